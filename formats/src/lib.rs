@@ -1,0 +1,10 @@
+//! The Parallax trace files.
+//!
+//! Everything that `tracegen` (scene to trace) and `replay` (trace to answer) share is in this
+//! crate, and the files it describes are the only joint between the two programs. FORMAT.md in
+//! the repository root is the byte-level specification.
+
+pub mod raytrace;
+pub mod texture;
+pub mod textrace;
+pub mod view;

@@ -1,0 +1,1 @@
+//! The ray trace (`.raytrace`): its data model.

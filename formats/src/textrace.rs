@@ -1,0 +1,207 @@
+//! The texture-address trace (`.textrace`): its data model.
+//!
+//! A trace holds, for every pass (one view of one frame), for every 16x16 tile, the primitives in
+//! submission order, and for each primitive the covered 2x2 quads with the texture coordinates of
+//! every uv group that its draw samples. Addresses are not stored: they follow from the texture
+//! table and from the layout that replay chooses.
+
+use crate::texture::{Sampler, Texture};
+use crate::view::{Eye, FrameViews, Hmd};
+use serde::{Deserialize, Serialize};
+
+/// Fixed-point steps per texel of a group's `extent` in which uv, dx, dy and cross are stored.
+///
+/// A lane's coordinate is the sum of at most four rounded terms, so it is exact to
+/// `4 * 0.5 / 2048` = 1/1024 texel.
+pub const SUBTEXELS: i32 = 2048;
+
+/// The whole description of a trace but for its quads.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TraceMeta {
+    /// Program and version that wrote the trace, `tracegen 0.1.0`.
+    pub tool: String,
+    /// Its arguments without the output paths, so that the same capture gives the same bytes.
+    pub command_line: Vec<String>,
+    /// Scene name or path as given.
+    pub scene: String,
+    /// Triangles in the scene, instances counted.
+    pub scene_triangles: u64,
+    /// Name of the camera (`default` or a camera node's).
+    pub camera: String,
+    /// Capture backend, `lavapipe` or `osmesa`.
+    pub backend: String,
+    /// Driver string as it names itself.
+    pub driver: String,
+    /// Seed of whatever was random in the capture.
+    pub seed: u64,
+    /// The display.
+    pub hmd: Hmd,
+    /// Eye matrices by frame.
+    pub frames: Vec<FrameViews>,
+}
+
+/// What a pass renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum PassKind {
+    /// The picture of one eye.
+    Main = 0,
+    /// A layer of a shadow map (texture accesses of alpha-masked casters).
+    Shadow = 1,
+}
+
+/// One pass: one view of one frame. Its tiles are numbered row by row from the top left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Pass {
+    /// Frame number.
+    pub frame: u32,
+    /// What it renders.
+    pub kind: PassKind,
+    /// Eye, or `None` for a pass that belongs to both.
+    pub eye: Option<Eye>,
+    /// Width and height in pixels.
+    pub size_px: [u32; 2],
+    /// Tile columns and rows; the last ones may be partly outside the image.
+    pub tiles: [u32; 2],
+}
+
+impl Pass {
+    /// Number of tiles.
+    #[must_use]
+    pub fn tile_count(&self) -> u32 {
+        self.tiles[0] * self.tiles[1]
+    }
+}
+
+/// One texture read that a draw makes per fragment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Sample {
+    /// Index into the texture table.
+    pub texture: u32,
+    /// Index into the sampler table.
+    pub sampler: u16,
+    /// Array layer.
+    pub layer: u16,
+    /// Texel offset at the sampled level (the taps of percentage-closer filtering).
+    pub offset: [i8; 2],
+}
+
+/// Textures that one draw samples at the same texture coordinates: one quad record serves all.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UvGroup {
+    /// Texels per unit of u and v that define the fixed-point step `1 / (SUBTEXELS * extent)`:
+    /// the largest level-0 size among the group's textures, by axis.
+    pub extent: [u32; 2],
+    /// The samples, in shader order.
+    pub samples: Vec<Sample>,
+}
+
+/// One draw call. The same draw has the same index in every pass.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Draw {
+    /// Material name for reports.
+    pub material: String,
+    /// Global number of its first primitive: primitive `p` of the draw is `first_primitive + p`
+    /// in every pass, so both eyes name the same triangle alike.
+    pub first_primitive: u32,
+    /// Number of primitives.
+    pub primitives: u32,
+    /// What it samples; at most 15 groups. Empty for an untextured draw, whose quads are still
+    /// recorded (with no group) because they take shader time.
+    pub groups: Vec<UvGroup>,
+}
+
+/// Group number of the record of a quad that samples nothing.
+pub const NO_GROUP: u8 = 15;
+
+/// One covered quad of one primitive and its coordinates in one uv group.
+///
+/// A quad with several groups is several consecutive records with the same position, groups
+/// ascending; a shadow-mapped quad that straddles two cascades has one record per cascade, each
+/// with the lanes that use it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct QuadRecord {
+    /// Quad column in the tile, 0 to 7.
+    pub x: u8,
+    /// Quad row in the tile, 0 to 7.
+    pub y: u8,
+    /// Covered lanes that take this sample: bit 0 top left, 1 top right, 2 bottom left, 3 bottom
+    /// right. Never 0.
+    pub mask: u8,
+    /// Index into the draw's groups, or `NO_GROUP`.
+    pub group: u8,
+    /// Coordinates of the top-left lane, fixed point (covered or not).
+    pub uv: [i32; 2],
+    /// Horizontal derivative, top row.
+    pub dx: [i32; 2],
+    /// Vertical derivative, left column.
+    pub dy: [i32; 2],
+    /// Change of the horizontal derivative from the top row to the bottom row.
+    pub cross: [i32; 2],
+}
+
+impl QuadRecord {
+    /// Fixed-point coordinates of a lane (0 to 3): `uv + i*dx + j*dy + i*j*cross`.
+    #[must_use]
+    #[inline]
+    pub fn lane_uv(&self, lane: u32) -> [i32; 2] {
+        let i = (lane & 1) as i32;
+        let j = (lane >> 1) as i32;
+        let axis = |a: usize| {
+            self.uv[a]
+                .wrapping_add(i.wrapping_mul(self.dx[a]))
+                .wrapping_add(j.wrapping_mul(self.dy[a]))
+                .wrapping_add((i * j).wrapping_mul(self.cross[a]))
+        };
+        [axis(0), axis(1)]
+    }
+}
+
+/// A run of records that belong to one primitive in one tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PrimitiveRun {
+    /// Global primitive number (see `Draw::first_primitive`), ascending within a tile.
+    pub primitive: u32,
+    /// Index into the draw table.
+    pub draw: u32,
+    /// Records `first..first + count` of the tile.
+    pub first: u32,
+    /// Number of records.
+    pub count: u32,
+}
+
+/// One decoded tile: its primitives in submission order and their quad records.
+///
+/// Within a primitive, quads follow the Morton curve over the tile's 8x8 quads.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tile {
+    /// Runs in submission order.
+    pub runs: Vec<PrimitiveRun>,
+    /// Records of all runs.
+    pub records: Vec<QuadRecord>,
+}
+
+impl Tile {
+    /// Empties the tile, keeping its memory for the next one.
+    pub fn clear(&mut self) {
+        self.runs.clear();
+        self.records.clear();
+    }
+}
+
+/// The tables of a trace: everything that is needed to turn a record into texel addresses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tables {
+    /// Description.
+    pub meta: TraceMeta,
+    /// Textures.
+    pub textures: Vec<Texture>,
+    /// Samplers.
+    pub samplers: Vec<Sampler>,
+    /// Draws in submission order.
+    pub draws: Vec<Draw>,
+    /// Passes in submission order; a stereo frame is left eye then right eye.
+    pub passes: Vec<Pass>,
+}

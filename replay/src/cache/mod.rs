@@ -1,0 +1,1 @@
+//! Set-associative caches and their hierarchy.

@@ -1,0 +1,12 @@
+//! Trace to answer: replays texture traces through caches and a texture unit in any tile order,
+//! and ray traces through a model of a mobile ray-tracing GPU.
+
+pub mod cache;
+pub mod cli;
+pub mod image;
+pub mod order;
+pub mod report;
+pub mod result;
+pub mod sgrt;
+pub mod sweep;
+pub mod tmu;

@@ -1,0 +1,3 @@
+//! `replay`: trace to answer.
+
+fn main() {}

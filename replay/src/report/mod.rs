@@ -1,0 +1,1 @@
+//! Tables, plots, JSON, CSV and the HTML report.

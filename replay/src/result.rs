@@ -1,0 +1,128 @@
+//! What a replay yields: plain data that the models fill and the printers read.
+
+use serde::{Deserialize, Serialize};
+
+/// Schema of the object that `replay run --json` prints.
+pub const RUN_SCHEMA: &str = "replay.run/1";
+
+/// Counters of one cache level, or of a part of its traffic (one view, texture, mip level, tile).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LevelCounters {
+    /// Bilinear footprints that came to this level.
+    pub footprints: u64,
+    /// Footprints of which any line missed.
+    pub footprint_misses: u64,
+    /// Distinct lines asked for, summed over footprints.
+    pub line_lookups: u64,
+    /// Lines that had to be fetched from below (primary misses).
+    pub line_misses: u64,
+    /// Lines that missed while their fetch was already in flight (timed mode only).
+    pub secondary_misses: u64,
+}
+
+impl LevelCounters {
+    /// Adds another part's counters.
+    pub fn add(&mut self, other: &Self) {
+        self.footprints += other.footprints;
+        self.footprint_misses += other.footprint_misses;
+        self.line_lookups += other.line_lookups;
+        self.line_misses += other.line_misses;
+        self.secondary_misses += other.secondary_misses;
+    }
+}
+
+/// A cache level's summary.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LevelResult {
+    /// L1: missing footprints over footprints. L2: missing line look-ups over line look-ups.
+    pub miss_rate: f64,
+    /// The same as `line_misses`; external traffic is the L2's.
+    pub misses: u64,
+    /// The counters (L1: summed over cores).
+    #[serde(flatten)]
+    pub counters: LevelCounters,
+}
+
+/// Texture-unit figures of a timed replay, summed over cores.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TmuResult {
+    /// Cycles in which a useful footprint left the pipeline over all cycles, 0 to 1.
+    pub utilization: f64,
+    /// Footprint issues that were wasted by threads looping for the next chance.
+    pub wasted_issues: u64,
+    /// Threads (quads) run.
+    pub threads: u64,
+    /// Extra trips through the pipeline after a miss.
+    pub loops: u64,
+}
+
+/// L1 and L2 counters of a part of the traffic.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// What the part is: a texture's name, `left`, `level 3`, ...
+    pub name: String,
+    /// First level.
+    pub l1: LevelCounters,
+    /// Second level.
+    pub l2: LevelCounters,
+}
+
+/// Per-tile counts of one pass, row by row.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TileMap {
+    /// Index of the pass in the trace.
+    pub pass: u32,
+    /// Tile columns and rows.
+    pub tiles: [u32; 2],
+    /// Covered lanes over pixels of the tile.
+    pub overdraw: Vec<f32>,
+    /// Footprints.
+    pub footprints: Vec<u32>,
+    /// Footprints with any L1 miss.
+    pub l1_misses: Vec<u32>,
+    /// Lines fetched from memory.
+    pub l2_misses: Vec<u32>,
+}
+
+/// Everything that one replay of one trace under one configuration yields.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunResult {
+    /// Quads replayed.
+    pub quads: u64,
+    /// Covered lanes of the records.
+    pub lanes: u64,
+    /// Bilinear footprints.
+    pub footprints: u64,
+    /// First level, all cores together.
+    pub l1: LevelResult,
+    /// Second level.
+    pub l2: LevelResult,
+    /// L2 line misses times the line size.
+    pub external_bytes: u64,
+    /// Distinct lines touched: the misses of an infinite cache, a lower bound for L2 misses.
+    pub unique_lines: u64,
+    /// Order-independent hash of the multiset of accesses (conservation check), as hex.
+    pub access_hash: String,
+    /// Texture unit; `None` in functional mode.
+    pub tmu: Option<TmuResult>,
+    /// Cycles until the last core is done; `None` in functional mode.
+    pub cycles: Option<u64>,
+    /// By view.
+    pub by_view: Vec<Part>,
+    /// By texture, in table order.
+    pub by_texture: Vec<Part>,
+    /// By mip level.
+    pub by_level: Vec<Part>,
+    /// Per-tile maps, only when asked for (`--tiles`; the report asks).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tile_maps: Vec<TileMap>,
+}
+
+/// Which trace a result belongs to.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TraceId {
+    /// Scene name from the trace.
+    pub scene: String,
+    /// CRC-32 of the whole file, 8 hex digits.
+    pub checksum: String,
+}

@@ -1,0 +1,1 @@
+//! The SGRT paper's model: reprojection, traversal and intersection, energy.

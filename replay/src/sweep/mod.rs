@@ -1,0 +1,1 @@
+//! Parameter sweeps: plan, run, resume.

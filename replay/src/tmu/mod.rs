@@ -1,0 +1,1 @@
+//! The texture mapping unit: looping for the next chance.

@@ -1,0 +1,3 @@
+//! `tracegen`: scene to trace.
+
+fn main() {}

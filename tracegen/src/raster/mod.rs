@@ -1,0 +1,1 @@
+//! Captures texture samples: a stereo raster pass through a Mesa driver.

@@ -1,0 +1,1 @@
+//! The companion ray tracer: traces stereo pairs and writes ray traces.
