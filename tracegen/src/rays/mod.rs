@@ -1,1 +1,5 @@
-//! The companion ray tracer: traces stereo pairs and writes ray traces.
+//! Ray tracing: a scene seen by both eyes, with every ray's work in the hierarchy recorded.
+
+pub mod bvh;
+pub mod ray;
+pub mod reference;
