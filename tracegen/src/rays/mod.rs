@@ -1,5 +1,11 @@
 //! Ray tracing: a scene seen by both eyes, with every ray's work in the hierarchy recorded.
 
 pub mod bvh;
+pub mod light;
+pub mod material;
 pub mod ray;
 pub mod reference;
+pub mod scene;
+pub mod soup;
+pub mod texture;
+pub mod tracer;
