@@ -52,14 +52,14 @@ pub enum SceneError {
         known: String,
     },
     /// A file that cannot be read.
-    #[error("{}: {place}: cannot read: {source}", file.display())]
+    #[error("{}: {place}: cannot read: {reason}", file.display())]
     Io {
         /// The file.
         file: PathBuf,
         /// What refers to it.
         place: String,
         /// The system's error.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// A file that is not what it claims to be.
     #[error("{}: {place}: expected {expected}, found {found}", file.display())]
@@ -217,9 +217,9 @@ impl Origin {
 
 /// Reads a whole file, saying what refers to it.
 pub(crate) fn read_file(file: &Path, place: &str) -> Result<Vec<u8>, SceneError> {
-    std::fs::read(file).map_err(|source| SceneError::Io {
+    std::fs::read(file).map_err(|reason| SceneError::Io {
         file: file.to_owned(),
         place: place.to_owned(),
-        source,
+        reason,
     })
 }
