@@ -5,6 +5,6 @@
 //! the repository root is the byte-level specification.
 
 pub mod raytrace;
-pub mod texture;
 pub mod textrace;
+pub mod texture;
 pub mod view;
