@@ -125,18 +125,14 @@ pub fn nice_step(span: f64, parts: u32) -> f64 {
         .unwrap_or(10.0 * decade)
 }
 
-/// Tick positions from `low` to `high` at a nice step, and the step.
+/// Multiples of `step` from `low` to `high`.
 #[must_use]
-pub fn ticks(low: f64, high: f64, parts: u32) -> (Vec<f64>, f64) {
-    let step = nice_step(high - low, parts);
+pub fn ticks(low: f64, high: f64, step: f64) -> Vec<f64> {
     let first = (low / step - 1e-9).ceil() as i64;
     let last = (high / step + 1e-9).floor() as i64;
-    (
-        (first..=last.max(first).min(first + 200))
-            .map(|i| i as f64 * step)
-            .collect(),
-        step,
-    )
+    (first..=last.max(first).min(first + 200))
+        .map(|i| i as f64 * step)
+        .collect()
 }
 
 /// Formats a number for a tick of the given step: just enough decimals, thousands apart.
@@ -209,9 +205,9 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_cover_the_range() {
-        let (at, step) = ticks(0.0, 12.3, 5);
+        let step = nice_step(12.3, 5);
         assert_eq!(step, 2.5);
-        assert_eq!(at, [0.0, 2.5, 5.0, 7.5, 10.0]);
+        assert_eq!(ticks(0.0, 12.3, step), [0.0, 2.5, 5.0, 7.5, 10.0]);
         assert_eq!(tick_label(7.5, step), "7.5");
         assert_eq!(tick_label(0.2, 0.05), "0.20");
     }

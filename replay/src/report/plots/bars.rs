@@ -109,8 +109,7 @@ impl BarChart {
         let step = theme::nice_step(top_value * 1.02, 5);
         let high = (top_value * 1.02 / step).ceil() * step;
         let scale = Scale::linear(0.0, high, bottom, TOP_PX);
-        let (at, step) = theme::ticks(0.0, high, 5);
-        let at: Vec<(f64, String)> = at
+        let at: Vec<(f64, String)> = theme::ticks(0.0, high, step)
             .into_iter()
             .map(|v| (v, theme::tick_label(v, step)))
             .collect();

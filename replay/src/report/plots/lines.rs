@@ -72,6 +72,8 @@ pub struct EndLabel {
     pub name: String,
     /// Its colour.
     pub color: plotters::style::RGBColor,
+    /// The series' last point, px; a leader line joins it to the name.
+    pub from_px: (f64, f64),
     /// Left end of the text, px.
     pub x_px: f64,
     /// Vertical middle of the text, px.
@@ -80,7 +82,7 @@ pub struct EndLabel {
 
 const LEFT_PX: f64 = 58.0;
 const TOP_PX: f64 = 54.0;
-const PLOT_PX: (f64, f64) = (520.0, 260.0);
+const PLOT_PX: (f64, f64) = (430.0, 260.0);
 const LABEL_GAP_PX: f64 = 15.0;
 
 struct Layout {
@@ -118,7 +120,7 @@ impl LineChart {
             .fold(0.0, f64::max);
         let bottom = TOP_PX + PLOT_PX.1;
         let right = LEFT_PX + PLOT_PX.0;
-        let width = (right + 14.0 + label_width + 8.0)
+        let width = (right + 24.0 + label_width + 8.0)
             .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0);
         let height = bottom + 44.0;
         draw(&self.title, (width.ceil() as u32, height as u32), |area| {
@@ -151,12 +153,18 @@ impl LineChart {
             }
             for label in &labels {
                 let at = (label.x_px, label.y_px);
+                let leader = [
+                    label.from_px,
+                    (label.x_px - 12.0, label.y_px),
+                    (label.x_px - 4.0, label.y_px),
+                ];
+                stroke(area, &leader, label.color, 1)?;
                 text(
                     area,
                     at,
                     &label.name,
                     theme::LABEL_PX,
-                    label.color,
+                    theme::INK,
                     Anchor::Start,
                 )?;
             }
@@ -189,10 +197,11 @@ impl LineChart {
         named
             .iter()
             .zip(placed)
-            .map(|((series, _), y_px)| EndLabel {
+            .map(|((series, end), y_px)| EndLabel {
+                from_px: (layout.x.at(end.0), layout.y.at(end.1)),
                 name: series.style.name.clone(),
                 color: series.style.color,
-                x_px: LEFT_PX + PLOT_PX.0 + 10.0,
+                x_px: LEFT_PX + PLOT_PX.0 + 22.0,
                 y_px,
             })
             .collect()
@@ -277,19 +286,17 @@ fn fit(
             at,
         );
     }
-    let (low, high) = if axis.range.is_some() {
-        (low, high)
-    } else {
-        let step = theme::nice_step((high - low).max(high.abs() * 1e-3), 5);
-        let low = if low >= 0.0 && low < 0.35 * high {
-            0.0
-        } else {
-            (low / step).floor() * step
-        };
-        (low, ((high / step).ceil() * step).max(low + step))
-    };
-    let (at, step) = theme::ticks(low, high, 5);
-    let ticks = at
+    let mut step = theme::nice_step((high - low).max(high.abs() * 1e-3), 5);
+    let (mut low, mut high) = (low, high);
+    if axis.range.is_none() {
+        if low >= 0.0 && low < 0.35 * high {
+            low = 0.0;
+            step = theme::nice_step(high, 5);
+        }
+        low = (low / step).floor() * step;
+        high = ((high / step).ceil() * step).max(low + step);
+    }
+    let ticks = theme::ticks(low, high, step)
         .into_iter()
         .map(|v| (v, theme::tick_label(v, step)))
         .collect();
