@@ -5,13 +5,24 @@
 //! cost in the bounding volume hierarchy. Lengths are metres; positions are `f32` relative to
 //! [`RaytraceMeta::origin`], so that a scene far from the world's origin loses no precision.
 
+mod bytes;
 pub mod camera;
+mod codec;
+mod file;
 pub mod half;
 pub mod normal;
+pub mod tables;
+
+#[cfg(test)]
+mod tests;
 
 use crate::textrace::TraceMeta;
 use crate::view::{Eye, TILE_SIZE_PX};
 pub use camera::EyeCamera;
+pub use file::{
+    EncodedRayTile, RAY_INDEX, RAY_INDEX_ENTRY_BYTES, RAY_TILES, Raytrace, RaytraceWriter,
+    encode_ray_tile,
+};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,10 @@
 //! Ray tracing: a scene seen by both eyes, with every ray's work in the hierarchy recorded.
 
 pub mod bvh;
+pub mod frame;
 pub mod light;
 pub mod material;
+pub mod picture;
 pub mod ray;
 pub mod reference;
 pub mod scene;
