@@ -138,7 +138,18 @@ mod tests {
 
     #[test]
     fn numbers_and_differences_come_back() {
-        let values = [0u32, 1, 127, 128, 300, 1 << 20, u32::MAX, 0, u32::MAX - 5, 7];
+        let values = [
+            0u32,
+            1,
+            127,
+            128,
+            300,
+            1 << 20,
+            u32::MAX,
+            0,
+            u32::MAX - 5,
+            7,
+        ];
         let mut out = ByteWriter::default();
         let mut previous = 0;
         for v in values {

@@ -191,7 +191,9 @@ pub(super) fn decode(
     let mut distances = Vec::with_capacity(hits);
     let mut previous = 0;
     for _ in 0..hits {
-        distances.push(f32::from_bits(input.difference(&mut previous, "a distance")?));
+        distances.push(f32::from_bits(
+            input.difference(&mut previous, "a distance")?,
+        ));
     }
     let mut normals = Vec::with_capacity(hits);
     let mut previous = [0; 2];
@@ -321,7 +323,10 @@ fn decode_ray(
     };
     let flags = HAS_ALPHA_TESTS | PARENT_IS_PRIMARY;
     if head >> 4 & !(flags >> 4) != 0 || (own == 0) != (kind == RayKind::Primary) {
-        return Err(input.fail("a primary ray first, then the others", format!("{head:#04x}")));
+        return Err(input.fail(
+            "a primary ray first, then the others",
+            format!("{head:#04x}"),
+        ));
     }
     let (parent, depth) = if own == 0 {
         (NO_PARENT, 0)

@@ -208,9 +208,8 @@ impl Raytrace {
             let expected = format!("24 bytes for each of {tiles} tiles");
             return Err(container.malformed(RAY_INDEX, 0, expected, format!("{bytes} bytes")));
         }
-        let index = container.parse_chunk(RAY_INDEX, |input| {
-            count(index_entry, tiles).parse(input)
-        })?;
+        let index =
+            container.parse_chunk(RAY_INDEX, |input| count(index_entry, tiles).parse(input))?;
         check_placement(&container, &index)?;
         Ok(Self {
             container,

@@ -157,7 +157,10 @@ fn check(tables: &RaytraceTables) -> std::result::Result<(), Broken> {
         found,
     };
     let [left, right] = &meta.eyes;
-    let fits = left.size_px.iter().all(|s| (1..=MAX_EYE_SIZE_PX).contains(s));
+    let fits = left
+        .size_px
+        .iter()
+        .all(|s| (1..=MAX_EYE_SIZE_PX).contains(s));
     if !fits || left.size_px != right.size_px {
         let expected = format!("the same size, 1 to {MAX_EYE_SIZE_PX} pixels, for both");
         let found = format!("{:?} and {:?}", left.size_px, right.size_px);
@@ -165,7 +168,11 @@ fn check(tables: &RaytraceTables) -> std::result::Result<(), Broken> {
     }
     if !(1..=MAX_SAMPLES_PER_PX).contains(&meta.samples_per_px) {
         let expected = format!("1 to {MAX_SAMPLES_PER_PX}");
-        return Err(broken("samples per pixel", expected, meta.samples_per_px.to_string()));
+        return Err(broken(
+            "samples per pixel",
+            expected,
+            meta.samples_per_px.to_string(),
+        ));
     }
     if meta.max_depth > MAX_DEPTH {
         let expected = format!("at most {MAX_DEPTH}");
@@ -181,7 +188,10 @@ fn check(tables: &RaytraceTables) -> std::result::Result<(), Broken> {
             found,
         };
         if previous.is_some_and(|p| p >= t.primitive) {
-            return Err(broken("ascending primitive numbers", t.primitive.to_string()));
+            return Err(broken(
+                "ascending primitive numbers",
+                t.primitive.to_string(),
+            ));
         }
         previous = Some(t.primitive);
         if t.material as usize >= tables.materials.len() {

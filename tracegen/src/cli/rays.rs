@@ -65,11 +65,17 @@ enum Tree {
 /// Unreadable input or wrong use.
 pub fn run(args: RaysArgs) -> anyhow::Result<()> {
     if args.scene.camera.frames > 1 {
-        bail!("--frames {}: a ray trace holds one frame", args.scene.camera.frames);
+        bail!(
+            "--frames {}: a ray trace holds one frame",
+            args.scene.camera.frames
+        );
     }
     if let Some(image) = &args.image {
         if *image == args.output {
-            bail!("--image and --output name the same file, {}", image.display());
+            bail!(
+                "--image and --output name the same file, {}",
+                image.display()
+            );
         }
     }
     if let Some(threads) = args.threads {
@@ -191,7 +197,12 @@ fn report(tables: &RaytraceTables, frame: &Frame, bytes: u64, at: [Duration; 3])
     let per_ray = |n: u64| n as f64 / rays.max(1) as f64;
     anstream::eprintln!(
         "hierarchy: {}, {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}",
-        bvh.builder, bvh.triangles, bvh.nodes, bvh.leaves, bvh.depth, bvh.sah_cost
+        bvh.builder,
+        bvh.triangles,
+        bvh.nodes,
+        bvh.leaves,
+        bvh.depth,
+        bvh.sah_cost
     );
     anstream::eprintln!(
         "rays: {rays} ({} primary, {} shadow, {} reflection, {} refraction), \

@@ -11,3 +11,6 @@ pub mod scene;
 pub mod soup;
 pub mod texture;
 pub mod tracer;
+
+#[cfg(test)]
+mod tests;
