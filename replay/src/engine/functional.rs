@@ -1,7 +1,7 @@
 //! Functional replay: no latencies. A footprint is the unit of time, and a miss fills at once.
 
 use super::feed::{Feed, Quad};
-use super::footprint::{Bundle, Footprints, SampleRef};
+use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
 use super::tally::{Place, Tally, access_hash};
 use super::{ReplayError, TileSource};
 use crate::cache::Cache;
@@ -23,6 +23,7 @@ pub struct Functional<'a, S: ?Sized, A, B> {
     footprints: &'a Footprints,
     cores: Vec<Core<A>>,
     l2: B,
+    scratch: Scratch,
     tally: Tally,
 }
 
@@ -33,7 +34,7 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Functional<'a, S, A, B> {
             .into_iter()
             .map(|l1| Core { l1, feed: Feed::default(), busy: false, clock: 0 })
             .collect();
-        Self { source, footprints, cores, l2, tally }
+        Self { source, footprints, cores, l2, scratch: footprints.scratch(), tally }
     }
 
     /// Runs all phases.
@@ -125,7 +126,7 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Functional<'a, S, A, B> {
             tally: &mut self.tally,
             footprints: 0,
         };
-        run_quad(self.footprints, &quad, &mut ports);
+        run_quad(self.footprints, &quad, &mut self.scratch, &mut ports);
         // An untextured quad takes its turn, too.
         core.clock += u64::from(ports.footprints.max(1));
         true
@@ -142,8 +143,8 @@ struct Ports<'a, A, B> {
 }
 
 #[inline]
-fn run_quad<A: Cache, B: Cache>(footprints: &Footprints, quad: &Quad<'_>, ports: &mut Ports<'_, A, B>) {
-    footprints.for_quad(quad.draw, quad.records, |sample, bundle| ports.bundle(sample, bundle));
+fn run_quad<A: Cache, B: Cache>(footprints: &Footprints, quad: &Quad<'_>, scratch: &mut Scratch, ports: &mut Ports<'_, A, B>) {
+    footprints.for_quad(quad.draw, quad.records, scratch, |sample, bundle| ports.bundle(sample, bundle));
 }
 
 impl<A: Cache, B: Cache> Ports<'_, A, B> {

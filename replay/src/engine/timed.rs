@@ -2,7 +2,7 @@
 //! which order the cores' misses reach the shared L2.
 
 use super::feed::Feed;
-use super::footprint::{Bundle, Footprints, SampleRef};
+use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
 use super::tally::{Place, Tally, access_hash};
 use super::{ReplayError, TileSource};
 use crate::cache::{Cache, InFlight};
@@ -33,6 +33,7 @@ pub struct Timed<'a, S: ?Sized, A, B> {
     config: &'a RunConfig,
     cores: Vec<Core<A>>,
     shared: Shared<B>,
+    scratch: Scratch,
     tally: Tally,
 }
 
@@ -67,7 +68,7 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
             })
             .collect();
         let shared = Shared { l2, in_flight: InFlight::default() };
-        Self { source, footprints, config, cores, shared, tally }
+        Self { source, footprints, config, cores, shared, scratch: footprints.scratch(), tally }
     }
 
     /// Runs all phases; a phase starts when the last core is done with the one before.
@@ -153,7 +154,9 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
             footprints: 0,
         };
         self.footprints
-            .for_quad(quad.draw, quad.records, |sample, bundle| probe.bundle(sample, bundle));
+            .for_quad(quad.draw, quad.records, &mut self.scratch, |sample, bundle| {
+                probe.bundle(sample, bundle);
+            });
         let (footprints, ready) = (probe.footprints, probe.ready);
         if footprints > 0 {
             core.pipeline.start(footprints, ready);
