@@ -9,9 +9,16 @@
 //! file order: a trace should not depend on a sort by distance, which differs between the eyes).
 
 pub mod backend;
+pub mod bin;
+pub mod capture;
 pub mod cascades;
 pub mod cull;
 pub mod draws;
 pub mod groups;
 pub mod lavapipe;
 pub mod lighting;
+pub mod masked;
+pub mod picture;
+pub mod quantise;
+pub mod regions;
+pub mod tiles;

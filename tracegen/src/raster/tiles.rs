@@ -77,6 +77,9 @@ impl TileRules {
             self.add_quad(records, quad, scratch, &mut counts);
         }
         scratch.order = order;
+        if scratch.tile.runs.last().is_some_and(|run| run.count == 0) {
+            scratch.tile.runs.pop();
+        }
         counts.records = scratch.tile.records.len() as u64;
         counts
     }
