@@ -21,4 +21,5 @@ pub mod masked;
 pub mod picture;
 pub mod quantise;
 pub mod regions;
+pub mod textures;
 pub mod tiles;

@@ -226,8 +226,8 @@ fn record_depth(lane: Lane, passes: bool, depth: f32) {
 fn texture_uv(slot: u32, uv: vec4<f32>) -> vec2<f32> {
     let row0 = material.uv_rows[2u * slot];
     let row1 = material.uv_rows[2u * slot + 1u];
-    let set = select(uv.xy, uv.zw, row0.w > 0.5);
-    return vec2(dot(row0.xyz, vec3(set, 1.0)), dot(row1.xyz, vec3(set, 1.0)));
+    let chosen = select(uv.xy, uv.zw, row0.w > 0.5);
+    return vec2(dot(row0.xyz, vec3(chosen, 1.0)), dot(row1.xyz, vec3(chosen, 1.0)));
 }
 
 fn base_color(in: Fragment) -> vec4<f32> {
