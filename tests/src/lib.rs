@@ -1,1 +1,62 @@
-//! placeholder
+//! Helpers of the end-to-end tests: the built programs, the golden traces, the real scenes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The workspace root.
+#[must_use]
+pub fn root() -> PathBuf {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    manifest.parent().expect("tests/ has a parent").to_owned()
+}
+
+/// A built program (`tracegen` or `replay`) of the same profile as the running test.
+///
+/// # Panics
+/// When it is not built: `cargo test --workspace` builds it, `-p parallax-tests` alone does not.
+#[must_use]
+pub fn program(name: &str) -> Command {
+    let test = std::env::current_exe().expect("a running test has a path");
+    let profile = test
+        .ancestors()
+        .find(|dir| dir.file_name().is_some_and(|f| f == "deps"))
+        .and_then(Path::parent)
+        .expect("test binaries live in <profile>/deps");
+    let path = profile.join(name);
+    assert!(
+        path.exists(),
+        "{} is not built: run `make test`, or `cargo build --release` first",
+        path.display()
+    );
+    Command::new(path)
+}
+
+/// Runs a command and returns its output; panics with its standard error unless it exits 0.
+///
+/// # Panics
+/// When the command cannot be started or fails.
+pub fn run_ok(command: &mut Command) -> Output {
+    let output = command.output().expect("the program starts");
+    assert!(
+        output.status.success(),
+        "{command:?} failed with {:?}:\n{}",
+        output.status.code(),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    output
+}
+
+/// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout),
+/// or `None`, with a line on stderr that says so.
+#[must_use]
+pub fn real_scene(relative: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("PARALLAX_SCENES")
+        .map_or_else(|| root().join("../shared/scenes"), PathBuf::from);
+    let path = folder.join(relative);
+    if path.exists() {
+        Some(path)
+    } else {
+        eprintln!("SKIPPED: {} is absent (set PARALLAX_SCENES)", path.display());
+        None
+    }
+}

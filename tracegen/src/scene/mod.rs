@@ -38,6 +38,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Background and ambient radiance, linear RGB.
     pub sky: Vec3,
+    /// The scene's own choice of `--shadows`: 0 none, 1 one shadow map, more: that many cascades.
+    pub shadow_cascades: u32,
 }
 
 /// An indexed triangle list with one material.

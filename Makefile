@@ -1,0 +1,34 @@
+# Two commands do everything on a fresh Debian or Ubuntu machine with Rust:
+#   make demo   capture the built-in scenes, replay them, write out/report.html
+#   make test   run every test
+# The rest is for daily work.
+
+CARGO ?= cargo
+OUT   ?= out
+
+.PHONY: demo test lint build mesa golden paper clean
+
+demo: mesa build
+	@OUT="$(OUT)" scripts/demo.sh
+
+test: mesa
+	@CARGO="$(CARGO)" scripts/test.sh
+
+lint:
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --release --workspace --all-targets --locked -- -D warnings
+
+build:
+	$(CARGO) build --release --locked -p tracegen -p replay
+
+# lavapipe is the only thing needed from outside Cargo.
+mesa:
+	@scripts/install-mesa.sh
+
+# Rewrites the golden traces and results; review the diff.
+golden: mesa build
+	scripts/golden.sh
+
+clean:
+	$(CARGO) clean
+	rm -rf "$(OUT)"

@@ -1,1 +1,0 @@
-//! The ray trace (`.raytrace`): its data model.

@@ -1,0 +1,365 @@
+//! The ray trace (`.raytrace`): its data model.
+//!
+//! A trace holds one stereo frame: for each eye and each 16x16 tile the pixels row by row, and for
+//! each pixel its primary hit, its colour and the tree of rays that it spawned with what each ray
+//! cost in the bounding volume hierarchy. Lengths are metres; positions are `f32` relative to
+//! [`RaytraceMeta::origin`], so that a scene far from the world's origin loses no precision.
+
+pub mod camera;
+
+use crate::textrace::TraceMeta;
+use crate::view::{Eye, TILE_SIZE_PX};
+pub use camera::EyeCamera;
+use serde::{Deserialize, Serialize};
+
+/// What the whole trace says about itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RaytraceMeta {
+    /// Scene, camera, HMD, eye matrices, tool and command line; `backend` is `rays` and `driver`
+    /// names the traversal.
+    pub trace: TraceMeta,
+    /// World position that every position of the trace is relative to, metres.
+    pub origin: [f64; 3],
+    /// Left and right eye, relative to `origin`: what rays are made of.
+    pub eyes: [EyeCamera; 2],
+    /// Levels of secondary rays: a primary ray has depth 0, the deepest reflection `max_depth`.
+    pub max_depth: u32,
+    /// Samples per pixel; a tile holds this many records a pixel.
+    pub samples_per_px: u32,
+    /// True where every ray lists the nodes and triangles that it visited.
+    pub has_visits: bool,
+    /// Background radiance straight up and at the horizon, linear RGB (a miss is between them).
+    pub sky: [[f32; 3]; 2],
+    /// Ambient radiance added to diffuse surfaces, linear RGB.
+    pub ambient: [f32; 3],
+}
+
+/// What a material does to a ray.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RayMaterial {
+    /// Name for reports.
+    pub name: String,
+    /// Scatters light: has a view-independent part.
+    pub diffuse: bool,
+    /// Spawns reflection rays.
+    pub mirror: bool,
+    /// Spawns refraction rays (glass, or a blended surface that lets rays pass straight on).
+    pub glass: bool,
+    /// Has a specular highlight.
+    pub glossy: bool,
+    /// Has texels with alpha below a cutoff, through which rays go on.
+    pub alpha_masked: bool,
+}
+
+impl RayMaterial {
+    /// True where the colour depends on where it is seen from.
+    #[must_use]
+    pub fn view_dependent(&self) -> bool {
+        self.mirror || self.glass || self.glossy
+    }
+}
+
+/// A light; one shadow ray goes to each from every shaded hit that faces it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
+pub enum RayLight {
+    /// Parallel light.
+    Directional {
+        /// Unit direction in which the light travels.
+        direction: [f32; 3],
+        /// Irradiance, linear RGB.
+        color: [f32; 3],
+    },
+    /// A point light.
+    Point {
+        /// Position relative to the trace's origin.
+        position: [f32; 3],
+        /// Radiant intensity, linear RGB.
+        color: [f32; 3],
+    },
+}
+
+/// A triangle that a primary ray of either eye hit: enough to intersect it again.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RayTriangle {
+    /// Primitive number: triangles of all instances in submission order.
+    pub primitive: u32,
+    /// Object number: the scene's instance.
+    pub object: u32,
+    /// Index into the material table.
+    pub material: u32,
+    /// Vertices relative to the trace's origin, counter-clockwise from the front.
+    pub vertices: [[f32; 3]; 3],
+}
+
+/// How rays walk the hierarchy, hence what a step is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TraversalKind {
+    /// Binary tree; a step tests both children's boxes, as T&I unit 2.0 does.
+    Bvh2,
+    /// Eight-wide tree; a step tests all children's boxes.
+    Bvh8,
+}
+
+/// The bounding volume hierarchy that the counts refer to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BvhSummary {
+    /// Builder and version, `obvhs 0.4 ploc+reinsertion`.
+    pub builder: String,
+    /// Pinned build settings, name and value.
+    pub settings: Vec<(String, String)>,
+    /// Tree walked.
+    pub traversal: TraversalKind,
+    /// Triangles in the tree.
+    pub triangles: u64,
+    /// Inner nodes of the tree walked; a step reads one.
+    pub nodes: u64,
+    /// Leaves.
+    pub leaves: u64,
+    /// Inner nodes on the longest path from the root to a leaf.
+    pub depth: u32,
+    /// Surface-area cost of the binary tree, traversal and intersection cost 1 each.
+    pub sah_cost: f64,
+    /// Memory of one inner node in bytes (all children's boxes).
+    pub bytes_per_node: u32,
+    /// Memory of one triangle in bytes.
+    pub bytes_per_triangle: u32,
+}
+
+impl BvhSummary {
+    /// Byte address of a visit when nodes lie from 0 and triangles, in leaf order, behind them.
+    #[must_use]
+    pub fn address(&self, visit: Visit) -> u64 {
+        match visit {
+            Visit::Node(index) => u64::from(index) * u64::from(self.bytes_per_node),
+            Visit::Triangle(slot) => {
+                self.nodes * u64::from(self.bytes_per_node)
+                    + u64::from(slot) * u64::from(self.bytes_per_triangle)
+            }
+        }
+    }
+
+    /// Bytes that a visit reads.
+    #[must_use]
+    pub fn visit_bytes(&self, visit: Visit) -> u32 {
+        match visit {
+            Visit::Node(_) => self.bytes_per_node,
+            Visit::Triangle(_) => self.bytes_per_triangle,
+        }
+    }
+}
+
+/// One memory access of a ray in the hierarchy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Visit {
+    /// A step at the inner node of this index.
+    Node(u32),
+    /// A test of the triangle in this slot (leaf order, not the primitive number).
+    Triangle(u32),
+}
+
+/// Why a ray was cast.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum RayKind {
+    /// From the eye; closest hit.
+    #[default]
+    Primary = 0,
+    /// Towards a light; any hit.
+    Shadow = 1,
+    /// Mirrored; closest hit.
+    Reflection = 2,
+    /// Through glass or a blended surface; closest hit.
+    Refraction = 3,
+}
+
+/// How a ray ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum Outcome {
+    /// Left the scene; for a shadow ray: reached the light.
+    #[default]
+    Miss = 0,
+    /// Found its closest hit.
+    Hit = 1,
+    /// A shadow ray that something blocks.
+    Occluded = 2,
+}
+
+/// Parent of a primary ray.
+pub const NO_PARENT: u32 = u32::MAX;
+
+/// One ray and its cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayRecord {
+    /// Why it was cast.
+    pub kind: RayKind,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// 0 for a primary ray; a secondary ray has its parent's depth plus 1.
+    pub depth: u8,
+    /// Index, among the same pixel's rays, of the ray whose hit spawned it; less than its own.
+    /// [`NO_PARENT`] for a primary ray.
+    pub parent: u32,
+    /// Inner nodes visited ([`TraversalKind`] says what one step tests).
+    pub steps: u32,
+    /// Triangles tested.
+    pub triangle_tests: u32,
+    /// Alpha look-ups at masked triangles.
+    pub alpha_tests: u32,
+}
+
+impl RayRecord {
+    /// Entries that the ray has in [`RayTile::visits`], where the trace holds visits.
+    #[must_use]
+    pub fn visit_count(&self) -> u64 {
+        u64::from(self.steps) + u64::from(self.triangle_tests)
+    }
+}
+
+/// A primary hit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hit {
+    /// Distance from the eye in metres (primary directions have unit length).
+    pub t: f32,
+    /// Position relative to the trace's origin: eye + t * direction.
+    pub position: [f32; 3],
+    /// Unit normal of the triangle, towards the eye.
+    pub geometric_normal: [f32; 3],
+    /// Unit interpolated normal, towards the eye; quantised to 2 x 16 bits (octahedral).
+    pub shading_normal: [f32; 3],
+    /// Texture coordinates, set 0, before any texture transform.
+    pub uv: [f32; 2],
+    /// Primitive number; the triangle table has its vertices.
+    pub primitive: u32,
+    /// Object (instance) number.
+    pub object: u32,
+    /// Index into the material table.
+    pub material: u32,
+}
+
+/// One pixel (one sample of it where there are several).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelRecord {
+    /// Primary hit, or `None` where the sky is seen.
+    pub hit: Option<Hit>,
+    /// Radiance that does not change with the viewpoint: diffuse with shadows, ambient, emitted;
+    /// for a miss nothing. Linear RGB, rounded to half floats.
+    pub view_independent: [f32; 3],
+    /// Radiance that does: highlights, reflection, refraction, sky. Linear RGB, rounded to half
+    /// floats.
+    pub view_dependent: [f32; 3],
+    /// First of its rays in [`RayTile::rays`]: its primary ray.
+    pub first_ray: u32,
+    /// Number of its rays, at least 1; parents before children.
+    pub ray_count: u32,
+}
+
+impl PixelRecord {
+    /// Final colour: the sum of both parts, linear RGB.
+    #[must_use]
+    pub fn color(&self) -> [f32; 3] {
+        std::array::from_fn(|c| self.view_independent[c] + self.view_dependent[c])
+    }
+}
+
+/// One decoded tile of one eye.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RayTile {
+    /// Left and top pixel.
+    pub origin_px: [u32; 2],
+    /// Width and height in pixels; less than 16 at the right and bottom edge of some images.
+    pub size_px: [u32; 2],
+    /// Records row by row, `samples_per_px` a pixel.
+    pub pixels: Vec<PixelRecord>,
+    /// Rays of all pixels, in pixel order.
+    pub rays: Vec<RayRecord>,
+    /// Visits of all rays in ray order, [`RayRecord::visit_count`] each, in the order made; empty
+    /// where the trace has none.
+    pub visits: Vec<Visit>,
+}
+
+impl RayTile {
+    /// Empties the tile, keeping its memory for the next one.
+    pub fn clear(&mut self) {
+        self.origin_px = [0; 2];
+        self.size_px = [0; 2];
+        self.pixels.clear();
+        self.rays.clear();
+        self.visits.clear();
+    }
+
+    /// Rays of a pixel, its primary ray first; empty for a pixel that is not of this tile.
+    #[must_use]
+    pub fn rays_of(&self, pixel: &PixelRecord) -> &[RayRecord] {
+        let first = pixel.first_ray as usize;
+        self.rays
+            .get(first..first.saturating_add(pixel.ray_count as usize))
+            .unwrap_or(&[])
+    }
+}
+
+/// Everything in a trace but its tiles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RaytraceTables {
+    /// Description and eyes.
+    pub meta: RaytraceMeta,
+    /// The hierarchy that was walked.
+    pub bvh: BvhSummary,
+    /// Materials.
+    pub materials: Vec<RayMaterial>,
+    /// Lights.
+    pub lights: Vec<RayLight>,
+    /// Triangles that primary rays of either eye hit, by ascending primitive number.
+    pub triangles: Vec<RayTriangle>,
+}
+
+impl RaytraceTables {
+    /// The triangle of a primitive that a primary ray hit.
+    #[must_use]
+    pub fn triangle(&self, primitive: u32) -> Option<&RayTriangle> {
+        let at = self
+            .triangles
+            .binary_search_by_key(&primitive, |t| t.primitive)
+            .ok()?;
+        self.triangles.get(at)
+    }
+
+    /// Camera of an eye.
+    #[must_use]
+    pub fn camera(&self, eye: Eye) -> &EyeCamera {
+        let [left, right] = &self.meta.eyes;
+        match eye {
+            Eye::Left => left,
+            Eye::Right => right,
+        }
+    }
+
+    /// Tile columns and rows of an eye's image; tiles are numbered row by row from the top left.
+    #[must_use]
+    pub fn tiles(&self) -> [u32; 2] {
+        self.meta.eyes[0].size_px.map(|s| s.div_ceil(TILE_SIZE_PX))
+    }
+
+    /// Number of tiles of an eye's image.
+    #[must_use]
+    pub fn tile_count(&self) -> u32 {
+        let [columns, rows] = self.tiles();
+        columns * rows
+    }
+
+    /// Left and top pixel, width and height of a tile.
+    #[must_use]
+    pub fn tile_rect(&self, tile: u32) -> ([u32; 2], [u32; 2]) {
+        let [columns, _] = self.tiles();
+        let [width, height] = self.meta.eyes[0].size_px;
+        let columns = columns.max(1);
+        let x = (tile % columns) * TILE_SIZE_PX;
+        let y = (tile / columns) * TILE_SIZE_PX;
+        let clip = |at: u32, size: u32| size.saturating_sub(at).min(TILE_SIZE_PX);
+        ([x, y], [clip(x, width), clip(y, height)])
+    }
+}

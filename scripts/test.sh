@@ -1,0 +1,12 @@
+#!/bin/sh
+# Runs every test of the workspace and closes with the totals.
+set -eu
+cd "$(dirname "$0")/.."
+log=$(mktemp)
+status=$(mktemp)
+trap 'rm -f "$log" "$status"' EXIT
+# A plain sh has no pipefail: the status travels through a file.
+{ "${CARGO:-cargo}" test --release --workspace --locked --no-fail-fast 2>&1; echo $? >"$status"; } | tee "$log"
+awk '/^test result:/ { passed += $4; failed += $6; ignored += $8 }
+     END { printf "%d passed, %d failed, %d skipped\n", passed, failed, ignored }' "$log"
+exit "$(cat "$status")"
