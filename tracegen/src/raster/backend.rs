@@ -6,12 +6,11 @@ use formats::texture::TexelFormat;
 use formats::view::EyeView;
 use glam::Mat4;
 
-/// Group number under which a masked draw's alpha and depth travel to the in-order replay. It
-/// never reaches a trace.
-pub const DEPTH_GROUP: u8 = 14;
-
 /// Bytes of one raw record.
 pub const RECORD_BYTES: u64 = 44;
+
+/// Bytes of one raw depth.
+pub const DEPTH_BYTES: u64 = 20;
 
 /// One covered quad in one uv group as the instrumented shader writes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -23,12 +22,11 @@ pub struct RawRecord {
     pub primitive: u32,
     /// Index into the draw table.
     pub draw: u32,
-    /// Coordinates of the top-left lane; for [`DEPTH_GROUP`] the depths of lanes 0 and 1.
+    /// Coordinates of the top-left lane, covered or not.
     pub uv: [f32; 2],
-    /// Horizontal derivative of the top row; for [`DEPTH_GROUP`] the depths of lanes 2 and 3.
+    /// Horizontal derivative of the top row.
     pub dx: [f32; 2],
-    /// Vertical derivative of the left column; for [`DEPTH_GROUP`] the bits of the first hold the
-    /// covered lanes (its mask holds those that pass the alpha test).
+    /// Vertical derivative of the left column.
     pub dy: [f32; 2],
     /// Change of the horizontal derivative from the top row to the bottom row.
     pub cross: [f32; 2],
@@ -53,7 +51,7 @@ impl RawRecord {
         (self.header >> 24 & 15) as u8
     }
 
-    /// Uv group, `NO_GROUP` or [`DEPTH_GROUP`].
+    /// Uv group or `NO_GROUP`.
     #[must_use]
     pub fn group(&self) -> u8 {
         (self.header >> 28) as u8
@@ -64,6 +62,26 @@ impl RawRecord {
     pub fn pack(qx: u32, qy: u32, mask: u8, group: u8) -> u32 {
         qx & 0xfff | (qy & 0xfff) << 12 | u32::from(mask & 15) << 24 | u32::from(group) << 28
     }
+}
+
+/// What the in-order replay of an alpha-masked draw needs to know about a quad.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct RawDepth {
+    /// Depth of each lane.
+    pub depth: [f32; 4],
+    /// Covered lanes whose alpha passes the test.
+    pub passing: u32,
+}
+
+/// The raw records of one region, in no particular order.
+#[derive(Clone, Copy, Debug)]
+pub struct RawRecords<'a> {
+    /// One a quad and uv group.
+    pub quads: &'a [RawRecord],
+    /// `depths[i]` belongs to `quads[i]` where that is group 0 of a masked draw, and means nothing
+    /// elsewhere; empty where no draw is masked.
+    pub depths: &'a [RawDepth],
 }
 
 /// A rectangle of the view in pixels.
@@ -202,7 +220,7 @@ pub trait CaptureBackend {
     fn render_shadows(&mut self, draws: &DrawList, lighting: &Lighting) -> Result<(), RasterError>;
 
     /// Renders a region of a view into the view's picture, and with `capture` hands every record
-    /// of the region to `sink`, in no particular order.
+    /// of the region to `sink`.
     ///
     /// # Errors
     /// Driver errors.
@@ -212,7 +230,7 @@ pub trait CaptureBackend {
         view: &View<'_>,
         region: Region,
         capture: bool,
-        sink: &mut dyn FnMut(&[RawRecord]) -> Result<(), RasterError>,
+        sink: &mut dyn FnMut(RawRecords<'_>) -> Result<(), RasterError>,
     ) -> Result<Rendered, RasterError>;
 
     /// Reads the picture that the regions since have filled: sRGB RGBA8, row by row.

@@ -2,7 +2,7 @@
 
 use super::backend::RasterError;
 use super::groups::MaterialGroups;
-use crate::scene::{AlphaMode, Scene};
+use crate::scene::{AlphaMode, Material, Scene};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::textrace::{Draw, Sample, UvGroup};
 use glam::{Affine3A, Vec3};
@@ -14,6 +14,29 @@ pub const SHADOW_SIZE: u32 = 2048;
 /// footprints tile a 4x4 neighbourhood without overlap.
 pub const SHADOW_TAPS: [[i8; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
 
+/// How a draw treats alpha. Where alpha is a constant, the test is made here and not a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DrawMode {
+    /// Every fragment is kept.
+    Opaque,
+    /// Fragments are discarded by their texture's alpha.
+    Masked,
+    /// Blended over what is there, depth not written.
+    Blended,
+}
+
+impl DrawMode {
+    /// The mode of a material, or `None` where nothing of it is seen.
+    fn new(material: &Material) -> Option<Self> {
+        match material.alpha {
+            AlphaMode::Opaque => Some(Self::Opaque),
+            AlphaMode::Blend => Some(Self::Blended),
+            AlphaMode::Mask(_) if material.base_color_texture.is_some() => Some(Self::Masked),
+            AlphaMode::Mask(cutoff) => (material.base_color.w >= cutoff).then_some(Self::Opaque),
+        }
+    }
+}
+
 /// One draw call: one instance of one mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct DrawCall {
@@ -21,6 +44,8 @@ pub struct DrawCall {
     pub mesh: usize,
     /// Index into the scene's materials.
     pub material: usize,
+    /// How it treats alpha.
+    pub mode: DrawMode,
     /// Object to world.
     pub transform: Affine3A,
     /// The transform mirrors: front faces wind the other way round.
@@ -44,7 +69,7 @@ pub struct DrawList {
 
 impl DrawList {
     /// Orders the scene's instances: opaque and masked ones in the scene's order, then blended
-    /// ones in the scene's order. Instances without triangles are left out.
+    /// ones in the scene's order. Instances that show nothing are left out.
     ///
     /// # Errors
     /// More primitives than 32 bits number, or an index out of range.
@@ -64,7 +89,8 @@ impl DrawList {
                         scene.materials.len()
                     ))
                 })?;
-                if (material.alpha == AlphaMode::Blend) != blended || mesh.triangles() == 0 {
+                let Some(mode) = DrawMode::new(material) else { continue };
+                if (mode == DrawMode::Blended) != blended || mesh.triangles() == 0 {
                     continue;
                 }
                 if let Some(index) = mesh.indices.iter().find(|&&i| i as usize >= mesh.positions.len()) {
@@ -77,6 +103,7 @@ impl DrawList {
                 calls.push(DrawCall {
                     mesh: instance.mesh,
                     material: mesh.material,
+                    mode,
                     transform: instance.transform,
                     mirrored: instance.mirrored(),
                     first_primitive: next_primitive,

@@ -248,7 +248,7 @@ fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     }
 }
 
-fn view_entries() -> [wgpu::BindGroupLayoutEntry; 6] {
+fn view_entries() -> [wgpu::BindGroupLayoutEntry; 7] {
     let fragment = wgpu::ShaderStages::FRAGMENT;
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
     [
@@ -266,6 +266,7 @@ fn view_entries() -> [wgpu::BindGroupLayoutEntry; 6] {
             },
         ),
         entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
+        entry(6, fragment, storage(false)),
     ]
 }
 
