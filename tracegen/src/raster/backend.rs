@@ -2,7 +2,6 @@
 
 use super::draws::DrawList;
 use super::lighting::Lighting;
-use formats::texture::TexelFormat;
 use formats::view::EyeView;
 use glam::Mat4;
 
@@ -91,19 +90,6 @@ pub struct Region {
     pub origin_px: [u32; 2],
     /// Width and height.
     pub size_px: [u32; 2],
-}
-
-/// A texture as the driver gets it: every mip level of every layer, ready to upload.
-#[derive(Clone, Debug)]
-pub struct DeviceTexture {
-    /// Width and height of level 0 in texels, multiples of 4 for block formats.
-    pub size: [u32; 2],
-    /// BC1 or RGBA8.
-    pub format: TexelFormat,
-    /// Colours are sRGB encoded.
-    pub srgb: bool,
-    /// Bytes of each level, largest first.
-    pub levels: Vec<Vec<u8>>,
 }
 
 /// What every draw of a view shares.

@@ -2,6 +2,7 @@
 
 use super::backend::RasterError;
 use super::groups::MaterialGroups;
+use crate::scene::textures::TextureSet;
 use crate::scene::{AlphaMode, Material, Scene};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::textrace::{Draw, Sample, UvGroup};
@@ -126,23 +127,10 @@ impl DrawList {
         })
     }
 
-    /// Texture table of the trace: the scene's images in their order, then the shadow maps.
-    /// `levels` and `sizes` are those of the uploaded textures.
+    /// Texture table of the trace: the scene's textures in their order, then the shadow maps.
     #[must_use]
-    pub fn textures(&self, scene: &Scene, uploaded: &[super::backend::DeviceTexture]) -> Vec<Texture> {
-        let mut textures: Vec<Texture> = scene
-            .images
-            .iter()
-            .zip(uploaded)
-            .map(|(image, device)| Texture {
-                name: image.name.clone(),
-                size: device.size,
-                levels: device.levels.len() as u32,
-                layers: 1,
-                format: device.format,
-                color_space: image.color_space,
-            })
-            .collect();
+    pub fn textures(&self, set: &TextureSet) -> Vec<Texture> {
+        let mut textures: Vec<Texture> = set.textures.iter().map(|t| t.texture.clone()).collect();
         if self.cascades > 0 {
             textures.push(Texture {
                 name: "shadow cascades".into(),
@@ -156,9 +144,10 @@ impl DrawList {
         textures
     }
 
-    /// Sampler and draw tables of the trace; `textures` is [`DrawList::textures`]' result.
+    /// Sampler and draw tables of the trace; `textures` is [`DrawList::textures`]' result for the
+    /// same `set`.
     #[must_use]
-    pub fn tables(&self, scene: &Scene, textures: &[Texture]) -> (Vec<Sampler>, Vec<Draw>) {
+    pub fn tables(&self, scene: &Scene, set: &TextureSet, textures: &[Texture]) -> (Vec<Sampler>, Vec<Draw>) {
         let mut samplers = Vec::new();
         let material_groups: Vec<Vec<UvGroup>> = scene
             .materials
@@ -173,11 +162,15 @@ impl DrawList {
                         let samples = group
                             .iter()
                             .filter_map(|&slot| slots[slot])
-                            .map(|t| Sample {
-                                texture: t.image as u32,
-                                sampler: intern(&mut samplers, t.sampler),
-                                layer: 0,
-                                offset: [0, 0],
+                            .filter_map(|t| {
+                                // Images that only unplaced materials use have no texture.
+                                let texture = (*set.of_image.get(t.image)?)?;
+                                Some(Sample {
+                                    texture: texture as u32,
+                                    sampler: intern(&mut samplers, t.sampler),
+                                    layer: 0,
+                                    offset: [0, 0],
+                                })
                             })
                             .collect();
                         uv_group(samples, textures)
@@ -188,7 +181,7 @@ impl DrawList {
                     let samples = SHADOW_TAPS
                         .iter()
                         .map(|&offset| Sample {
-                            texture: scene.images.len() as u32,
+                            texture: set.textures.len() as u32,
                             sampler,
                             layer: layer as u16,
                             offset,

@@ -6,10 +6,11 @@ mod targets;
 mod uniforms;
 mod upload;
 
-use super::backend::{CaptureBackend, DEPTH_BYTES, DeviceTexture, RECORD_BYTES, RasterError, RawRecords, Region, Rendered, View};
+use super::backend::{CaptureBackend, DEPTH_BYTES, RECORD_BYTES, RasterError, RawRecords, Region, Rendered, View};
 use super::draws::{DrawCall, DrawList, DrawMode};
 use super::lighting::Lighting;
 use crate::scene::Scene;
+use crate::scene::textures::TextureSet;
 use device::Gpu;
 use pipelines::{PipelineKey, Pipelines, Role};
 use targets::{ShadowMaps, Targets};
@@ -46,7 +47,7 @@ impl Lavapipe {
     pub fn new(
         scene: &Scene,
         draws: &DrawList,
-        textures: &[DeviceTexture],
+        textures: &TextureSet,
         view_size_px: [u32; 2],
         record_budget_bytes: u64,
     ) -> Result<Self, RasterError> {

@@ -127,6 +127,7 @@ impl Pipelines {
             ("LEADERS", f64::from(key.leaders)),
             ("CASCADES", f64::from(key.cascades)),
             ("BLENDED", f64::from(u8::from(key.role == Role::Blended))),
+            ("MASKED", f64::from(u8::from(key.role == Role::Masked))),
         ];
         let compilation_options = wgpu::PipelineCompilationOptions {
             constants: &constants,

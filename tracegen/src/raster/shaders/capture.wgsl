@@ -14,6 +14,8 @@ override LEADERS: u32 = 0u;
 override CASCADES: u32 = 0u;
 // Alpha reaches the target (blended materials).
 override BLENDED: bool = false;
+// The base colour texture has BC1's one-bit alpha, whose transparent texels are black.
+override MASKED: bool = false;
 
 const BASE_COLOR: u32 = 0u;
 const NORMAL: u32 = 1u;
@@ -250,7 +252,9 @@ fn texture_uv(slot: u32, uv: vec4<f32>) -> vec2<f32> {
 fn base_color(in: Fragment) -> vec4<f32> {
     var color = material.base_color;
     if (TEXTURES & (1u << BASE_COLOR)) != 0u {
-        color *= textureSample(base_color_texture, base_color_sampler, texture_uv(BASE_COLOR, in.uv));
+        var texel = textureSample(base_color_texture, base_color_sampler, texture_uv(BASE_COLOR, in.uv));
+        if MASKED { texel = vec4(texel.rgb / max(texel.a, 0.02), texel.a); }
+        color *= texel;
     }
     return color;
 }
@@ -413,7 +417,7 @@ fn shade(in: Fragment, front: bool, base: vec4<f32>, found: ShadowLookup) -> vec
     let mirror = reflect(-s.to_eye, normal);
     let gloss = (1.0 - roughness) * (1.0 - roughness);
     light += (s.albedo * sky_radiance(normal) + s.f0 * sky_radiance(mirror) * gloss) * occlusion;
-    return vec4(tone_map(light), select(1.0, base.a, BLENDED));
+    return vec4(tone_map(0.75 * light), select(1.0, base.a, BLENDED));
 }
 
 // Everything that a fragment of an opaque or blended draw does.
@@ -492,7 +496,7 @@ fn fragment_background(in: Background) -> @location(0) vec4<f32> {
     let zenith = view.sky.rgb * vec3(0.75, 0.85, 1.0);
     let sky = mix(view.sky.rgb, zenith, clamp(direction.y, 0.0, 1.0));
     let radiance = mix(view.ground.rgb, sky, smoothstep(-0.1, 0.02, direction.y));
-    return vec4(tone_map(radiance), 1.0);
+    return vec4(tone_map(0.75 * radiance), 1.0);
 }
 
 // Alpha-masked casters.
