@@ -1,14 +1,15 @@
 //! `tracegen raster`.
 
 use super::scene_args::{SceneArgs, SceneSetup};
-use crate::raster::backend::{CaptureBackend, DeviceTexture};
+use crate::raster::backend::CaptureBackend;
 use crate::raster::capture::{CaptureJob, Pictures};
 use crate::raster::draws::DrawList;
 use crate::raster::lavapipe::Lavapipe;
 use crate::raster::lighting::Lighting;
 use crate::raster::tiles::CaptureCounts;
-use crate::raster::{picture, textures};
+use crate::raster::picture;
 use crate::scene::LoadOptions;
+use crate::scene::textures::TextureSet;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::textrace::{Tables, TextraceWriter, TraceMeta};
@@ -53,10 +54,13 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         limit_threads(threads)?;
     }
     let started = Instant::now();
-    let setup = args.scene.setup(None, &LoadOptions::ALL)?;
-    let cascades = if args.shadows { CASCADES } else { 0 };
+    let mut setup = args.scene.setup(None, &LoadOptions::ALL)?;
+    let cascades = if args.shadows { CASCADES } else { setup.scene.shadow_cascades.min(CASCADES) };
     let draws = DrawList::new(&setup.scene, cascades)?;
-    let uploads = textures::for_device(&setup.scene);
+    let uploads = TextureSet::compress_and_free(&mut setup.scene)?;
+    for note in &uploads.notes {
+        super::warn(note);
+    }
     let size_px = setup.hmd.eye_size_px;
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
     let tables = tables(&setup, &args.scene.scene, &draws, &uploads, &backend);
@@ -121,11 +125,11 @@ fn tables(
     setup: &SceneSetup,
     spec: &str,
     draws: &DrawList,
-    uploads: &[DeviceTexture],
+    uploads: &TextureSet,
     backend: &dyn CaptureBackend,
 ) -> Tables {
-    let textures = draws.textures(&setup.scene, uploads);
-    let (samplers, draw_table) = draws.tables(&setup.scene, &textures);
+    let textures = draws.textures(uploads);
+    let (samplers, draw_table) = draws.tables(&setup.scene, uploads, &textures);
     Tables {
         meta: TraceMeta {
             tool: concat!("tracegen ", env!("CARGO_PKG_VERSION")).into(),

@@ -1,6 +1,6 @@
 //! Captures the frames of a scene into a trace.
 
-use super::backend::{CaptureBackend, RasterError, RawRecord, View};
+use super::backend::{CaptureBackend, RasterError, RawRecords, View};
 use super::bin::{Bins, TileRect};
 use super::draws::DrawList;
 use super::lighting::Lighting;
@@ -124,7 +124,7 @@ impl CaptureJob<'_> {
         tables: &Tables,
         writer: &mut TextraceWriter<W>,
     ) -> Result<(Pictures, CaptureCounts), RasterError> {
-        let rules = TileRules::new(tables);
+        let rules = TileRules::new(tables, self.draws);
         let lighting = self.light_frame(views);
         backend.render_shadows(self.draws, &lighting)?;
         let mut pictures = Pictures::default();
@@ -139,7 +139,7 @@ impl CaptureJob<'_> {
             let visible = cull::visible_draws(self.draws, view.clip_from_world());
             view.visible = &visible;
             let columns = tables.passes[pass].tiles[0];
-            let mut sink = |rect: &TileRect, records: &[RawRecord]| {
+            let mut sink = |rect: &TileRect, records: RawRecords<'_>| {
                 let (tiles, of_region) = encode_region(&rules, tables, rect, records)?;
                 counts += of_region;
                 for (number, tile) in tiles.into_iter().enumerate() {
@@ -163,9 +163,9 @@ fn encode_region(
     rules: &TileRules,
     tables: &Tables,
     rect: &TileRect,
-    records: &[RawRecord],
+    records: RawRecords<'_>,
 ) -> Result<(Vec<EncodedTile>, CaptureCounts), RasterError> {
-    let bins = Bins::new(records, rect);
+    let bins = Bins::new(records.quads, rect);
     let encoded: Vec<(EncodedTile, CaptureCounts)> = (0..rect.count())
         .into_par_iter()
         .map_init(Scratch::default, |scratch, tile| {

@@ -5,7 +5,7 @@
 //! of a row. Memory stays bounded by one region's records however large the frame, and each
 //! region's tiles are complete, so they can be written at once.
 
-use super::backend::{CaptureBackend, RasterError, RawRecord, Region, Rendered, View};
+use super::backend::{CaptureBackend, RasterError, RawRecords, Region, Rendered, View};
 use super::bin::TileRect;
 use super::draws::DrawList;
 use formats::view::TILE_SIZE_PX;
@@ -22,7 +22,7 @@ pub fn capture_view(
     view: &View<'_>,
     size_px: [u32; 2],
     parts: u32,
-    sink: &mut dyn FnMut(&TileRect, &[RawRecord]) -> Result<(), RasterError>,
+    sink: &mut dyn FnMut(&TileRect, RawRecords<'_>) -> Result<(), RasterError>,
 ) -> Result<u32, RasterError> {
     let whole = TileRect {
         origin: [0, 0],
@@ -34,14 +34,18 @@ pub fn capture_view(
     let mut rendered = 0;
     while let Some(rect) = open.pop() {
         let mut handed_over = false;
-        let mut pass_on = |records: &[RawRecord]| {
+        let mut pass_on = |records: RawRecords<'_>| {
             handed_over = true;
             sink(&rect, records)
         };
         match backend.render(draws, view, region(&rect, size_px), true, &mut pass_on)? {
             Rendered::Complete { .. } => {
                 if !handed_over {
-                    sink(&rect, &[])?;
+                    let nothing = RawRecords {
+                        quads: &[],
+                        depths: &[],
+                    };
+                    sink(&rect, nothing)?;
                 }
                 rendered += 1;
             }

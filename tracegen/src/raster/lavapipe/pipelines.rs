@@ -127,6 +127,7 @@ impl Pipelines {
             ("LEADERS", f64::from(key.leaders)),
             ("CASCADES", f64::from(key.cascades)),
             ("BLENDED", f64::from(u8::from(key.role == Role::Blended))),
+            ("MASKED", f64::from(u8::from(key.role == Role::Masked))),
         ];
         let compilation_options = wgpu::PipelineCompilationOptions {
             constants: &constants,
@@ -248,7 +249,7 @@ fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     }
 }
 
-fn view_entries() -> [wgpu::BindGroupLayoutEntry; 6] {
+fn view_entries() -> [wgpu::BindGroupLayoutEntry; 7] {
     let fragment = wgpu::ShaderStages::FRAGMENT;
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
     [
@@ -266,6 +267,7 @@ fn view_entries() -> [wgpu::BindGroupLayoutEntry; 6] {
             },
         ),
         entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
+        entry(6, fragment, storage(false)),
     ]
 }
 

@@ -2,11 +2,12 @@
 
 use super::device::Gpu;
 use super::pipelines::Layouts;
-use crate::raster::backend::{DeviceTexture, RasterError};
+use crate::raster::backend::RasterError;
 use crate::raster::draws::DrawList;
 use crate::raster::groups::MATERIAL_TEXTURES;
+use crate::scene::textures::{CompressedTexture, TextureSet};
 use crate::scene::{AlphaMode, Material, Mesh, Scene};
-use formats::texture::{Filter, MipFilter, Sampler, TexelFormat, Wrap};
+use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
 use glam::{Mat4, Vec4};
 use wgpu::util::DeviceExt;
 
@@ -72,7 +73,7 @@ impl SceneBuffers {
         layouts: &Layouts,
         scene: &Scene,
         draws: &DrawList,
-        textures: &[DeviceTexture],
+        textures: &TextureSet,
     ) -> Result<Self, RasterError> {
         let mut used = vec![false; scene.meshes.len()];
         for call in &draws.calls {
@@ -84,6 +85,7 @@ impl SceneBuffers {
             meshes.push(used.then(|| upload_mesh(gpu, mesh, limit)).transpose()?);
         }
         let views = textures
+            .textures
             .iter()
             .map(|t| upload_texture(gpu, t))
             .collect::<Result<Vec<_>, _>>()?;
@@ -91,7 +93,7 @@ impl SceneBuffers {
         let materials = scene
             .materials
             .iter()
-            .map(|m| bind_material(gpu, layouts, m, &views, &absent))
+            .map(|m| bind_material(gpu, layouts, m, textures, &views, &absent))
             .collect();
         let instances = instance_rows(draws);
         let instances = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -169,24 +171,34 @@ fn instance_rows(draws: &DrawList) -> Vec<InstanceData> {
 }
 
 /// Stands for the textures that a material lacks; the pipelines never sample it.
-fn white() -> DeviceTexture {
-    DeviceTexture {
-        size: [1, 1],
-        format: TexelFormat::Rgba8,
-        srgb: false,
+fn white() -> CompressedTexture {
+    CompressedTexture {
+        texture: Texture {
+            name: "absent".into(),
+            size: [1, 1],
+            levels: 1,
+            layers: 1,
+            format: TexelFormat::Rgba8,
+            color_space: ColorSpace::Linear,
+        },
         levels: vec![vec![255; 4]],
     }
 }
 
-fn upload_texture(gpu: &Gpu, texture: &DeviceTexture) -> Result<wgpu::TextureView, RasterError> {
-    let format = match (texture.format, texture.srgb) {
-        (TexelFormat::Bc1, true) => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
-        (TexelFormat::Bc1, false) => wgpu::TextureFormat::Bc1RgbaUnorm,
-        (TexelFormat::Rgba8, true) => wgpu::TextureFormat::Rgba8UnormSrgb,
-        (TexelFormat::Rgba8, false) => wgpu::TextureFormat::Rgba8Unorm,
-        (other, _) => {
+fn upload_texture(gpu: &Gpu, compressed: &CompressedTexture) -> Result<wgpu::TextureView, RasterError> {
+    let texture = &compressed.texture;
+    let srgb = texture.color_space == ColorSpace::Srgb;
+    let format = match texture.format {
+        TexelFormat::Bc1 if srgb => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
+        TexelFormat::Bc1 => wgpu::TextureFormat::Bc1RgbaUnorm,
+        TexelFormat::Bc3 if srgb => wgpu::TextureFormat::Bc3RgbaUnormSrgb,
+        TexelFormat::Bc3 => wgpu::TextureFormat::Bc3RgbaUnorm,
+        TexelFormat::Rgba8 if srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        TexelFormat::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
+        other => {
             return Err(RasterError::Scene(format!(
-                "textures are uploaded as BC1 or RGBA8, not {other:?}"
+                "texture {}: expected BC1, BC3 or RGBA8, found {other:?}",
+                texture.name
             )));
         }
     };
@@ -209,7 +221,7 @@ fn upload_texture(gpu: &Gpu, texture: &DeviceTexture) -> Result<wgpu::TextureVie
                         height: texture.size[1],
                         depth_or_array_layers: 1,
                     },
-                    mip_level_count: texture.levels.len() as u32,
+                    mip_level_count: texture.levels,
                     sample_count: 1,
                     dimension: wgpu::TextureDimension::D2,
                     format,
@@ -217,7 +229,7 @@ fn upload_texture(gpu: &Gpu, texture: &DeviceTexture) -> Result<wgpu::TextureVie
                     view_formats: &[],
                 },
                 wgpu::util::TextureDataOrder::LayerMajor,
-                &texture.levels.concat(),
+                &compressed.levels.concat(),
             )
             .create_view(&wgpu::TextureViewDescriptor::default())
     })
@@ -227,6 +239,7 @@ fn bind_material(
     gpu: &Gpu,
     layouts: &Layouts,
     material: &Material,
+    set: &TextureSet,
     views: &[wgpu::TextureView],
     absent: &wgpu::TextureView,
 ) -> wgpu::BindGroup {
@@ -246,7 +259,9 @@ fn bind_material(
         resource: uniform.as_entire_binding(),
     }];
     for (binding, texture) in (1..).zip(&textures) {
-        let view = texture.and_then(|t| views.get(t.image)).unwrap_or(absent);
+        let view = texture
+            .and_then(|t| (*set.of_image.get(t.image)?).and_then(|i| views.get(i)))
+            .unwrap_or(absent);
         entries.push(wgpu::BindGroupEntry {
             binding,
             resource: wgpu::BindingResource::TextureView(view),
