@@ -6,6 +6,8 @@
 
 pub mod container;
 pub mod error;
+pub mod footprint;
+pub mod layout;
 pub mod parse;
 pub mod raytrace;
 pub mod textrace;
