@@ -31,7 +31,8 @@ impl Axis {
     /// each of the level's texels.
     pub fn new(steps: i64, wrap: Wrap, offset: i32, bytes: Vec<u32>) -> Self {
         let size = bytes.len() as i64;
-        let exact = steps % size == 0 && ((steps / size) as u64).is_power_of_two() && steps / size > 1;
+        let exact =
+            steps % size == 0 && ((steps / size) as u64).is_power_of_two() && steps / size > 1;
         Self {
             size: size as i32,
             wrap,

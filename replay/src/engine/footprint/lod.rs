@@ -53,15 +53,31 @@ pub fn fast_log2(x: f32) -> f32 {
 pub fn levels(lod: f32, sampler: &Sampler, last: u32) -> Levels {
     // NaN (degenerate derivatives) is magnification, too.
     if !(lod > 0.0) {
-        return Levels { first: 0, both: false, filter: sampler.mag };
+        return Levels {
+            first: 0,
+            both: false,
+            filter: sampler.mag,
+        };
     }
     let filter = sampler.min;
     match sampler.mip {
-        MipFilter::None => Levels { first: 0, both: false, filter },
-        MipFilter::Nearest => Levels { first: ((lod + 0.5) as u32).min(last), both: false, filter },
+        MipFilter::None => Levels {
+            first: 0,
+            both: false,
+            filter,
+        },
+        MipFilter::Nearest => Levels {
+            first: ((lod + 0.5) as u32).min(last),
+            both: false,
+            filter,
+        },
         MipFilter::Linear => {
             let first = (lod as u32).min(last);
-            Levels { first, both: first < last, filter }
+            Levels {
+                first,
+                both: first < last,
+                filter,
+            }
         }
     }
 }

@@ -15,8 +15,8 @@ pub use bundle::Bundle;
 use super::ReplayError;
 use crate::config::{RunConfig, SamplingConfig};
 use axis::Axis;
-use formats::texture::{Filter, Sampler};
 use formats::textrace::{QuadRecord, Tables};
+use formats::texture::{Filter, Sampler};
 use lod::Derivatives;
 use std::sync::Arc;
 
@@ -85,8 +85,17 @@ impl Footprints {
     /// Memory for [`Self::for_quad`].
     #[must_use]
     pub fn scratch(&self) -> Scratch {
-        let kinds = self.draws.iter().flatten().map(|g| g.kinds.len()).max().unwrap_or(0);
-        Scratch { bundles: vec![[Bundle::default(); 2]; kinds], both: vec![false; kinds] }
+        let kinds = self
+            .draws
+            .iter()
+            .flatten()
+            .map(|g| g.kinds.len())
+            .max()
+            .unwrap_or(0);
+        Scratch {
+            bundles: vec![[Bundle::default(); 2]; kinds],
+            both: vec![false; kinds],
+        }
     }
 
     /// Lines of the whole address space.
@@ -129,14 +138,28 @@ impl Footprints {
     #[inline(always)]
     fn bundles(&self, kind: &Kind, record: &QuadRecord, out: &mut [Bundle; 2]) -> bool {
         let texels = |d: [i32; 2]| [0, 1].map(|a| d[a] as f32 * kind.to_texels[a]);
-        let derivatives = Derivatives { dx: texels(record.dx), dy: texels(record.dy) };
+        let derivatives = Derivatives {
+            dx: texels(record.dx),
+            dy: texels(record.dy),
+        };
         let last = kind.levels.len() as u32 - 1;
         let levels = lod::levels(lod::lod(derivatives, &self.sampling), &kind.sampler, last);
-        let lanes = if self.helper_lanes { 15 } else { record.mask & 15 };
+        let lanes = if self.helper_lanes {
+            15
+        } else {
+            record.mask & 15
+        };
         let uv = [0, 1, 2, 3].map(|lane| record.lane_uv(lane));
         self.fill(kind, levels.first, levels.filter, lanes, &uv, &mut out[0]);
         if levels.both {
-            self.fill(kind, levels.first + 1, levels.filter, lanes, &uv, &mut out[1]);
+            self.fill(
+                kind,
+                levels.first + 1,
+                levels.filter,
+                lanes,
+                &uv,
+                &mut out[1],
+            );
         }
         levels.both
     }

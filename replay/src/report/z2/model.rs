@@ -1,8 +1,9 @@
 //! The rows of the experiment, their averages and their checks, as plain data (`replay.paper/1`).
 
 use crate::config::{OrderKind, RunConfig};
-use crate::paper::{closed_form_utilization, z2_row, z2_table};
+use crate::paper::{z2_row, z2_table};
 use crate::result::{Part, RunResult, TileMap, TraceId};
+use crate::tmu::closed_form as closed_form_utilization;
 use formats::textrace::TraceMeta;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@ use super::model::{Detail, PaperReport, Row, TraceInfo};
 use super::tables::{busiest, caches_title, l1_miss_pct, l2_miss_pct, order_title};
 use crate::config::OrderKind;
 use crate::order::{View, WorkItem, by_kind};
-use crate::paper::{closed_form_utilization, z2_table};
+use crate::paper::z2_table;
 use crate::report::plots::bars::{BarChart, BarGroup};
 use crate::report::plots::contours::{ContourChart, PointSeries};
 use crate::report::plots::hbars::HBarChart;
@@ -14,6 +14,7 @@ use crate::report::plots::paths::{PathPlot, Stop};
 use crate::report::plots::{PlotError, SeriesStyle};
 use crate::report::theme;
 use crate::result::{Part, TileMap};
+use crate::tmu::closed_form as closed_form_utilization;
 
 fn style(order: OrderKind) -> SeriesStyle {
     SeriesStyle {
