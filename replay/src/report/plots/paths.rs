@@ -1,7 +1,7 @@
 //! A tile order as its path over both eyes' tiles (the Z2 paper's Figs. 2 and 3).
 
 use super::heatmap::{HeatMap, Panel};
-use super::{Anchor, Area, PlotError, draw, stroke, text};
+use super::{Anchor, Area, PlotError, draw, fill, stroke, text};
 use crate::report::theme;
 
 /// A stop of the path: the eye (0 left, 1 right), column and row.
@@ -143,6 +143,8 @@ impl PathPlot {
             )?;
         }
         for (step, stop) in self.numbering() {
+            let (x, y) = centre(stop);
+            fill(area, (x - 8.0, y - 6.0), (x + 8.0, y + 6.0), theme::PAPER)?;
             text(
                 area,
                 centre(stop),

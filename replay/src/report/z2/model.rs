@@ -179,8 +179,8 @@ pub struct Detail {
 pub struct PaperReport {
     /// `replay.paper/1`.
     pub schema: String,
-    /// Version of this program.
-    pub version: String,
+    /// Program and version.
+    pub tool: String,
     /// Configuration of the first run; caches and order vary as the rows say.
     pub config: RunConfig,
     /// Traces.
@@ -204,7 +204,7 @@ impl PaperReport {
     pub fn new(traces: Vec<TraceInfo>, base: RunConfig, runs: &[Run], functional: &[Run]) -> Self {
         let mut report = Self {
             schema: PAPER_SCHEMA.to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            tool: concat!("replay ", env!("CARGO_PKG_VERSION")).to_owned(),
             config: base,
             rows: runs
                 .iter()

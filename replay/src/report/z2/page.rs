@@ -295,7 +295,7 @@ fn configuration(report: &PaperReport) -> Markup {
     html! {
         p {
             "Mode " (mode) "; varied: orders " (orders.join(", ")) "; L1/L2 " (caches.join(", ")) " KiB. "
-            "Everything else as below. Written by replay " (report.version) "."
+            "Everything else as below. Written by " (report.tool) "."
         }
         (folded("full configuration (TOML)", &text))
     }
