@@ -30,7 +30,10 @@ pub enum ReplayError {
     /// The configuration is impossible.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The trace cannot be read.
+    /// The trace file is damaged.
+    #[error(transparent)]
+    Format(#[from] formats::FormatError),
+    /// A tile cannot be replayed.
     #[error("pass {pass} tile {tile}: {message}")]
     Trace {
         /// Pass index.

@@ -2,10 +2,16 @@
 
 use super::axis::Axis;
 use super::{Footprints, Group, Kind, Level, SampleRef};
-use crate::config::{FilterOverride, RunConfig};
+use crate::config::RunConfig;
 use crate::engine::ReplayError;
+<<<<<<< HEAD
 use formats::textrace::{SUBTEXELS, Sample, Tables, UvGroup};
 use formats::texture::{Filter, MipFilter, Sampler, TexelFormat, Texture};
+=======
+use formats::layout::{Layout, LevelLayout};
+use formats::textrace::{SUBTEXELS, Sample, Tables, UvGroup};
+use formats::texture::{Sampler, TexelFormat};
+>>>>>>> main
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -30,7 +36,12 @@ pub(super) struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     pub(super) fn new(tables: &'a Tables, config: &'a RunConfig) -> Result<Self, ReplayError> {
+<<<<<<< HEAD
         let layout = Layout::new(&tables.textures, config);
+=======
+        let layout = Layout::new(&tables.textures, &config.layout)
+            .map_err(|error| ReplayError::Tables(error.to_string()))?;
+>>>>>>> main
         Ok(Self {
             tables,
             config,
@@ -42,11 +53,27 @@ impl<'a> Builder<'a> {
     pub(super) fn finish(mut self) -> Result<Footprints, ReplayError> {
         let lines = self
             .layout
+<<<<<<< HEAD
             .total_bytes()
+=======
+            .end()
+>>>>>>> main
             .div_ceil(u64::from(self.config.line_bytes));
         if lines >= u64::from(u32::MAX) {
             return Err(ReplayError::Tables(format!(
                 "textures take {lines} lines: expected fewer than 2^32"
+            )));
+        }
+        let largest = self
+            .layout
+            .textures()
+            .iter()
+            .map(|t| t.layer_bytes)
+            .max()
+            .unwrap_or(0);
+        if largest > u64::from(u32::MAX / 2) {
+            return Err(ReplayError::Tables(format!(
+                "a texture layer takes {largest} bytes: expected at most 2 GiB"
             )));
         }
         let tables = self.tables;
@@ -76,7 +103,11 @@ impl<'a> Builder<'a> {
                     out.kinds.push(kind);
                     out.kinds.len() - 1
                 });
+<<<<<<< HEAD
             let base = self.base(sample);
+=======
+            let base = self.base(sample).unwrap_or(0);
+>>>>>>> main
             out.samples.push((
                 slot,
                 SampleRef {
@@ -89,9 +120,15 @@ impl<'a> Builder<'a> {
     }
 
     /// First byte of the sample's texture layer.
+<<<<<<< HEAD
     fn base(&self, sample: &Sample) -> u64 {
         self.layout
             .address(sample.texture as usize, u32::from(sample.layer), 0, [0, 0])
+=======
+    fn base(&self, sample: &Sample) -> Option<u64> {
+        let placed = self.layout.textures().get(sample.texture as usize)?;
+        Some(placed.base + u64::from(sample.layer) * placed.layer_bytes)
+>>>>>>> main
     }
 
     fn kind(&mut self, sample: &Sample, extent: [u32; 2]) -> Result<Arc<Kind>, ReplayError> {
@@ -115,12 +152,13 @@ impl<'a> Builder<'a> {
         if layer >= texture.layers {
             return Err(unknown("layer", sample.layer.into()));
         }
-        let base = self.base(sample);
+        let placed = &self.layout.textures()[index];
+        let base = placed.base + u64::from(layer) * placed.layer_bytes;
         let key = KindKey {
             size: texture.size,
             levels: texture.levels,
-            format: self.layout.format(index),
-            sampler: overridden(*sampler, texture, self.config.sampling.filter),
+            format: placed.format,
+            sampler: self.config.sampling.filter.apply(sampler),
             offset: sample.offset,
             extent,
             skew_bytes: (base % u64::from(self.config.line_bytes)) as u32,
@@ -129,6 +167,7 @@ impl<'a> Builder<'a> {
             return Ok(Arc::clone(kind));
         }
         let steps = extent.map(|texels| i64::from(SUBTEXELS) * i64::from(texels));
+<<<<<<< HEAD
         let levels = (0..texture.levels)
             .map(|level| {
                 let at = |texel: [u32; 2]| self.layout.address(index, layer, level, texel);
@@ -154,8 +193,32 @@ impl<'a> Builder<'a> {
                 }
             })
             .collect();
+=======
+        let level = |layout: &LevelLayout| {
+            let axis = |a: usize| {
+                let bytes = (0..layout.size[a]).map(|texel| {
+                    let mut block = [0; 2];
+                    block[a] = texel / placed.block.texels[a];
+                    layout.placement.index(block) as u32 * placed.block.bytes
+                });
+                Axis::new(
+                    steps[a],
+                    key.sampler.wrap[a],
+                    sample.offset[a],
+                    bytes.collect(),
+                )
+            };
+            Level {
+                base_bytes: layout.offset_bytes as u32,
+                u: axis(0),
+                v: axis(1),
+            }
+        };
+        let levels = placed.levels.iter().map(level).collect();
+>>>>>>> main
         let kind = Arc::new(Kind {
-            to_texels: [0, 1].map(|a| texture.size[a] as f32 / steps[a] as f32),
+            size: texture.size,
+            extent,
             sampler: key.sampler,
             skew_bytes: key.skew_bytes,
             levels,
@@ -164,6 +227,7 @@ impl<'a> Builder<'a> {
         Ok(kind)
     }
 }
+<<<<<<< HEAD
 
 /// The sampler under a filter override. Textures without levels keep their sampler: a shadow map
 /// is never filtered otherwise.
@@ -237,3 +301,5 @@ impl Layout {
                 + u64::from(x / b))
     }
 }
+=======
+>>>>>>> main
