@@ -64,7 +64,7 @@ impl Encoding {
 }
 
 /// The whole description of a trace but for its quads.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TraceMeta {
     /// Program and version that wrote the trace, `tracegen 0.1.0`.
     pub tool: String,
@@ -245,7 +245,7 @@ impl Tile {
 }
 
 /// The tables of a trace: everything that is needed to turn a record into texel addresses.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tables {
     /// Description.
     pub meta: TraceMeta,
