@@ -24,7 +24,11 @@ pub struct ExperimentArgs {
     #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
     orders: String,
     /// L1/L2 sizes in KiB, comma-separated
-    #[arg(long, value_name = "L1/L2,...", default_value = "8/128,16/128,8/256,16/256")]
+    #[arg(
+        long,
+        value_name = "L1/L2,...",
+        default_value = "8/128,16/128,8/256,16/256"
+    )]
     caches: String,
     /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
     #[arg(long = "as", value_name = "SCENE")]
@@ -46,7 +50,10 @@ impl ExperimentArgs {
         super::set_threads(self.threads)?;
         let base = self.machine.resolve()?;
         let usual = RunConfig::default();
-        ensure!(base.order == usual.order, "--order is varied here; use --orders");
+        ensure!(
+            base.order == usual.order,
+            "--order is varied here; use --orders"
+        );
         ensure!(
             (base.l1.size_bytes, base.l2.size_bytes) == (usual.l1.size_bytes, usual.l2.size_bytes),
             "--l1 and --l2 are varied here; use --caches"
@@ -63,7 +70,12 @@ impl ExperimentArgs {
             .iter()
             .map(|path| super::open_textrace(path))
             .collect::<Result<Vec<_>>>()?;
-        let names = labels(&opened.iter().map(|(t, id)| (t.tables(), id)).collect::<Vec<_>>());
+        let names = labels(
+            &opened
+                .iter()
+                .map(|(t, id)| (t.tables(), id))
+                .collect::<Vec<_>>(),
+        );
         let subjects: Vec<Subject> = opened
             .iter()
             .zip(names)
@@ -94,7 +106,10 @@ impl ExperimentArgs {
                 let (label, path) = match image.split_once('=') {
                     Some((label, path)) => (label, path),
                     None if known.len() == 1 => (known[0], image.as_str()),
-                    None => bail!("--image {image}: expected LABEL=FILE with one of {}", known.join(", ")),
+                    None => bail!(
+                        "--image {image}: expected LABEL=FILE with one of {}",
+                        known.join(", ")
+                    ),
                 };
                 ensure!(
                     known.contains(&label),
@@ -145,19 +160,27 @@ pub fn check_conservation(report: &PaperReport) -> std::result::Result<(), Strin
     if wrong.is_empty() {
         return Ok(());
     }
-    Err(format!("orders replayed different accesses: {}", wrong.join("; ")))
+    Err(format!(
+        "orders replayed different accesses: {}",
+        wrong.join("; ")
+    ))
 }
 
 fn parse_orders(text: &str) -> Result<Vec<OrderKind>> {
     if text == "all" {
-        let others = OrderKind::ALL.into_iter().filter(|o| !Z2_ORDERS.contains(o));
+        let others = OrderKind::ALL
+            .into_iter()
+            .filter(|o| !Z2_ORDERS.contains(o));
         return Ok(Z2_ORDERS.into_iter().chain(others).collect());
     }
     let mut orders = Vec::new();
     for name in text.split(',').map(str::trim) {
         let Some(order) = OrderKind::ALL.into_iter().find(|o| o.name() == name) else {
             let known: Vec<&str> = OrderKind::ALL.iter().map(|o| o.name()).collect();
-            bail!("--orders: expected `all` or some of {}, found `{name}`", known.join(", "));
+            bail!(
+                "--orders: expected `all` or some of {}, found `{name}`",
+                known.join(", ")
+            );
         };
         if !orders.contains(&order) {
             orders.push(order);
@@ -167,10 +190,18 @@ fn parse_orders(text: &str) -> Result<Vec<OrderKind>> {
 }
 
 fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
-    let kib = |number: &str| number.trim().parse::<u64>().ok().filter(|n| (1..=1 << 20).contains(n));
+    let kib = |number: &str| {
+        number
+            .trim()
+            .parse::<u64>()
+            .ok()
+            .filter(|n| (1..=1 << 20).contains(n))
+    };
     text.split(',')
         .map(|pair| {
-            let sizes = pair.split_once('/').and_then(|(l1, l2)| Some((kib(l1)? << 10, kib(l2)? << 10)));
+            let sizes = pair
+                .split_once('/')
+                .and_then(|(l1, l2)| Some((kib(l1)? << 10, kib(l2)? << 10)));
             sizes.with_context(|| {
                 let usual = Z2_CACHES_KIB.map(|(l1, l2)| format!("{l1}/{l2}")).join(",");
                 format!("--caches: expected L1/L2 in KiB as in {usual}, found `{pair}`")
@@ -183,7 +214,9 @@ fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
 fn twin(twins: &[String], label: &str) -> Result<Option<Option<String>>> {
     let mut found = None;
     for entry in twins {
-        let (name, scene) = entry.rsplit_once('=').map_or((None, entry.as_str()), |(n, s)| (Some(n), s));
+        let (name, scene) = entry
+            .rsplit_once('=')
+            .map_or((None, entry.as_str()), |(n, s)| (Some(n), s));
         ensure!(
             scene == "none" || Z2_SCENES.contains(&scene),
             "--as: expected none or one of {}, found `{scene}`",
@@ -217,7 +250,10 @@ mod tests {
 
     #[test]
     fn cache_sizes_are_in_kib() {
-        assert_eq!(parse_caches("8/128, 16/256").unwrap(), [(8192, 131_072), (16_384, 262_144)]);
+        assert_eq!(
+            parse_caches("8/128, 16/256").unwrap(),
+            [(8192, 131_072), (16_384, 262_144)]
+        );
         assert_eq!(
             parse_caches("8-128").unwrap_err().to_string(),
             "--caches: expected L1/L2 in KiB as in 8/128,16/128,8/256,16/256, found `8-128`"
@@ -227,9 +263,17 @@ mod tests {
     #[test]
     fn a_twin_can_be_given_for_one_label_or_for_all() {
         let twins = ["crytek-sponza".to_owned(), "b=none".to_owned()];
-        assert_eq!(twin(&twins, "a").unwrap(), Some(Some("crytek-sponza".to_owned())));
+        assert_eq!(
+            twin(&twins, "a").unwrap(),
+            Some(Some("crytek-sponza".to_owned()))
+        );
         assert_eq!(twin(&twins, "b").unwrap(), Some(None));
         assert_eq!(twin(&[], "a").unwrap(), None);
-        assert!(twin(&["x".to_owned()], "a").unwrap_err().to_string().starts_with("--as: expected none or one of"));
+        assert!(
+            twin(&["x".to_owned()], "a")
+                .unwrap_err()
+                .to_string()
+                .starts_with("--as: expected none or one of")
+        );
     }
 }

@@ -38,7 +38,9 @@ pub struct Args {
 /// # Errors
 /// Wrong arguments, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let report = args.experiment.run(args.functional || args.html.is_some(), args.html.is_some())?;
+    let report = args
+        .experiment
+        .run(args.functional || args.html.is_some(), args.html.is_some())?;
     if let Some(path) = &args.csv {
         write_atomically(path, tables::csv(&report).as_bytes())?;
     }
@@ -73,8 +75,16 @@ pub fn text(report: &PaperReport) -> String {
             fit.mean_absolute_points, fit.largest_points, fit.rows
         );
     }
-    for c in report.conservation.iter().filter(|c| c.differing.is_empty()) {
-        let _ = writeln!(text, "{}: {} runs replayed the same accesses ({})", c.scene, c.runs, c.access_hash);
+    for c in report
+        .conservation
+        .iter()
+        .filter(|c| c.differing.is_empty())
+    {
+        let _ = writeln!(
+            text,
+            "{}: {} runs replayed the same accesses ({})",
+            c.scene, c.runs, c.access_hash
+        );
     }
     text
 }

@@ -5,8 +5,8 @@ use crate::config::{Mode, OrderKind, RunConfig};
 use crate::engine::{ReplayError, TileSource, replay};
 use crate::paper::z2_twin;
 use crate::result::TraceId;
-use formats::texture::TexelFormat;
 use formats::textrace::{PassKind, Tables};
+use formats::texture::TexelFormat;
 use rayon::prelude::*;
 
 /// A trace to run, and how to name it.
@@ -59,7 +59,11 @@ impl Plan {
     ///
     /// # Errors
     /// The first point, in the plan's order, that cannot be replayed.
-    pub fn run(&self, subjects: &[Subject], done: &(dyn Fn() + Sync)) -> Result<PaperReport, ExperimentError> {
+    pub fn run(
+        &self,
+        subjects: &[Subject],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<PaperReport, ExperimentError> {
         let timed = self.points(subjects.len(), self.base.mode, self.tile_maps);
         let functional = if self.functional && self.base.mode == Mode::Timed {
             self.points(subjects.len(), Mode::Functional, false)
@@ -74,7 +78,11 @@ impl Plan {
                 let result = replay(subjects[trace].source, &config);
                 done();
                 result
-                    .map(|result| Run { trace, config, result })
+                    .map(|result| Run {
+                        trace,
+                        config,
+                        result,
+                    })
                     .map_err(|source| ExperimentError {
                         label: subjects[trace].label.clone(),
                         order: config.order.name(),
@@ -98,7 +106,11 @@ impl Plan {
         for trace in 0..traces {
             for (index, &(l1, l2)) in self.caches_bytes.iter().enumerate() {
                 for &order in &self.orders {
-                    let mut config = RunConfig { mode, order, ..self.base };
+                    let mut config = RunConfig {
+                        mode,
+                        order,
+                        ..self.base
+                    };
                     config.l1.size_bytes = l1;
                     config.l2.size_bytes = l2;
                     config.tile_maps = tile_maps && index == 0;
@@ -113,30 +125,49 @@ impl Plan {
 fn info(subject: &Subject, run: Option<&Run>) -> TraceInfo {
     let tables = subject.source.tables();
     let first_frame = tables.passes.iter().map(|p| p.frame).min().unwrap_or(0);
-    let main = || tables.passes.iter().enumerate().filter(|(_, p)| p.kind == PassKind::Main);
-    let mut frames: Vec<u32> = main().map(|(_, p)| p.frame).collect();
-    frames.sort_unstable();
-    frames.dedup();
+    let main = || {
+        tables
+            .passes
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| p.kind == PassKind::Main)
+    };
     let result = run.map(|r| &r.result);
     TraceInfo {
         label: subject.label.clone(),
         trace: subject.id.clone(),
         twin: subject.twin.clone(),
-        frames: frames.len() as u32,
+        frames: frames_of(tables),
         quads: result.map_or(0, |r| r.quads),
         lanes: result.map_or(0, |r| r.lanes),
         footprints: result.map_or(0, |r| r.footprints),
         textures: tables.textures.len(),
         tiles: main().next().map_or([0, 0], |(_, p)| p.tiles),
-        eye_passes: main().filter(|(_, p)| p.frame == first_frame).map(|(i, _)| i as u32).collect(),
+        eye_passes: main()
+            .filter(|(_, p)| p.frame == first_frame)
+            .map(|(i, _)| i as u32)
+            .collect(),
         meta: tables.meta.clone(),
     }
+}
+
+/// Frames that a trace renders.
+#[must_use]
+pub fn frames_of(tables: &Tables) -> u32 {
+    let main = tables.passes.iter().filter(|p| p.kind == PassKind::Main);
+    let mut frames: Vec<u32> = main.map(|p| p.frame).collect();
+    frames.sort_unstable();
+    frames.dedup();
+    frames.len() as u32
 }
 
 /// Whether the trace samples a shadow map.
 #[must_use]
 pub fn has_shadow_maps(tables: &Tables) -> bool {
-    tables.textures.iter().any(|t| t.format == TexelFormat::R32f)
+    tables
+        .textures
+        .iter()
+        .any(|t| t.format == TexelFormat::R32f)
 }
 
 /// The scene of the paper that a trace stands for.
@@ -154,7 +185,11 @@ pub fn labels(traces: &[(&Tables, &TraceId)]) -> Vec<String> {
         .map(|(tables, _)| {
             let name = scene_name(&tables.meta.scene);
             let usual = name.contains("shadow") || name.contains("jungle");
-            if has_shadow_maps(tables) && !usual { format!("{name}+shadows") } else { name }
+            if has_shadow_maps(tables) && !usual {
+                format!("{name}+shadows")
+            } else {
+                name
+            }
         })
         .collect();
     plain
@@ -162,7 +197,11 @@ pub fn labels(traces: &[(&Tables, &TraceId)]) -> Vec<String> {
         .zip(traces)
         .map(|(label, (_, id))| {
             let same = plain.iter().filter(|other| *other == label).count();
-            if same > 1 { format!("{label} {}", id.checksum) } else { label.clone() }
+            if same > 1 {
+                format!("{label} {}", id.checksum)
+            } else {
+                label.clone()
+            }
         })
         .collect()
 }
@@ -170,7 +209,9 @@ pub fn labels(traces: &[(&Tables, &TraceId)]) -> Vec<String> {
 fn scene_name(scene: &str) -> String {
     let mut parts = scene.trim_end_matches(['/', '\\']).rsplit(['/', '\\']);
     let file = parts.next().unwrap_or(scene);
-    let folder = parts.next().filter(|f| !f.is_empty() && *f != "." && *f != "..");
+    let folder = parts
+        .next()
+        .filter(|f| !f.is_empty() && *f != "." && *f != "..");
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     folder.unwrap_or(stem).to_owned()
 }
@@ -181,7 +222,10 @@ mod tests {
 
     #[test]
     fn a_file_is_named_by_its_folder_and_a_built_in_scene_by_itself() {
-        assert_eq!(scene_name("../shared/scenes/crytek-sponza/sponza.gltf"), "crytek-sponza");
+        assert_eq!(
+            scene_name("../shared/scenes/crytek-sponza/sponza.gltf"),
+            "crytek-sponza"
+        );
         assert_eq!(scene_name("sponza.gltf"), "sponza");
         assert_eq!(scene_name("../sponza.gltf"), "sponza");
         assert_eq!(scene_name("atrium-plain"), "atrium-plain");
