@@ -60,7 +60,10 @@ pub fn lanes<'a>(
         for run in &tile.runs {
             let records = &tile.records[run.first as usize..(run.first + run.count) as usize];
             let groups = &draws[run.draw as usize].groups;
-            for record in records.iter().filter(|r| r.group == 0 || r.group == NO_GROUP) {
+            for record in records
+                .iter()
+                .filter(|r| r.group == 0 || r.group == NO_GROUP)
+            {
                 let extent = groups.first().map_or(DVec2::ONE, |g| {
                     DVec2::new(f64::from(g.extent[0]), f64::from(g.extent[1]))
                 });
@@ -78,7 +81,10 @@ pub fn lanes<'a>(
                         extent,
                     };
                     if found.insert((pixel, run.primitive), content).is_some() {
-                        return Err(format!("pixel {pixel:?} of primitive {} is recorded twice", run.primitive));
+                        return Err(format!(
+                            "pixel {pixel:?} of primitive {} is recorded twice",
+                            run.primitive
+                        ));
                     }
                 }
             }
@@ -101,7 +107,8 @@ pub fn compare(reference: &[Fragment], lanes: &BTreeMap<FragmentKey, Lane>) -> A
         let error = ((fragment.uv - lane.uv) * lane.extent).length();
         total += error;
         agreement.max_uv_error_texels = agreement.max_uv_error_texels.max(error);
-        let levels = [(fragment.dx, fragment.dy), (lane.dx, lane.dy)].map(|(dx, dy)| level(dx * lane.extent, dy * lane.extent));
+        let levels = [(fragment.dx, fragment.dy), (lane.dx, lane.dy)]
+            .map(|(dx, dy)| level(dx * lane.extent, dy * lane.extent));
         agreement.level_differs += u64::from(levels[0] != levels[1]);
     }
     agreement.only_capture = lanes.len() as u64 - agreement.both;

@@ -56,7 +56,10 @@ pub fn render(
     for call in &draws.calls {
         let mesh = &scene.meshes[call.mesh];
         let material = &scene.materials[call.material];
-        let leader = draws.groups[call.material].groups.first().and_then(|g| material.textures()[g[0]]);
+        let leader = draws.groups[call.material]
+            .groups
+            .first()
+            .and_then(|g| material.textures()[g[0]]);
         let vertex = |index: u32| -> Vertex {
             let position = mesh.positions[index as usize].extend(1.0);
             let world: Vec4 = glam::Mat4::from(call.transform) * position;
@@ -66,7 +69,11 @@ pub fn render(
             }
         };
         for (number, triangle) in mesh.indices.chunks_exact(3).enumerate() {
-            let corners = clip_to_depth_range(&[vertex(triangle[0]), vertex(triangle[1]), vertex(triangle[2])]);
+            let corners = clip_to_depth_range(&[
+                vertex(triangle[0]),
+                vertex(triangle[1]),
+                vertex(triangle[2]),
+            ]);
             let projected: Vec<Projected> = corners.iter().map(|v| project(v, size_px)).collect();
             for fan in 2..projected.len() {
                 let mut part = [projected[0], projected[fan - 1], projected[fan]];
@@ -78,31 +85,37 @@ pub fn render(
                 if area(&part) < 0 {
                     part.swap(1, 2);
                 }
-                rasterise(&part, size_px, |pixel, depth, at: &dyn Fn(DVec2) -> DVec2| {
-                    let slot = &mut depth_buffer[pixel[1] as usize * size_px[0] as usize + pixel[0] as usize];
-                    if depth >= *slot {
-                        return;
-                    }
-                    let center = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
-                    let quad = DVec2::new(f64::from(pixel[0] & !1), f64::from(pixel[1] & !1)) + 0.5;
-                    let uv = at(center);
-                    let writes = match call.mode {
-                        DrawMode::Opaque => true,
-                        DrawMode::Masked => alpha_passes(call, uv),
-                        DrawMode::Blended => false,
-                    };
-                    if writes {
-                        *slot = depth;
-                    }
-                    let top_left = at(quad);
-                    fragments.push(Fragment {
-                        pixel,
-                        primitive: call.first_primitive + number as u32,
-                        uv,
-                        dx: at(quad + DVec2::X) - top_left,
-                        dy: at(quad + DVec2::Y) - top_left,
-                    });
-                });
+                rasterise(
+                    &part,
+                    size_px,
+                    |pixel, depth, at: &dyn Fn(DVec2) -> DVec2| {
+                        let slot = &mut depth_buffer
+                            [pixel[1] as usize * size_px[0] as usize + pixel[0] as usize];
+                        if depth >= *slot {
+                            return;
+                        }
+                        let center = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
+                        let quad =
+                            DVec2::new(f64::from(pixel[0] & !1), f64::from(pixel[1] & !1)) + 0.5;
+                        let uv = at(center);
+                        let writes = match call.mode {
+                            DrawMode::Opaque => true,
+                            DrawMode::Masked => alpha_passes(call, uv),
+                            DrawMode::Blended => false,
+                        };
+                        if writes {
+                            *slot = depth;
+                        }
+                        let top_left = at(quad);
+                        fragments.push(Fragment {
+                            pixel,
+                            primitive: call.first_primitive + number as u32,
+                            uv,
+                            dx: at(quad + DVec2::X) - top_left,
+                            dy: at(quad + DVec2::Y) - top_left,
+                        });
+                    },
+                );
             }
         }
     }
@@ -110,9 +123,20 @@ pub fn render(
 }
 
 fn coordinates(texture: Option<&TextureRef>, mesh: &crate::scene::Mesh, index: usize) -> DVec2 {
-    let Some(texture) = texture else { return DVec2::ZERO };
-    let set = if texture.uv_set == 1 { &mesh.uv1 } else { &mesh.uv0 };
-    let uv = set.get(index).copied().unwrap_or_default().as_dvec2().extend(1.0);
+    let Some(texture) = texture else {
+        return DVec2::ZERO;
+    };
+    let set = if texture.uv_set == 1 {
+        &mesh.uv1
+    } else {
+        &mesh.uv0
+    };
+    let uv = set
+        .get(index)
+        .copied()
+        .unwrap_or_default()
+        .as_dvec2()
+        .extend(1.0);
     let row = |r: [f32; 3]| glam::DVec3::new(r[0].into(), r[1].into(), r[2].into()).dot(uv);
     DVec2::new(row(texture.uv_transform[0]), row(texture.uv_transform[1]))
 }
@@ -152,7 +176,10 @@ fn project(vertex: &Vertex, size_px: [u32; 2]) -> Projected {
     );
     Projected {
         at,
-        snapped: [(at.x * SNAP).round_ties_even() as i64, (at.y * SNAP).round_ties_even() as i64],
+        snapped: [
+            (at.x * SNAP).round_ties_even() as i64,
+            (at.y * SNAP).round_ties_even() as i64,
+        ],
         depth: ndc.z,
         inverse_w,
         uv_over_w: vertex.uv * inverse_w,
@@ -171,7 +198,11 @@ fn edge(a: [i64; 2], b: [i64; 2], p: [i64; 2]) -> i128 {
 
 /// Visits the covered pixels of a clockwise triangle with their depth and a function that gives
 /// the coordinates at any point of its plane.
-fn rasterise(t: &[Projected; 3], size_px: [u32; 2], mut visit: impl FnMut([u32; 2], f32, &dyn Fn(DVec2) -> DVec2)) {
+fn rasterise(
+    t: &[Projected; 3],
+    size_px: [u32; 2],
+    mut visit: impl FnMut([u32; 2], f32, &dyn Fn(DVec2) -> DVec2),
+) {
     let span = |axis: usize| {
         let values = t.map(|v| v.snapped[axis]);
         let lo = values.iter().min().copied().unwrap_or(0).div_euclid(256);
@@ -182,14 +213,21 @@ fn rasterise(t: &[Projected; 3], size_px: [u32; 2], mut visit: impl FnMut([u32; 
         let cross = |a: DVec2, b: DVec2| (b - a).perp_dot(p - a);
         let [a, b, c] = t.map(|v| v.at);
         let total = (b - a).perp_dot(c - a);
-        [cross(b, c) / total, cross(c, a) / total, cross(a, b) / total]
+        [
+            cross(b, c) / total,
+            cross(c, a) / total,
+            cross(a, b) / total,
+        ]
     };
     let blend = |p: DVec2, value: &dyn Fn(&Projected) -> f64| -> f64 {
         weights(p).iter().zip(t).map(|(w, v)| w * value(v)).sum()
     };
     let uv_at = |p: DVec2| {
         let w = blend(p, &|v| v.inverse_w);
-        DVec2::new(blend(p, &|v| v.uv_over_w.x) / w, blend(p, &|v| v.uv_over_w.y) / w)
+        DVec2::new(
+            blend(p, &|v| v.uv_over_w.x) / w,
+            blend(p, &|v| v.uv_over_w.y) / w,
+        )
     };
     for y in span(1) {
         for x in span(0) {

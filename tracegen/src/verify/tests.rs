@@ -9,9 +9,11 @@ use crate::raster::draws::{DrawCall, DrawList};
 use crate::raster::lavapipe::Lavapipe;
 use crate::raster::lighting::Lighting;
 use crate::scene::textures::TextureSet;
-use crate::scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
-use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
+use crate::scene::{
+    AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd,
+};
 use formats::textrace::{Tables, Textrace, TextraceWriter, Tile, TraceMeta};
+use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
 use formats::view::{FrameViews, Hmd};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
 use std::sync::Arc;
@@ -36,7 +38,9 @@ fn display(size_px: [u32; 2]) -> Hmd {
 }
 
 fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
-    cameras::frame_views(&scene.cameras[0], &display(size_px), 1).unwrap().remove(0)
+    cameras::frame_views(&scene.cameras[0], &display(size_px), 1)
+        .unwrap()
+        .remove(0)
 }
 
 fn job<'a>(scene: &Scene, draws: &'a DrawList, size_px: [u32; 2]) -> CaptureJob<'a> {
@@ -54,7 +58,8 @@ fn job<'a>(scene: &Scene, draws: &'a DrawList, size_px: [u32; 2]) -> CaptureJob<
 fn capture(scene: &Scene, size_px: [u32; 2], cascades: u32, budget: u64) -> Captured {
     let draws = DrawList::new(scene, cascades).unwrap();
     let set = TextureSet::compress(scene).unwrap();
-    let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget).unwrap_or_else(|e| panic!("{e}"));
+    let mut backend =
+        Lavapipe::new(scene, &draws, &set, size_px, budget).unwrap_or_else(|e| panic!("{e}"));
     let views = views(scene, size_px);
     let textures = draws.textures(&set);
     let (samplers, draw_table) = draws.tables(scene, &set, &textures);
@@ -105,7 +110,12 @@ fn capture(scene: &Scene, size_px: [u32; 2], cascades: u32, budget: u64) -> Capt
 }
 
 /// Agreement of one eye's pass with the reference.
-fn agreement(scene: &Scene, captured: &Captured, pass: usize, alpha: &dyn Fn(&DrawCall, DVec2) -> bool) -> Agreement {
+fn agreement(
+    scene: &Scene,
+    captured: &Captured,
+    pass: usize,
+    alpha: &dyn Fn(&DrawCall, DVec2) -> bool,
+) -> Agreement {
     let draws = DrawList::new(scene, 0).unwrap();
     let size_px = captured.tables.passes[pass].size_px;
     let lighting = Lighting::new(scene);
@@ -116,7 +126,9 @@ fn agreement(scene: &Scene, captured: &Captured, pass: usize, alpha: &dyn Fn(&Dr
     };
     let fragments = reference::render(scene, &draws, &view, size_px, alpha);
     let columns = captured.tables.passes[pass].tiles[0];
-    let tiles = (0..).zip(&captured.tiles[pass]).map(|(i, tile)| ([i % columns, i / columns], tile));
+    let tiles = (0..)
+        .zip(&captured.tiles[pass])
+        .map(|(i, tile)| ([i % columns, i / columns], tile));
     let lanes = lanes(&captured.tables.draws, tiles).unwrap();
     compare(&fragments, &lanes)
 }
@@ -125,7 +137,9 @@ fn agreement(scene: &Scene, captured: &Captured, pass: usize, alpha: &dyn Fn(&Dr
 fn random(seed: u32) -> impl FnMut() -> f32 {
     let mut state = u64::from(seed) * 2 + 1;
     move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / (1 << 24) as f32
     }
 }
@@ -136,7 +150,11 @@ fn cells(cells: u32, opaque: impl Fn(u32, u32) -> bool) -> Image {
     let rgba: Vec<u8> = (0..edge * edge)
         .flat_map(|i| {
             let (x, y) = (i % edge / 4, i / edge / 4);
-            if opaque(x, y) { [200, 160, 80, 255] } else { [0, 0, 0, 0] }
+            if opaque(x, y) {
+                [200, 160, 80, 255]
+            } else {
+                [0, 0, 0, 0]
+            }
         })
         .collect();
     Image {
@@ -160,10 +178,12 @@ fn triangles(count: usize, seed: u32, material: usize) -> Mesh {
         let size = 0.3 + next() * next() * 6.0;
         for _ in 0..3 {
             mesh.indices.push(mesh.positions.len() as u32);
-            mesh.positions.push(center + size * (Vec3::new(next(), next(), next()) - 0.5));
+            mesh.positions
+                .push(center + size * (Vec3::new(next(), next(), next()) - 0.5));
             mesh.normals.push(Vec3::Z);
             mesh.tangents.push(Vec4::new(1.0, 0.0, 0.0, 1.0));
-            mesh.uv0.push(Vec2::new(next() * 4.0 - 2.0, next() * 4.0 - 2.0));
+            mesh.uv0
+                .push(Vec2::new(next() * 4.0 - 2.0, next() * 4.0 - 2.0));
         }
     }
     mesh
@@ -225,7 +245,11 @@ fn checker_passes(_: &DrawCall, uv: DVec2) -> bool {
 
 #[test]
 fn coverage_depth_order_coordinates_and_levels_of_random_triangles_agree_with_the_reference() {
-    let meshes = vec![triangles(150, 1, 0), triangles(80, 2, 1), triangles(60, 3, 2)];
+    let meshes = vec![
+        triangles(150, 1, 0),
+        triangles(80, 2, 1),
+        triangles(60, 3, 2),
+    ];
     let materials = vec![
         textured(AlphaMode::Opaque, true),
         textured(AlphaMode::Opaque, false),
@@ -247,7 +271,10 @@ fn coverage_depth_order_coordinates_and_levels_of_random_triangles_agree_with_th
         println!("pass {pass}: {a:?}, IoU {:.6}", a.coverage_iou());
         assert!(a.both > 20_000, "{a:?}");
         assert!(a.coverage_iou() >= 0.999, "{a:?}");
-        assert!(a.max_uv_error_texels < 0.05 && a.mean_uv_error_texels < 0.002, "{a:?}");
+        assert!(
+            a.max_uv_error_texels < 0.05 && a.mean_uv_error_texels < 0.002,
+            "{a:?}"
+        );
         assert!((a.level_differs as f64) < 0.001 * a.both as f64, "{a:?}");
     }
     assert!(captured.pictures_match);
@@ -262,10 +289,17 @@ fn masked_draws_keep_exactly_the_lanes_that_an_in_order_gpu_keeps() {
         triangles(20, 13, 0),
         triangles(500, 14, 1),
     ];
-    let materials = vec![textured(AlphaMode::Opaque, true), textured(AlphaMode::Mask(0.5), true)];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Mask(0.5), true),
+    ];
     let scene = scene(meshes, materials, vec![checker()]);
     let captured = capture(&scene, SIZE_PX, 0, BUDGET);
-    assert!(captured.killed > 10_000, "the scene must exercise the replay, killed {}", captured.killed);
+    assert!(
+        captured.killed > 10_000,
+        "the scene must exercise the replay, killed {}",
+        captured.killed
+    );
     for pass in 0..2 {
         let a = agreement(&scene, &captured, pass, &checker_passes);
         println!("pass {pass}: {a:?}, IoU {:.6}", a.coverage_iou());
@@ -277,22 +311,33 @@ fn masked_draws_keep_exactly_the_lanes_that_an_in_order_gpu_keeps() {
 #[test]
 fn a_small_record_budget_gives_the_same_trace() {
     let meshes = vec![triangles(150, 21, 0), triangles(150, 22, 1)];
-    let materials = vec![textured(AlphaMode::Opaque, true), textured(AlphaMode::Mask(0.5), true)];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Mask(0.5), true),
+    ];
     let scene = scene(meshes, materials, vec![checker()]);
     let whole = capture(&scene, SIZE_PX, 2, BUDGET);
     for budget in [300 << 10, 64 << 10] {
         let parts = capture(&scene, SIZE_PX, 2, budget);
-        assert!(parts.trace == whole.trace, "budget {budget} changed the trace");
+        assert!(
+            parts.trace == whole.trace,
+            "budget {budget} changed the trace"
+        );
         assert!(parts.pictures_match);
     }
 }
 
 #[test]
 fn a_budget_below_one_tile_is_refused() {
-    let scene = scene(vec![triangles(400, 31, 0)], vec![textured(AlphaMode::Blend, true)], vec![checker()]);
+    let scene = scene(
+        vec![triangles(400, 31, 0)],
+        vec![textured(AlphaMode::Blend, true)],
+        vec![checker()],
+    );
     let draws = DrawList::new(&scene, 0).unwrap();
     let set = TextureSet::compress(&scene).unwrap();
-    let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, 4096).unwrap_or_else(|e| panic!("{e}"));
+    let mut backend =
+        Lavapipe::new(&scene, &draws, &set, SIZE_PX, 4096).unwrap_or_else(|e| panic!("{e}"));
     let lighting = Lighting::new(&scene);
     let mut view = View {
         eye: views(&scene, SIZE_PX).eyes[0],
@@ -301,20 +346,34 @@ fn a_budget_below_one_tile_is_refused() {
     };
     let visible = cull::visible_draws(&draws, view.clip_from_world());
     view.visible = &visible;
-    let refused = crate::raster::regions::capture_view(&mut backend, &draws, &view, SIZE_PX, 1, &mut |_, _| Ok(()));
+    let refused = crate::raster::regions::capture_view(
+        &mut backend,
+        &draws,
+        &view,
+        SIZE_PX,
+        1,
+        &mut |_, _| Ok(()),
+    );
     let message = refused.unwrap_err().to_string();
-    assert!(message.contains("alone needs") && message.contains("--record-budget"), "{message}");
+    assert!(
+        message.contains("alone needs") && message.contains("--record-budget"),
+        "{message}"
+    );
 }
 
 #[test]
 fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
     let meshes = vec![triangles(200, 61, 0), triangles(100, 62, 1)];
-    let materials = vec![textured(AlphaMode::Opaque, true), textured(AlphaMode::Blend, true)];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Blend, true),
+    ];
     let scene = scene(meshes, materials, vec![checker()]);
     let captured = capture(&scene, SIZE_PX, 0, BUDGET);
     let draws = DrawList::new(&scene, 0).unwrap();
     let set = TextureSet::compress(&scene).unwrap();
-    let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap_or_else(|e| panic!("{e}"));
+    let mut backend =
+        Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap_or_else(|e| panic!("{e}"));
     let lighting = Lighting::new(&scene);
     for pass in 0..2 {
         let view = View {
@@ -325,7 +384,9 @@ fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
         let counted = backend.count_fragments(&draws, &view).unwrap();
         let mut recorded = vec![0; counted.len()];
         let columns = captured.tables.passes[pass].tiles[0];
-        let tiles = (0..).zip(&captured.tiles[pass]).map(|(i, tile)| ([i % columns, i / columns], tile));
+        let tiles = (0..)
+            .zip(&captured.tiles[pass])
+            .map(|(i, tile)| ([i % columns, i / columns], tile));
         for (pixel, _) in lanes(&captured.tables.draws, tiles).unwrap().into_keys() {
             recorded[(pixel[1] * SIZE_PX[0] + pixel[0]) as usize] += 1;
         }
@@ -336,7 +397,11 @@ fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
 
 #[test]
 fn untextured_draws_record_their_quads_without_a_group() {
-    let scene = scene(vec![triangles(50, 41, 0)], vec![Material::default()], Vec::new());
+    let scene = scene(
+        vec![triangles(50, 41, 0)],
+        vec![Material::default()],
+        Vec::new(),
+    );
     let captured = capture(&scene, SIZE_PX, 0, BUDGET);
     let records = || captured.tiles.iter().flatten().flat_map(|t| &t.records);
     assert!(records().count() > 1000);
@@ -346,19 +411,30 @@ fn untextured_draws_record_their_quads_without_a_group() {
 
 #[test]
 fn every_lane_of_a_shadowed_draw_takes_at_most_one_cascade() {
-    let scene = scene(vec![triangles(80, 51, 0)], vec![textured(AlphaMode::Opaque, true)], vec![checker()]);
+    let scene = scene(
+        vec![triangles(80, 51, 0)],
+        vec![textured(AlphaMode::Opaque, true)],
+        vec![checker()],
+    );
     let captured = capture(&scene, SIZE_PX, 4, BUDGET);
     let mut shadowed = 0;
     for tile in captured.tiles.iter().flatten() {
         for run in &tile.runs {
             let records = &tile.records[run.first as usize..(run.first + run.count) as usize];
             for quad in records.chunk_by(|a, b| (a.x, a.y) == (b.x, b.y)) {
-                let cascades: Vec<u8> = quad.iter().filter(|r| r.group > 0).map(|r| r.mask).collect();
+                let cascades: Vec<u8> = quad
+                    .iter()
+                    .filter(|r| r.group > 0)
+                    .map(|r| r.mask)
+                    .collect();
                 let lanes: u32 = cascades.iter().map(|m| m.count_ones()).sum();
                 let union = cascades.iter().fold(0, |all, m| all | m);
                 assert_eq!(lanes, union.count_ones());
                 // A clipped primitive may cover a quad in two parts.
-                let covered = quad.iter().filter(|r| r.group == 0).fold(0, |all, r| all | r.mask);
+                let covered = quad
+                    .iter()
+                    .filter(|r| r.group == 0)
+                    .fold(0, |all, r| all | r.mask);
                 assert_eq!(union & !covered, 0);
                 shadowed += u64::from(union != 0);
             }

@@ -2,20 +2,32 @@
 //! ballots nor atomics nor post-processing with it.
 
 use super::pipelines::{DEPTH_FORMAT, PipelineKey, Role};
+use super::uniforms::ViewData;
 use super::{Lavapipe, PassState};
 use crate::raster::backend::{RasterError, View};
 use crate::raster::draws::{DrawList, DrawMode};
-use super::uniforms::ViewData;
 
 impl Lavapipe {
     /// Fragments of opaque and blended draws that pass the early depth test, by pixel.
-    pub(crate) fn count_fragments(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<u32>, RasterError> {
+    pub(crate) fn count_fragments(
+        &mut self,
+        draws: &DrawList,
+        view: &View<'_>,
+    ) -> Result<Vec<u32>, RasterError> {
         let keys: Vec<PipelineKey> = draws
             .calls
             .iter()
             .map(|call| {
-                assert_ne!(call.mode, DrawMode::Masked, "alpha tests need the in-order replay");
-                let role = if call.mode == DrawMode::Blended { Role::CountBlended } else { Role::Count };
+                assert_ne!(
+                    call.mode,
+                    DrawMode::Masked,
+                    "alpha tests need the in-order replay"
+                );
+                let role = if call.mode == DrawMode::Blended {
+                    Role::CountBlended
+                } else {
+                    Role::Count
+                };
                 self.key(call, role, false, 0)
             })
             .collect();
@@ -50,9 +62,14 @@ impl Lavapipe {
             mapped_at_creation: false,
         });
         let data = ViewData::of_eye(view, self.targets.capacity);
-        self.gpu.queue.write_buffer(&self.targets.view_uniform, 0, bytemuck::bytes_of(&data));
+        self.gpu
+            .queue
+            .write_buffer(&self.targets.view_uniform, 0, bytemuck::bytes_of(&data));
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let (count_view, depth_view) = (counts.create_view(&Default::default()), depth.create_view(&Default::default()));
+        let (count_view, depth_view) = (
+            counts.create_view(&Default::default()),
+            depth.create_view(&Default::default()),
+        );
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &count_view,
@@ -96,7 +113,10 @@ impl Lavapipe {
                     .map(|h| half_to_integer(u16::from_le_bytes([h[0], h[1]])))
                     .collect()
             };
-            Ok(bytes.chunks_exact(row_bytes as usize).flat_map(row).collect())
+            Ok(bytes
+                .chunks_exact(row_bytes as usize)
+                .flat_map(row)
+                .collect())
         })
     }
 }
@@ -105,5 +125,9 @@ impl Lavapipe {
 fn half_to_integer(bits: u16) -> u32 {
     let exponent = i32::from(bits >> 10) - 15;
     let mantissa = f32::from(bits & 1023 | 1024) / 1024.0;
-    if bits == 0 { 0 } else { (mantissa * (exponent as f32).exp2()) as u32 }
+    if bits == 0 {
+        0
+    } else {
+        (mantissa * (exponent as f32).exp2()) as u32
+    }
 }
