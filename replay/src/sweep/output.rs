@@ -270,7 +270,11 @@ struct Lookup<'a> {
 impl<'a> Lookup<'a> {
     fn new(report: &'a SweepReport, scene: &'a str) -> Self {
         let orders = report.axes.iter().find(|a| a.key == ORDER);
-        Self { report, scene, orders: orders.map_or_else(Vec::new, |a| a.values.clone()) }
+        Self {
+            report,
+            scene,
+            orders: orders.map_or_else(Vec::new, |a| a.values.clone()),
+        }
     }
 
     /// One series an order, or a single one.
@@ -278,23 +282,39 @@ impl<'a> Lookup<'a> {
         if self.orders.is_empty() {
             return vec![SeriesStyle::nth("external traffic", 2)];
         }
-        let style = |o: &Value| SeriesStyle { name: plain(o), color: theme::order_color(&plain(o)) };
+        let style = |o: &Value| SeriesStyle {
+            name: plain(o),
+            color: theme::order_color(&plain(o)),
+        };
         self.orders.iter().map(style).collect()
     }
 
     /// One value a series; axes that are not named are at their first value.
-    fn values(&self, axis: Option<(&str, &Value)>, change: &Option<(String, Value)>) -> Vec<Option<f64>> {
+    fn values(
+        &self,
+        axis: Option<(&str, &Value)>,
+        change: &Option<(String, Value)>,
+    ) -> Vec<Option<f64>> {
         let with = |order: Option<&Value>| {
-            let named: Vec<(&str, &Value)> = axis.into_iter().chain(order.map(|o| (ORDER, o))).collect();
+            let named: Vec<(&str, &Value)> =
+                axis.into_iter().chain(order.map(|o| (ORDER, o))).collect();
             let matches = |row: &&SweepRow| {
                 row.scene == self.scene
                     && row.change == *change
-                    && row.settings.iter().zip(&self.report.axes).all(|((key, value), axis)| {
-                        let wanted = named.iter().find(|(k, _)| k == key).map(|(_, v)| *v);
-                        wanted.or(axis.values.first()) == Some(value)
-                    })
+                    && row
+                        .settings
+                        .iter()
+                        .zip(&self.report.axes)
+                        .all(|((key, value), axis)| {
+                            let wanted = named.iter().find(|(k, _)| k == key).map(|(_, v)| *v);
+                            wanted.or(axis.values.first()) == Some(value)
+                        })
             };
-            self.report.rows.iter().find(matches).map(|r| r.external_mb_per_frame)
+            self.report
+                .rows
+                .iter()
+                .find(matches)
+                .map(|r| r.external_mb_per_frame)
         };
         if self.orders.is_empty() {
             return vec![with(None)];
@@ -308,10 +328,11 @@ const VALUE_LABEL: &str = "external texture traffic, MB per frame";
 /// A row for the base and one for each single change.
 fn change_chart(report: &SweepReport, scene: &str) -> Option<HBarChart> {
     let lookup = Lookup::new(report, scene);
-    let changes = report
-        .one_at_a_time
-        .iter()
-        .flat_map(|axis| axis.values.iter().map(|v| Some((axis.key.clone(), v.clone()))));
+    let changes = report.one_at_a_time.iter().flat_map(|axis| {
+        axis.values
+            .iter()
+            .map(|v| Some((axis.key.clone(), v.clone())))
+    });
     (!report.one_at_a_time.is_empty()).then(|| HBarChart {
         title: format!("{scene}: one change at a time"),
         value_label: VALUE_LABEL.to_owned(),

@@ -433,7 +433,8 @@ mod tests {
     fn the_example_experiments_can_be_planned() {
         let caches = Experiment::parse(include_str!("../../experiments/caches.toml")).unwrap();
         assert_eq!(caches.points().unwrap().len(), 48);
-        let choices = Experiment::parse(include_str!("../../experiments/open-choices.toml")).unwrap();
+        let choices =
+            Experiment::parse(include_str!("../../experiments/open-choices.toml")).unwrap();
         assert_eq!(choices.points().unwrap().len() % 3, 0);
     }
 

@@ -50,7 +50,11 @@ impl HBarChart {
             .map(|n| theme::text_width_px(n, theme::TICK_PX))
             .fold(40.0, f64::max);
         let left = 8.0 + name_width + 8.0;
-        let bar_px = if self.decimals.is_some() { NUMBERED_BAR_PX } else { BAR_PX };
+        let bar_px = if self.decimals.is_some() {
+            NUMBERED_BAR_PX
+        } else {
+            BAR_PX
+        };
         let row_px = bar_px * self.series.len().max(1) as f64 + ROW_GAP_PX;
         let bottom = TOP_PX + row_px * self.rows.len() as f64;
         let largest = self
@@ -120,11 +124,11 @@ impl HBarChart {
                                 (scale.at(*value), y + bar_px - 1.0),
                                 style.color,
                             )?;
-                        if let Some(decimals) = self.decimals {
-                            let at = (scale.at(*value) + 4.0, y + bar_px / 2.0);
-                            let label = format!("{value:.decimals$}");
-                            text(area, at, &label, theme::TICK_PX, theme::INK, Anchor::Start)?;
-                        }
+                            if let Some(decimals) = self.decimals {
+                                let at = (scale.at(*value) + 4.0, y + bar_px / 2.0);
+                                let label = format!("{value:.decimals$}");
+                                text(area, at, &label, theme::TICK_PX, theme::INK, Anchor::Start)?;
+                            }
                         }
                     }
                 }
