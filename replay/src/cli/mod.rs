@@ -4,8 +4,12 @@ mod config_args;
 pub mod convert;
 pub mod diff;
 pub mod dump;
+mod experiment_args;
 pub mod info;
+mod paper;
+mod report;
 mod run;
+mod sweep;
 #[cfg(test)]
 mod testing;
 mod trace_file;
@@ -46,6 +50,12 @@ enum Command {
     Diff(diff::DiffArgs),
     /// Write a trace's accesses for other simulators, or the trace in another encoding.
     Convert(Box<convert::ConvertArgs>),
+    /// Replay the Z2 paper's experiment: its caches and orders, beside its published figures.
+    Paper(Box<paper::Args>),
+    /// Replay every point of an experiment file; goes on where it stopped.
+    Sweep(sweep::Args),
+    /// Write the experiment as one self-contained page, with JSON and CSV beside it.
+    Report(Box<report::Args>),
 }
 
 /// Parses the command line and runs it. Errors go to stderr.
@@ -58,6 +68,9 @@ pub fn main() -> ExitCode {
         Command::Dump(args) => dump::run(&args),
         Command::Diff(args) => diff::run(&args),
         Command::Convert(args) => convert::run(&args),
+        Command::Paper(args) => paper::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
+        Command::Report(args) => report::run(&args),
     };
     match outcome {
         Ok(code) => code,
