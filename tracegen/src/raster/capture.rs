@@ -53,7 +53,14 @@ impl CaptureJob<'_> {
     fn light_frame(&self, views: &FrameViews) -> Lighting {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
-        lighting.cascades = cascades::fit(views, self.draws.cascades, lighting.to_sun, self.bounds, near, far);
+        lighting.cascades = cascades::fit(
+            views,
+            self.draws.cascades,
+            lighting.to_sun,
+            self.bounds,
+            near,
+            far,
+        );
         lighting
     }
 
@@ -62,7 +69,11 @@ impl CaptureJob<'_> {
     ///
     /// # Errors
     /// Driver errors.
-    pub fn warm_up(&self, backend: &mut dyn CaptureBackend, views: &FrameViews) -> Result<(), RasterError> {
+    pub fn warm_up(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        views: &FrameViews,
+    ) -> Result<(), RasterError> {
         let lighting = self.light_frame(views);
         backend.render_shadows(self.draws, &lighting)?;
         let corner = super::backend::Region {
@@ -151,7 +162,14 @@ impl CaptureJob<'_> {
                 }
                 Ok(())
             };
-            self.parts = regions::capture_view(backend, self.draws, &view, self.size_px, self.parts, &mut sink)?;
+            self.parts = regions::capture_view(
+                backend,
+                self.draws,
+                &view,
+                self.size_px,
+                self.parts,
+                &mut sink,
+            )?;
             *picture = backend.picture()?;
         }
         Ok((pictures, counts))
@@ -170,7 +188,8 @@ fn encode_region(
         .into_par_iter()
         .map_init(Scratch::default, |scratch, tile| {
             let mut counts = rules.build(records, &bins, tile, scratch);
-            let encoded = encode_tile(tables, &scratch.tile).map_err(|e| RasterError::Write(e.to_string()))?;
+            let encoded = encode_tile(tables, &scratch.tile)
+                .map_err(|e| RasterError::Write(e.to_string()))?;
             counts.tile_bytes = encoded.size_bytes() as u64;
             Ok((encoded, counts))
         })

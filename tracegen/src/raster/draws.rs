@@ -4,8 +4,8 @@ use super::backend::RasterError;
 use super::groups::MaterialGroups;
 use crate::scene::textures::TextureSet;
 use crate::scene::{AlphaMode, Material, Scene};
-use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::textrace::{Draw, Sample, UvGroup};
+use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Vec3};
 
 /// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
@@ -80,7 +80,11 @@ impl DrawList {
         for blended in [false, true] {
             for instance in &scene.instances {
                 let mesh = scene.meshes.get(instance.mesh).ok_or_else(|| {
-                    RasterError::Scene(format!("instance of mesh {} of {}", instance.mesh, scene.meshes.len()))
+                    RasterError::Scene(format!(
+                        "instance of mesh {} of {}",
+                        instance.mesh,
+                        scene.meshes.len()
+                    ))
                 })?;
                 let material = scene.materials.get(mesh.material).ok_or_else(|| {
                     RasterError::Scene(format!(
@@ -90,11 +94,17 @@ impl DrawList {
                         scene.materials.len()
                     ))
                 })?;
-                let Some(mode) = DrawMode::new(material) else { continue };
+                let Some(mode) = DrawMode::new(material) else {
+                    continue;
+                };
                 if (mode == DrawMode::Blended) != blended || mesh.triangles() == 0 {
                     continue;
                 }
-                if let Some(index) = mesh.indices.iter().find(|&&i| i as usize >= mesh.positions.len()) {
+                if let Some(index) = mesh
+                    .indices
+                    .iter()
+                    .find(|&&i| i as usize >= mesh.positions.len())
+                {
                     return Err(RasterError::Scene(format!(
                         "mesh {}: index {index} beyond its {} vertices",
                         mesh.name,
@@ -147,7 +157,12 @@ impl DrawList {
     /// Sampler and draw tables of the trace; `textures` is [`DrawList::textures`]' result for the
     /// same `set`.
     #[must_use]
-    pub fn tables(&self, scene: &Scene, set: &TextureSet, textures: &[Texture]) -> (Vec<Sampler>, Vec<Draw>) {
+    pub fn tables(
+        &self,
+        scene: &Scene,
+        set: &TextureSet,
+        textures: &[Texture],
+    ) -> (Vec<Sampler>, Vec<Draw>) {
         let mut samplers = Vec::new();
         let material_groups: Vec<Vec<UvGroup>> = scene
             .materials
@@ -221,10 +236,13 @@ fn uv_group(samples: Vec<Sample>, textures: &[Texture]) -> UvGroup {
 }
 
 fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
-    let index = samplers.iter().position(|s| *s == sampler).unwrap_or_else(|| {
-        samplers.push(sampler);
-        samplers.len() - 1
-    });
+    let index = samplers
+        .iter()
+        .position(|s| *s == sampler)
+        .unwrap_or_else(|| {
+            samplers.push(sampler);
+            samplers.len() - 1
+        });
     index as u16
 }
 

@@ -41,7 +41,9 @@ impl MaskedDepth {
         let mut survivors = 0;
         for (lane, &depth) in record.depth.iter().enumerate() {
             let pixel = (2 * usize::from(y) + (lane >> 1)) * EDGE + 2 * usize::from(x) + (lane & 1);
-            let Some(nearest) = self.nearest.get_mut(pixel) else { continue };
+            let Some(nearest) = self.nearest.get_mut(pixel) else {
+                continue;
+            };
             if covered >> lane & 1 == 1 && depth < *nearest {
                 survivors |= 1 << lane;
                 if record.passing >> lane & 1 == 1 {
@@ -64,8 +66,14 @@ mod tests {
     #[test]
     fn a_lane_behind_an_earlier_passing_primitive_is_killed() {
         let mut depth = MaskedDepth::default();
-        assert_eq!(depth.survivors(3, 7, 7, 0b1111, &record(0b0101, [0.5; 4])), 0b1111);
-        assert_eq!(depth.survivors(3, 7, 7, 0b1111, &record(0b1111, [0.6; 4])), 0b1010);
+        assert_eq!(
+            depth.survivors(3, 7, 7, 0b1111, &record(0b0101, [0.5; 4])),
+            0b1111
+        );
+        assert_eq!(
+            depth.survivors(3, 7, 7, 0b1111, &record(0b1111, [0.6; 4])),
+            0b1010
+        );
     }
 
     #[test]

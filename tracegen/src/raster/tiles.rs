@@ -62,16 +62,35 @@ impl TileRules {
             scales: tables
                 .draws
                 .iter()
-                .map(|draw| draw.groups.iter().map(|g| GroupScale::new(g, &tables.samplers)).collect())
+                .map(|draw| {
+                    draw.groups
+                        .iter()
+                        .map(|g| GroupScale::new(g, &tables.samplers))
+                        .collect()
+                })
                 .collect(),
-            masked: draws.calls.iter().map(|c| c.mode == DrawMode::Masked).collect(),
+            masked: draws
+                .calls
+                .iter()
+                .map(|c| c.mode == DrawMode::Masked)
+                .collect(),
         }
     }
 
     /// Builds tile `tile` of the bins into `scratch.tile`.
-    pub fn build(&self, records: RawRecords<'_>, bins: &Bins, tile: usize, scratch: &mut Scratch) -> CaptureCounts {
+    pub fn build(
+        &self,
+        records: RawRecords<'_>,
+        bins: &Bins,
+        tile: usize,
+        scratch: &mut Scratch,
+    ) -> CaptureCounts {
         scratch.order.clear();
-        bins.visit(tile, |i| scratch.order.push((sort_key(&records.quads[i as usize]), i)));
+        bins.visit(tile, |i| {
+            scratch
+                .order
+                .push((sort_key(&records.quads[i as usize]), i))
+        });
         scratch.order.sort_unstable();
         scratch.tile.clear();
         scratch.depth.clear();
@@ -89,15 +108,25 @@ impl TileRules {
     }
 
     /// Adds the records of one quad of one primitive.
-    fn add_quad(&self, records: RawRecords<'_>, quad: &[(u64, u32)], scratch: &mut Scratch, counts: &mut CaptureCounts) {
+    fn add_quad(
+        &self,
+        records: RawRecords<'_>,
+        quad: &[(u64, u32)],
+        scratch: &mut Scratch,
+        counts: &mut CaptureCounts,
+    ) {
         let of = |entry: &(u64, u32)| &records.quads[entry.1 as usize];
-        let Some(first) = quad.first().map(of) else { return };
+        let Some(first) = quad.first().map(of) else {
+            return;
+        };
         let (x, y) = ((first.qx() & 7) as u8, (first.qy() & 7) as u8);
         let mut alive = 15;
         if self.masked.get(first.draw as usize) == Some(&true) {
             alive = 0;
             for &(_, index) in quad.iter().filter(|entry| of(entry).group() == 0) {
-                let (Some(depth), covered) = (records.depths.get(index as usize), of(&(0, index)).mask()) else {
+                let (Some(depth), covered) =
+                    (records.depths.get(index as usize), of(&(0, index)).mask())
+                else {
                     continue;
                 };
                 let survivors = scratch.depth.survivors(first.draw, x, y, covered, depth);
@@ -121,7 +150,10 @@ impl TileRules {
             };
             self.open_run(record, scratch);
             if record.group() != NO_GROUP {
-                let rule = self.scales.get(record.draw as usize).and_then(|g| g.get(usize::from(record.group())));
+                let rule = self
+                    .scales
+                    .get(record.draw as usize)
+                    .and_then(|g| g.get(usize::from(record.group())));
                 let quantiser = &mut scratch.quantisers[usize::from(record.group())];
                 let Some(fixed) = rule.and_then(|rule| quantiser.quantise(rule, record)) else {
                     counts.not_finite += 1;
@@ -141,7 +173,11 @@ impl TileRules {
     /// Starts the run of the record's primitive unless it is the one under way.
     fn open_run(&self, record: &RawRecord, scratch: &mut Scratch) {
         let tile = &mut scratch.tile;
-        if tile.runs.last().is_none_or(|run| run.primitive != record.primitive) {
+        if tile
+            .runs
+            .last()
+            .is_none_or(|run| run.primitive != record.primitive)
+        {
             // A run whose records were all left out makes room for the next.
             if tile.runs.last().is_some_and(|run| run.count == 0) {
                 tile.runs.pop();

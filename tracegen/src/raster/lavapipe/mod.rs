@@ -6,7 +6,9 @@ mod targets;
 mod uniforms;
 mod upload;
 
-use super::backend::{CaptureBackend, DEPTH_BYTES, RECORD_BYTES, RasterError, RawRecords, Region, Rendered, View};
+use super::backend::{
+    CaptureBackend, DEPTH_BYTES, RECORD_BYTES, RasterError, RawRecords, Region, Rendered, View,
+};
 use super::draws::{DrawCall, DrawList, DrawMode};
 use super::lighting::Lighting;
 use crate::scene::Scene;
@@ -56,7 +58,9 @@ impl Lavapipe {
         let buffers = SceneBuffers::new(&gpu, &pipelines.layouts, scene, draws, textures)?;
         let masked = draws.calls.iter().any(|c| c.mode == DrawMode::Masked);
         let targets = Targets::new(&gpu, view_size_px, record_budget_bytes, masked)?;
-        let shadow_maps = gpu.checked("making the shadow maps", || ShadowMaps::new(&gpu, draws.cascades))?;
+        let shadow_maps = gpu.checked("making the shadow maps", || {
+            ShadowMaps::new(&gpu, draws.cascades)
+        })?;
         let eye_bindings = bind_view(
             &gpu,
             &pipelines,
@@ -99,8 +103,16 @@ impl Lavapipe {
             role,
             capture,
             // A shadow caster without alpha test is drawn alike whatever its material.
-            textures: if role == Role::Shadow { 0 } else { material.textures },
-            leaders: if shadow || !capture { 0 } else { material.leaders },
+            textures: if role == Role::Shadow {
+                0
+            } else {
+                material.textures
+            },
+            leaders: if shadow || !capture {
+                0
+            } else {
+                material.leaders
+            },
             cascades: if shadow { 0 } else { cascades },
             double_sided: shadow || material.double_sided,
             mirrored: !shadow && call.mirrored,
@@ -128,7 +140,9 @@ impl Lavapipe {
     }
 
     fn keys_of(&self, call: &DrawCall, cascades: u32) -> Vec<PipelineKey> {
-        let roles = [false, true].into_iter().flat_map(|capture| Self::roles(call, capture));
+        let roles = [false, true]
+            .into_iter()
+            .flat_map(|capture| Self::roles(call, capture));
         let mut keys: Vec<PipelineKey> = roles
             .map(|&(role, capture)| self.key(call, role, capture, cascades))
             .collect();
@@ -139,8 +153,17 @@ impl Lavapipe {
     }
 
     /// Issues one draw through one pipeline, setting only the state that changes.
-    fn issue(&self, pass: &mut wgpu::RenderPass<'_>, state: &mut PassState, index: u32, call: &DrawCall, key: PipelineKey) {
-        let (Some(mesh), Some(pipeline)) = (&self.scene.meshes[call.mesh], self.pipelines.get(&key)) else {
+    fn issue(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        state: &mut PassState,
+        index: u32,
+        call: &DrawCall,
+        key: PipelineKey,
+    ) {
+        let (Some(mesh), Some(pipeline)) =
+            (&self.scene.meshes[call.mesh], self.pipelines.get(&key))
+        else {
             // Every draw's mesh is uploaded and its pipelines prepared when the backend is made.
             return;
         };
@@ -183,11 +206,14 @@ impl CaptureBackend for Lavapipe {
         // The map cannot be bound while it is rendered: the casters get a stand-in.
         let stand_in = ShadowMaps::new(&self.gpu, 0);
         for (cascade, layer) in lighting.cascades.iter().zip(&self.shadow_maps.layers) {
-            let uniform = self.gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("cascade"),
-                contents: bytemuck::bytes_of(&ViewData::of_cascade(cascade, lighting)),
-                usage: wgpu::BufferUsages::UNIFORM,
-            });
+            let uniform = self
+                .gpu
+                .device
+                .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                    label: Some("cascade"),
+                    contents: bytemuck::bytes_of(&ViewData::of_cascade(cascade, lighting)),
+                    usage: wgpu::BufferUsages::UNIFORM,
+                });
             let bindings = bind_view(
                 &self.gpu,
                 &self.pipelines,
@@ -237,7 +263,8 @@ impl CaptureBackend for Lavapipe {
         let gpu = &self.gpu;
         let targets = &self.targets;
         let data = ViewData::of_eye(view, targets.capacity);
-        gpu.queue.write_buffer(&targets.view_uniform, 0, bytemuck::bytes_of(&data));
+        gpu.queue
+            .write_buffer(&targets.view_uniform, 0, bytemuck::bytes_of(&data));
         gpu.queue.write_buffer(&targets.counter, 0, &[0; 4]);
         gpu.checked("rendering a view", || {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -290,12 +317,18 @@ impl CaptureBackend for Lavapipe {
             gpu.wait("rendering a view")?;
             return Ok(Rendered::Complete { records: 0 });
         }
-        let needed = u64::from(gpu.read(&targets.counter, 0..4, |bytes| Ok(bytemuck::pod_read_unaligned::<u32>(bytes)))?);
+        let needed = u64::from(gpu.read(&targets.counter, 0..4, |bytes| {
+            Ok(bytemuck::pod_read_unaligned::<u32>(bytes))
+        })?);
         if needed > u64::from(targets.capacity) {
             return Ok(Rendered::Overflow { needed });
         }
         if needed > 0 {
-            let depths = if targets.has_depths { needed * DEPTH_BYTES } else { 0 };
+            let depths = if targets.has_depths {
+                needed * DEPTH_BYTES
+            } else {
+                0
+            };
             gpu.read(&targets.records, 0..needed * RECORD_BYTES, |quads| {
                 let quads = records_of(quads)?;
                 if depths == 0 {

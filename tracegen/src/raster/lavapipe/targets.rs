@@ -40,7 +40,12 @@ impl Targets {
     ///
     /// # Errors
     /// A size of 0 or beyond the device's limit, and driver errors.
-    pub fn new(gpu: &Gpu, size_px: [u32; 2], budget_bytes: u64, has_depths: bool) -> Result<Self, RasterError> {
+    pub fn new(
+        gpu: &Gpu,
+        size_px: [u32; 2],
+        budget_bytes: u64,
+        has_depths: bool,
+    ) -> Result<Self, RasterError> {
         let limits = gpu.device.limits();
         // Records hold 12 bits of quad column and row.
         let limit = limits.max_texture_dimension_2d.min(8192);
@@ -54,7 +59,8 @@ impl Targets {
             }
         }
         let binding = u64::from(limits.max_storage_buffer_binding_size as u32);
-        let capacity = (budget_bytes.min(binding).min(limits.max_buffer_size) / RECORD_BYTES).max(1);
+        let capacity =
+            (budget_bytes.min(binding).min(limits.max_buffer_size) / RECORD_BYTES).max(1);
         let depths = if has_depths { capacity } else { 1 };
         let row_bytes = (size_px[0] * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         gpu.checked("making the render targets", || {
@@ -79,7 +85,10 @@ impl Targets {
                 has_depths,
                 counter: buffer(4, Usage::STORAGE | Usage::MAP_READ | Usage::COPY_DST),
                 capacity: capacity as u32,
-                view_uniform: buffer(size_of::<ViewData>() as u64, Usage::UNIFORM | Usage::COPY_DST),
+                view_uniform: buffer(
+                    size_of::<ViewData>() as u64,
+                    Usage::UNIFORM | Usage::COPY_DST,
+                ),
                 readback: buffer(
                     u64::from(row_bytes) * u64::from(size_px[1]),
                     Usage::MAP_READ | Usage::COPY_DST,

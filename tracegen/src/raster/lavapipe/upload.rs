@@ -96,11 +96,13 @@ impl SceneBuffers {
             .map(|m| bind_material(gpu, layouts, m, textures, &views, &absent))
             .collect();
         let instances = instance_rows(draws);
-        let instances = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("instances"),
-            contents: bytemuck::cast_slice(&instances),
-            usage: wgpu::BufferUsages::STORAGE,
-        });
+        let instances = gpu
+            .device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("instances"),
+                contents: bytemuck::cast_slice(&instances),
+                usage: wgpu::BufferUsages::STORAGE,
+            });
         Ok(Self {
             meshes,
             materials,
@@ -127,23 +129,37 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
             let (uv0, uv1) = (at2(&mesh.uv0, i), at2(&mesh.uv1, i));
             VertexData {
                 position: position.to_array(),
-                normal: mesh.normals.get(i).copied().unwrap_or(glam::Vec3::Y).to_array(),
-                tangent: mesh.tangents.get(i).copied().unwrap_or(Vec4::new(1.0, 0.0, 0.0, 1.0)).to_array(),
+                normal: mesh
+                    .normals
+                    .get(i)
+                    .copied()
+                    .unwrap_or(glam::Vec3::Y)
+                    .to_array(),
+                tangent: mesh
+                    .tangents
+                    .get(i)
+                    .copied()
+                    .unwrap_or(Vec4::new(1.0, 0.0, 0.0, 1.0))
+                    .to_array(),
                 uv: [uv0.x, uv0.y, uv1.x, uv1.y],
             }
         })
         .collect();
     let buffer = |contents: &[u8], usage| {
-        gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: None,
-            contents,
-            usage,
-        })
+        gpu.device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: None,
+                contents,
+                usage,
+            })
     };
     // A trailing partial triangle would be no primitive: leave it out of the index range.
     Ok(MeshBuffers {
         vertices: buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
-        indices: buffer(bytemuck::cast_slice(&mesh.indices), wgpu::BufferUsages::INDEX),
+        indices: buffer(
+            bytemuck::cast_slice(&mesh.indices),
+            wgpu::BufferUsages::INDEX,
+        ),
         index_count: mesh.triangles() as u32 * 3,
     })
 }
@@ -157,7 +173,12 @@ fn instance_rows(draws: &DrawList) -> Vec<InstanceData> {
             // A flattened instance has no inverse; its normals keep the object's direction.
             let normal = if inverse.is_finite() { inverse } else { matrix };
             let mut normal_from_object = Mat4::from_mat3(normal);
-            normal_from_object.w_axis = Vec4::new(f32::from_bits(draw), f32::from_bits(call.first_primitive), 0.0, 1.0);
+            normal_from_object.w_axis = Vec4::new(
+                f32::from_bits(draw),
+                f32::from_bits(call.first_primitive),
+                0.0,
+                1.0,
+            );
             InstanceData {
                 world_from_object: Mat4::from(call.transform).to_cols_array_2d(),
                 normal_from_object: normal_from_object.to_cols_array_2d(),
@@ -185,7 +206,10 @@ fn white() -> CompressedTexture {
     }
 }
 
-fn upload_texture(gpu: &Gpu, compressed: &CompressedTexture) -> Result<wgpu::TextureView, RasterError> {
+fn upload_texture(
+    gpu: &Gpu,
+    compressed: &CompressedTexture,
+) -> Result<wgpu::TextureView, RasterError> {
     let texture = &compressed.texture;
     let srgb = texture.color_space == ColorSpace::Srgb;
     let format = match texture.format {
@@ -249,11 +273,13 @@ fn bind_material(
         gpu.device.create_sampler(&sampler_descriptor(&state))
     });
     let data = material_data(material);
-    let uniform = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("material"),
-        contents: bytemuck::bytes_of(&data),
-        usage: wgpu::BufferUsages::UNIFORM,
-    });
+    let uniform = gpu
+        .device
+        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("material"),
+            contents: bytemuck::bytes_of(&data),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
     let mut entries = vec![wgpu::BindGroupEntry {
         binding: 0,
         resource: uniform.as_entire_binding(),
@@ -321,7 +347,11 @@ fn sampler_descriptor(state: &Sampler) -> wgpu::SamplerDescriptor<'static> {
             MipFilter::Linear => wgpu::MipmapFilterMode::Linear,
         },
         // Vulkan has no sampler without levels; a quarter of a level above 0 never reaches 1.
-        lod_max_clamp: if state.mip == MipFilter::None { 0.25 } else { 32.0 },
+        lod_max_clamp: if state.mip == MipFilter::None {
+            0.25
+        } else {
+            32.0
+        },
         ..wgpu::SamplerDescriptor::default()
     }
 }
