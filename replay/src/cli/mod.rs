@@ -1,7 +1,11 @@
 //! The command line, one file a subcommand.
 
 mod config_args;
+mod experiment_args;
+mod paper;
+mod report;
 mod run;
+mod sweep;
 
 pub use config_args::ConfigArgs;
 
@@ -28,6 +32,12 @@ struct Cli {
 enum Command {
     /// Replay one trace in one tile order through one cache configuration.
     Run(Box<run::Args>),
+    /// Replay the Z2 paper's experiment: its caches and orders, beside its published figures.
+    Paper(Box<paper::Args>),
+    /// Replay every point of an experiment file; goes on where it stopped.
+    Sweep(sweep::Args),
+    /// Write the experiment as one self-contained page, with JSON and CSV beside it.
+    Report(Box<report::Args>),
 }
 
 /// Parses the command line and runs it. Errors go to stderr.
@@ -35,6 +45,9 @@ enum Command {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Run(args) => run::run(&args),
+        Command::Paper(args) => paper::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
+        Command::Report(args) => report::run(&args),
     };
     match outcome {
         Ok(code) => code,

@@ -1,7 +1,8 @@
 //! Grouped bars with optional reference marks (a paper's values) over them.
 
 use super::{
-    Anchor, PlotError, Scale, SeriesStyle, draw, fill, heading, horizontal_grid, stroke, text, wrap,
+    Anchor, LegendEntry, PlotError, Scale, SeriesStyle, Symbol, draw, fill, heading,
+    horizontal_grid, legend, legend_width_px, stroke, text, wrap,
 };
 use crate::report::theme;
 
@@ -84,7 +85,7 @@ impl BarChart {
             .map(|g| wrap(&g.label, group_px - 6.0, theme::LABEL_PX).len())
             .max()
             .unwrap_or(1);
-        let legend_width: f64 = self.legend_width_px() + LEFT_PX + RIGHT_PX;
+        let legend_width: f64 = legend_width_px(&self.legend()) + LEFT_PX + RIGHT_PX;
         let heading_width = theme::text_width_px(&self.title, theme::TITLE_PX)
             .max(theme::text_width_px(&self.value_label, theme::LABEL_PX))
             + 16.0;
@@ -119,7 +120,7 @@ impl BarChart {
             (width.ceil() as u32, height.ceil() as u32),
             |area| {
                 heading(area, &self.title, &self.value_label)?;
-                self.legend(area)?;
+                legend(area, (LEFT_PX, 53.0), &self.legend())?;
                 horizontal_grid(
                     area,
                     &scale,
@@ -222,39 +223,18 @@ impl BarChart {
         (widest + 5.0).max(22.0)
     }
 
-    fn legend_entries(&self) -> impl Iterator<Item = (&str, Option<plotters::style::RGBColor>)> {
-        self.series
-            .iter()
-            .map(|s| (s.name.as_str(), Some(s.color)))
-            .chain(self.mark_name.as_deref().map(|name| (name, None)))
-    }
-
-    fn legend_width_px(&self) -> f64 {
-        self.legend_entries()
-            .map(|(name, _)| 34.0 + theme::text_width_px(name, theme::LABEL_PX))
-            .sum()
-    }
-
-    /// Names in a row under the heading: bars have no end to write a name at.
-    fn legend(&self, area: &super::Area) -> Result<(), String> {
-        let mut x = LEFT_PX;
-        let y = 53.0;
-        for (name, color) in self.legend_entries() {
-            match color {
-                Some(color) => fill(area, (x, y - 5.0), (x + 12.0, y + 5.0), color)?,
-                None => stroke(area, &[(x, y), (x + 12.0, y)], theme::INK, theme::LINE_PX)?,
-            }
-            text(
-                area,
-                (x + 17.0, y),
-                name,
-                theme::LABEL_PX,
-                theme::INK,
-                Anchor::Start,
-            )?;
-            x += 34.0 + theme::text_width_px(name, theme::LABEL_PX);
-        }
-        Ok(())
+    fn legend(&self) -> Vec<LegendEntry<'_>> {
+        let series = self.series.iter().map(|s| LegendEntry {
+            name: &s.name,
+            color: s.color,
+            symbol: Symbol::Box,
+        });
+        let mark = self.mark_name.as_deref().map(|name| LegendEntry {
+            name,
+            color: theme::INK,
+            symbol: Symbol::Stroke,
+        });
+        series.chain(mark).collect()
     }
 }
 
