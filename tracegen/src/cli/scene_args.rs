@@ -126,7 +126,7 @@ impl CameraArgs {
     pub fn resolve(&self, scene: &Scene) -> Result<Camera, cameras::CameraError> {
         let from_scene = cameras::find(scene, self.camera.as_deref())?;
         let camera = match (self.eye, self.target) {
-            (Some(eye), Some(target)) => self.from_flags(eye, target, from_scene),
+            (Some(eye), Some(target)) => self.posed(eye, target, from_scene),
             _ => from_scene.clone(),
         };
         cameras::validate(&camera)?;
@@ -139,11 +139,11 @@ impl CameraArgs {
             return Ok(());
         };
         let planes = cameras::default_camera(&Scene::default());
-        cameras::validate(&self.from_flags(eye, target, &planes))
+        cameras::validate(&self.posed(eye, target, &planes))
     }
 
     /// Near and far planes come from the scene's own camera: they fit its scale.
-    fn from_flags(&self, eye: Vec3, target: Vec3, planes: &Camera) -> Camera {
+    fn posed(&self, eye: Vec3, target: Vec3, planes: &Camera) -> Camera {
         Camera {
             name: "custom".into(),
             eye,
