@@ -1,7 +1,7 @@
 //! A sports car in a studio: paint, glass, chrome, rubber. 55 K triangles.
 
 use super::car_body::{self, AXLES, TYRE};
-use super::masonry::plaster;
+use super::masonry::carved_stone;
 use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
 use super::organic::damask;
 use super::scene_builder::{MaterialId, SceneBuilder};
@@ -38,7 +38,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             1024,
             Maps::ColorNormal,
             4.0,
-            plaster(rgb(0x9a9da2), rgb(0x85888c), 0.0),
+            carved_stone([rgb(0x8e9196), rgb(0x86898e)], 0.0, 0.0, 0.2),
         ),
         recipe(
             "leather",
@@ -137,7 +137,8 @@ pub fn scene() -> Scene {
 
 fn skin(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("body", car_body::body_mesh(92, 40), kit.paint);
-    scene.add("end-caps", car_body::end_caps(32), kit.trim);
+    scene.add("intake", car_body::end_cap(32, true), kit.trim);
+    scene.add("rear-panel", car_body::end_cap(32, false), kit.paint);
     let [paint, glass, trim] = car_body::cabin_meshes(60, 52);
     scene.add("roof", paint, kit.paint);
     scene.add("windows", glass, kit.glass);
@@ -154,13 +155,13 @@ fn skin(scene: &mut SceneBuilder, kit: &Kit) {
         vec2(r * cos, r * sin)
     };
     house.surface(28, 1, |s, t| {
-        (vec3(arc(s).x, arc(s).y, -0.30 * t), vec2(s, t))
+        (vec3(arc(s).x, arc(s).y, -0.35 * t), vec2(s, t))
     });
     house.orient(|p| -vec3(p.x, p.y, 0.0));
     let mut back = MeshBuilder::new();
     back.surface(28, 1, |s, t| {
         (
-            vec3(arc(s).x, arc(s).y * t - 0.07 * (1.0 - t), -0.30),
+            vec3(arc(s).x, arc(s).y * t - 0.07 * (1.0 - t), -0.35),
             vec2(s, t),
         )
     });
@@ -171,7 +172,7 @@ fn skin(scene: &mut SceneBuilder, kit: &Kit) {
             let turn = Quat::from_rotation_y(if side > 0.0 { 0.0 } else { PI });
             pan.merge(
                 &house,
-                Affine3A::from_rotation_translation(turn, vec3(x, TYRE, side * 0.84)),
+                Affine3A::from_rotation_translation(turn, vec3(x, TYRE, side * 0.885)),
             );
         }
     }
@@ -448,7 +449,7 @@ fn details(scene: &mut SceneBuilder, kit: &Kit) {
                 shaped(
                     vec3(0.062, 0.03, 0.062),
                     back,
-                    vec3(-2.165 + 0.05 * k as f32, 0.70, z),
+                    vec3(-2.205 + 0.02 * k as f32, 0.70, z),
                 ),
             );
             let ring: Vec<(Vec3, f32)> = (0..=32)
@@ -456,7 +457,7 @@ fn details(scene: &mut SceneBuilder, kit: &Kit) {
                     let (sin, cos) = (TAU * (i % 32) as f32 / 32.0).sin_cos();
                     (
                         vec3(
-                            -2.172 + 0.05 * k as f32,
+                            -2.208 + 0.02 * k as f32,
                             0.70 + 0.067 * sin,
                             z + 0.067 * cos,
                         ),
@@ -565,7 +566,7 @@ fn details(scene: &mut SceneBuilder, kit: &Kit) {
         })
         .collect();
     paint.tube(&wing, 10);
-    dark.block(vec3(-2.225, 0.50, -0.26), vec3(-2.205, 0.61, 0.26), 0.004);
+    dark.block(vec3(-2.235, 0.50, -0.26), vec3(-2.20, 0.61, 0.26), 0.004);
     chrome.merge(
         &ball(10),
         shaped(

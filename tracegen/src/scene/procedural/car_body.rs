@@ -269,29 +269,27 @@ pub fn cabin_meshes(ns: usize, nt: usize) -> [MeshBuilder; 3] {
     parts
 }
 
-/// End caps: nose and tail closed by fans of quads towards the middle.
+/// The nose's intake (`front`) or the tail's panel, a shallow dish inside the body's outline.
 #[must_use]
-pub fn end_caps(nt: usize) -> MeshBuilder {
+pub fn end_cap(nt: usize, front: bool) -> MeshBuilder {
+    let (x, out) = if front { (NOSE, 1.0f32) } else { (TAIL, -1.0) };
+    let middle = 0.5 * (lower_edge(x) + crown(x));
     let mut m = MeshBuilder::new();
-    for (x, out) in [(NOSE, 1.0f32), (TAIL, -1.0)] {
-        let middle = vec3(x + 0.03 * out, 0.5 * (lower_edge(x) + crown(x)), 0.0);
-        let mut cap = MeshBuilder::new();
-        cap.surface(nt, 5, |a, b| {
-            let p = body(x, 2.0 * a - 1.0)
-                .lerp(vec3(middle.x, middle.y, 0.7 * body(x, 2.0 * a - 1.0).z), b);
-            (vec3(p.x, p.y, p.z * (1.0 - 0.02 * b)), vec2(p.z, -p.y))
-        });
-        cap.orient(|_| Vec3::X * out);
-        m.merge(&cap, glam::Affine3A::IDENTITY);
-        // Below the middle the lower edge is open: a curtain closes it.
-        let mut under = MeshBuilder::new();
-        under.surface(12, 3, |a, b| {
-            let z = 0.7 * half_width(x) * (2.0 * a - 1.0);
-            let p = vec3(middle.x, middle.y, z).lerp(vec3(x, lower_edge(x), z / 0.7 * 0.97), b);
-            (p, vec2(p.z, -p.y))
-        });
-        under.orient(|_| Vec3::X * out);
-        m.merge(&under, glam::Affine3A::IDENTITY);
-    }
+    m.surface(nt, 5, |a, b| {
+        let rim = body(x, 2.0 * a - 1.0);
+        let inner = vec3(x + 0.03 * out, middle, 0.7 * rim.z);
+        let p = rim.lerp(inner, b);
+        (p, vec2(p.z, -p.y))
+    });
+    m.orient(|_| Vec3::X * out);
+    // Below the middle the outline is open: a curtain closes it.
+    let mut under = MeshBuilder::new();
+    under.surface(12, 3, |a, b| {
+        let z = 0.7 * half_width(x) * (2.0 * a - 1.0);
+        let p = vec3(x + 0.03 * out, middle, z).lerp(vec3(x, lower_edge(x), z / 0.7 * 0.97), b);
+        (p, vec2(p.z, -p.y))
+    });
+    under.orient(|_| Vec3::X * out);
+    m.merge(&under, glam::Affine3A::IDENTITY);
     m
 }

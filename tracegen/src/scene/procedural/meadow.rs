@@ -543,10 +543,10 @@ fn trees(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
 }
 
 fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
-    let bushes = |scene: &mut SceneBuilder, stalks: usize, rng: &mut Rng| -> Vec<[usize; 2]> {
+    let bushes = |scene: &mut SceneBuilder, stalks: usize, spike: f32, rng: &mut Rng| -> Vec<[usize; 2]> {
         (0..4)
             .map(|i| {
-                let [green, purple] = parts::lavender(stalks, 0.52, rng);
+                let [green, purple] = parts::lavender(stalks, 0.52, spike, rng);
                 [
                     scene.mesh("lavender-stems", green, kit.stem),
                     scene.mesh("lavender-flowers", purple, kit.lavender[i % 2]),
@@ -554,8 +554,8 @@ fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
             })
             .collect()
     };
-    let near = bushes(scene, 92, rng);
-    let far = bushes(scene, 34, rng);
+    let near = bushes(scene, 112, 0.0095, rng);
+    let far = bushes(scene, 36, 0.014, rng);
     for row in -9i32..=9 {
         let x = row as f32 * ROW;
         let mut z = 4.6;
@@ -609,7 +609,7 @@ fn grass_and_poppies(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
     for i in 0..left {
         let (x, z) = match i % 5 {
             // Before the field, along its sides, in the yard, and between the rows.
-            0 | 4 => (rng.jitter(11.0), rng.range(4.8, 9.5)),
+            0 | 4 => (rng.jitter(8.0), rng.range(4.6, 8.2)),
             1 => (
                 (17.2 + rng.range(0.0, 9.0)) * rng.jitter(1.0).signum(),
                 rng.range(-24.0, 8.0),

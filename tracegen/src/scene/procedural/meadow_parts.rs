@@ -50,9 +50,9 @@ fn spindle(m: &mut MeshBuilder, base: Vec3, top: Vec3, radius: f32, turn: f32) {
     }
 }
 
-/// A lavender bush: stems and leaves, and the flower spikes. 5 + 6 triangles a stalk.
+/// A lavender bush: stems and leaves, and the flower spikes, `spike` metres in radius. 5 + 6 triangles a stalk.
 #[must_use]
-pub fn lavender(stalks: usize, radius: f32, rng: &mut Rng) -> [MeshBuilder; 2] {
+pub fn lavender(stalks: usize, radius: f32, spike: f32, rng: &mut Rng) -> [MeshBuilder; 2] {
     let (mut green, mut purple) = (MeshBuilder::new(), MeshBuilder::new());
     for i in 0..stalks {
         let ring = ((i as f32 + 0.5) / stalks as f32).sqrt();
@@ -73,13 +73,13 @@ pub fn lavender(stalks: usize, radius: f32, rng: &mut Rng) -> [MeshBuilder; 2] {
         let v =
             [root - side, root + side, top].map(|p| green.vertex(p, normal, vec2(p.x + p.z, -p.y)));
         green.triangle(v[0], v[1], v[2]);
-        let spike = 0.26 * radius * rng.range(0.8, 1.3);
+        let head = 0.19 * radius * rng.range(0.8, 1.3);
         let along = (top - root).normalize_or(Vec3::Y);
         spindle(
             &mut purple,
             top - along * 0.02,
-            top + along * spike,
-            0.0125 * rng.range(0.8, 1.2),
+            top + along * head,
+            spike * rng.range(0.8, 1.2),
             i as f32,
         );
         if i % 2 == 0 {

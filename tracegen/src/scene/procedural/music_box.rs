@@ -104,8 +104,8 @@ pub fn scene() -> Scene {
     bells(&mut scene, &kit);
     scene.camera(
         "default",
-        vec3(0.012, 0.108, 0.098),
-        vec3(0.004, 0.018, -0.004),
+        vec3(-0.002, 0.096, 0.070),
+        vec3(0.004, 0.020, -0.010),
         0.01,
         10.0,
     );
