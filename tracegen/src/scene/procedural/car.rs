@@ -38,7 +38,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             1024,
             Maps::ColorNormal,
             4.0,
-            carved_stone([rgb(0x8e9196), rgb(0x86898e)], 0.0, 0.0, 0.2),
+            carved_stone([rgb(0x75787d), rgb(0x6c6f74)], 0.0, 0.0, 0.2),
         ),
         recipe(
             "leather",
@@ -52,7 +52,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
     let floor = match sets.next() {
         Some(set) => scene.textured(set, |m| {
             m.roughness = 0.2;
-            m.mirror = 0.14;
+            m.mirror = 0.10;
         }),
         None => scene.plain("missing", rgb(0xff_00ff), 0.5, |_| {}),
     };
@@ -62,7 +62,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
     };
     Kit {
         paint: scene.plain("paint", rgb(0xb3141c), 0.08, |m| {
-            m.mirror = 0.22;
+            m.mirror = 0.12;
             m.double_sided = true;
         }),
         glass: scene.plain("glass", rgb(0xdce8e4), 0.0, |m| {
@@ -111,7 +111,7 @@ pub fn scene() -> Scene {
     studio(&mut scene, &kit);
     scene.camera(
         "default",
-        vec3(2.75, 1.30, 1.95),
+        vec3(2.5, 1.12, 1.72),
         vec3(0.35, 0.55, 0.0),
         0.05,
         60.0,
@@ -130,9 +130,9 @@ pub fn scene() -> Scene {
         0.05,
         60.0,
     );
-    scene.sun(vec3(-0.45, -0.80, -0.40), vec3(2.0, 1.95, 1.85));
-    scene.lamp(vec3(2.5, 3.2, 2.2), vec3(6.0, 6.2, 6.6));
-    scene.finish(vec3(0.55, 0.60, 0.68), 0)
+    scene.sun(vec3(-0.45, -0.80, -0.40), vec3(1.35, 1.3, 1.2));
+    scene.lamp(vec3(2.5, 3.2, 2.2), vec3(3.2, 3.3, 3.6));
+    scene.finish(vec3(0.30, 0.34, 0.40), 0)
 }
 
 fn skin(scene: &mut SceneBuilder, kit: &Kit) {

@@ -65,7 +65,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         None => scene.plain("missing", rgb(0xff_00ff), roughness, |_| {}),
     };
     let wood = textured(scene, 0.45, 0.0);
-    let bench = textured(scene, 0.25, 0.08);
+    let bench = textured(scene, 0.25, 0.03);
     let tiles = textured(scene, 0.2, 0.06);
     let label = textured(scene, 0.9, 0.0);
     let liquid = |scene: &mut SceneBuilder, name: &str, color: u32| {
@@ -174,9 +174,9 @@ pub fn scene() -> Scene {
         0.02,
         20.0,
     );
-    scene.sun(vec3(0.35, -0.75, -0.55), vec3(1.5, 1.5, 1.5));
-    scene.lamp(vec3(-0.7, 1.0, 0.7), vec3(0.9, 0.85, 0.75));
-    scene.finish(vec3(0.50, 0.56, 0.62), 0)
+    scene.sun(vec3(0.35, -0.75, -0.55), vec3(1.15, 1.15, 1.1));
+    scene.lamp(vec3(-0.7, 1.0, 0.7), vec3(0.6, 0.56, 0.5));
+    scene.finish(vec3(0.32, 0.36, 0.40), 0)
 }
 
 fn furniture(scene: &mut SceneBuilder, kit: &Kit) {

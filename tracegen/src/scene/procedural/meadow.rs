@@ -66,7 +66,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         recipe(
             "grassland",
             8.0,
-            turf([rgb(0x6f7c34), rgb(0xa8a456)], rgb(0xa98a5c)),
+            turf([rgb(0x55662a), rgb(0x84883f)], rgb(0xa98a5c)),
         ),
         recipe(
             "farm-stone",
@@ -184,8 +184,8 @@ pub fn scene() -> Scene {
         0.05,
         400.0,
     );
-    scene.sun(vec3(0.55, -0.62, -0.42), vec3(3.3, 3.0, 2.5));
-    scene.finish(vec3(0.50, 0.68, 0.95), 0)
+    scene.sun(vec3(0.55, -0.62, -0.42), vec3(2.3, 2.1, 1.75));
+    scene.finish(vec3(0.36, 0.52, 0.78), 0)
 }
 
 fn land(scene: &mut SceneBuilder, kit: &Kit) {
@@ -543,17 +543,18 @@ fn trees(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
 }
 
 fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
-    let bushes = |scene: &mut SceneBuilder, stalks: usize, spike: f32, rng: &mut Rng| -> Vec<[usize; 2]> {
-        (0..4)
-            .map(|i| {
-                let [green, purple] = parts::lavender(stalks, 0.52, spike, rng);
-                [
-                    scene.mesh("lavender-stems", green, kit.stem),
-                    scene.mesh("lavender-flowers", purple, kit.lavender[i % 2]),
-                ]
-            })
-            .collect()
-    };
+    let bushes =
+        |scene: &mut SceneBuilder, stalks: usize, spike: f32, rng: &mut Rng| -> Vec<[usize; 2]> {
+            (0..4)
+                .map(|i| {
+                    let [green, purple] = parts::lavender(stalks, 0.52, spike, rng);
+                    [
+                        scene.mesh("lavender-stems", green, kit.stem),
+                        scene.mesh("lavender-flowers", purple, kit.lavender[i % 2]),
+                    ]
+                })
+                .collect()
+        };
     let near = bushes(scene, 112, 0.0095, rng);
     let far = bushes(scene, 36, 0.014, rng);
     for row in -9i32..=9 {

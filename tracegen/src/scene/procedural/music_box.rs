@@ -77,7 +77,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         })
     };
     Kit {
-        brass: metal(scene, "brass", 0xd8a94c, 0.22, 0.35),
+        brass: metal(scene, "brass", 0xdcb45e, 0.22, 0.25),
         polished: metal(scene, "polished-brass", 0xe8bf62, 0.08, 0.6),
         steel: metal(scene, "steel", 0xcfd3d8, 0.1, 0.6),
         blued: metal(scene, "blued-steel", 0x2f4a86, 0.15, 0.45),
@@ -116,9 +116,9 @@ pub fn scene() -> Scene {
         0.01,
         10.0,
     );
-    scene.sun(vec3(-0.4, -0.8, -0.45), vec3(1.6, 1.55, 1.45));
+    scene.sun(vec3(-0.4, -0.8, -0.45), vec3(1.25, 1.2, 1.1));
     scene.lamp(vec3(0.25, 0.35, 0.2), vec3(0.12, 0.11, 0.09));
-    scene.finish(vec3(0.55, 0.58, 0.62), 0)
+    scene.finish(vec3(0.36, 0.39, 0.43), 0)
 }
 
 /// Box with an open lid, lined with velvet, on a table.
