@@ -8,6 +8,7 @@ use crate::report::csv::Csv;
 use crate::report::html::table::{Column, Table};
 use crate::report::html::{self, Section, figures, folded};
 use crate::report::plots::bars::{BarChart, BarGroup};
+use crate::report::plots::hbars::HBarChart;
 use crate::report::plots::{PlotError, SeriesStyle};
 use crate::report::theme;
 use crate::report::z2::experiment::{Subject, frames_of};
@@ -258,93 +259,117 @@ pub fn csv(report: &SweepReport) -> String {
     csv.finish()
 }
 
-/// Bars of external traffic: one chart for the changes, one for each axis, the other axes at
-/// their first value; the orders are the series where they are an axis.
-fn charts(report: &SweepReport, scene: &str) -> Vec<BarChart> {
-    let orders: Vec<Value> = report
-        .axes
-        .iter()
-        .find(|a| a.key == ORDER)
-        .map_or_else(Vec::new, |a| a.values.clone());
-    let series: Vec<SeriesStyle> = if orders.is_empty() {
-        vec![SeriesStyle::nth("external traffic", 2)]
-    } else {
+/// What one trace's charts look up: external traffic in MB a frame.
+struct Lookup<'a> {
+    report: &'a SweepReport,
+    scene: &'a str,
+    /// Values of the order axis; empty where the order is no axis.
+    orders: Vec<Value>,
+}
+
+impl<'a> Lookup<'a> {
+    fn new(report: &'a SweepReport, scene: &'a str) -> Self {
+        let orders = report.axes.iter().find(|a| a.key == ORDER);
+        Self {
+            report,
+            scene,
+            orders: orders.map_or_else(Vec::new, |a| a.values.clone()),
+        }
+    }
+
+    /// One series an order, or a single one.
+    fn series(&self) -> Vec<SeriesStyle> {
+        if self.orders.is_empty() {
+            return vec![SeriesStyle::nth("external traffic", 2)];
+        }
         let style = |o: &Value| SeriesStyle {
             name: plain(o),
             color: theme::order_color(&plain(o)),
         };
-        orders.iter().map(style).collect()
-    };
-    // The row with these values; axes that are not named are at their first value.
-    let value = |named: &[(&str, &Value)], change: &Option<(String, Value)>| {
-        let matches = |row: &&SweepRow| {
-            row.scene == scene
-                && row.change == *change
-                && row
-                    .settings
-                    .iter()
-                    .zip(&report.axes)
-                    .all(|((key, value), axis)| {
-                        let wanted = named.iter().find(|(k, _)| k == key).map(|(_, v)| *v);
-                        wanted.or(axis.values.first()) == Some(value)
-                    })
-        };
-        report
-            .rows
-            .iter()
-            .find(matches)
-            .map(|r| r.external_mb_per_frame)
-    };
-    let group = |label: String, axis: Option<(&str, &Value)>, change: Option<(String, Value)>| {
+        self.orders.iter().map(style).collect()
+    }
+
+    /// One value a series; axes that are not named are at their first value.
+    fn values(
+        &self,
+        axis: Option<(&str, &Value)>,
+        change: &Option<(String, Value)>,
+    ) -> Vec<Option<f64>> {
         let with = |order: Option<&Value>| {
             let named: Vec<(&str, &Value)> =
                 axis.into_iter().chain(order.map(|o| (ORDER, o))).collect();
-            value(&named, &change)
+            let matches = |row: &&SweepRow| {
+                row.scene == self.scene
+                    && row.change == *change
+                    && row
+                        .settings
+                        .iter()
+                        .zip(&self.report.axes)
+                        .all(|((key, value), axis)| {
+                            let wanted = named.iter().find(|(k, _)| k == key).map(|(_, v)| *v);
+                            wanted.or(axis.values.first()) == Some(value)
+                        })
+            };
+            self.report
+                .rows
+                .iter()
+                .find(matches)
+                .map(|r| r.external_mb_per_frame)
         };
-        BarGroup {
-            label,
-            values: if orders.is_empty() {
-                vec![with(None)]
-            } else {
-                orders.iter().map(|o| with(Some(o))).collect()
-            },
-            marks: Vec::new(),
+        if self.orders.is_empty() {
+            return vec![with(None)];
         }
-    };
-    let chart = |title: String, group_label: &str, groups: Vec<BarGroup>| BarChart {
-        title,
-        value_label: "external texture traffic, MB per frame".to_owned(),
-        group_label: group_label.to_owned(),
-        series: series.clone(),
-        groups,
-        mark_name: None,
-        reference: None,
-        decimals: Some(1),
-    };
-    let mut out = Vec::new();
-    if !report.one_at_a_time.is_empty() {
-        let mut groups = vec![group("base".to_owned(), None, None)];
-        for axis in &report.one_at_a_time {
-            for v in &axis.values {
-                let change = Some((axis.key.clone(), v.clone()));
-                groups.push(group(change_title(change.as_ref()), None, change));
-            }
-        }
-        out.push(chart(format!("{scene}: one change at a time"), "", groups));
+        self.orders.iter().map(|o| with(Some(o))).collect()
     }
-    for axis in report
+}
+
+const VALUE_LABEL: &str = "external texture traffic, MB per frame";
+
+/// A row for the base and one for each single change.
+fn change_chart(report: &SweepReport, scene: &str) -> Option<HBarChart> {
+    let lookup = Lookup::new(report, scene);
+    let changes = report.one_at_a_time.iter().flat_map(|axis| {
+        axis.values
+            .iter()
+            .map(|v| Some((axis.key.clone(), v.clone())))
+    });
+    (!report.one_at_a_time.is_empty()).then(|| HBarChart {
+        title: format!("{scene}: one change at a time"),
+        value_label: VALUE_LABEL.to_owned(),
+        series: lookup.series(),
+        rows: std::iter::once(None)
+            .chain(changes)
+            .map(|change| (change_title(change.as_ref()), lookup.values(None, &change)))
+            .collect(),
+        decimals: Some(2),
+    })
+}
+
+/// A chart for each axis but the order, the other axes at their first value.
+fn axis_charts(report: &SweepReport, scene: &str) -> Vec<BarChart> {
+    let lookup = Lookup::new(report, scene);
+    report
         .axes
         .iter()
         .filter(|a| a.key != ORDER && a.values.len() > 1)
-    {
-        let groups = axis
-            .values
-            .iter()
-            .map(|v| group(plain(v), Some((&axis.key, v)), None))
-            .collect();
-        out.push(chart(format!("{scene}: {}", axis.key), &axis.key, groups));
-    }
-    out
+        .map(|axis| BarChart {
+            title: format!("{scene}: {}", axis.key),
+            value_label: VALUE_LABEL.to_owned(),
+            group_label: axis.key.clone(),
+            series: lookup.series(),
+            groups: axis
+                .values
+                .iter()
+                .map(|v| BarGroup {
+                    label: plain(v),
+                    values: lookup.values(Some((&axis.key, v)), &None),
+                    marks: Vec::new(),
+                })
+                .collect(),
+            decimals: Some(1),
+            ..BarChart::default()
+        })
+        .collect()
 }
 
 /// The sweep as a page.
@@ -354,7 +379,10 @@ fn charts(report: &SweepReport, scene: &str) -> Vec<BarChart> {
 pub fn page(title: &str, report: &SweepReport) -> Result<String, PlotError> {
     let mut pictures = Vec::new();
     for (label, _) in &report.traces {
-        for chart in charts(report, label) {
+        if let Some(chart) = change_chart(report, label) {
+            pictures.push((chart.svg()?, String::new()));
+        }
+        for chart in axis_charts(report, label) {
             pictures.push((chart.svg()?, String::new()));
         }
     }
@@ -447,10 +475,10 @@ mod tests {
 
     #[test]
     fn the_chart_of_changes_has_the_orders_as_series() {
-        let charts = charts(&report(), "a,b");
-        assert_eq!(charts.len(), 1);
-        assert_eq!(charts[0].series.len(), 2);
-        assert_eq!(charts[0].groups[1].values, [Some(4.4), Some(3.3)]);
+        let chart = change_chart(&report(), "a,b").unwrap();
+        assert_eq!(chart.series.len(), 2);
+        assert_eq!(chart.rows[1].1, [Some(4.4), Some(3.3)]);
+        assert!(axis_charts(&report(), "a,b").is_empty());
     }
 
     #[test]

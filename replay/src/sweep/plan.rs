@@ -430,6 +430,15 @@ mod tests {
     }
 
     #[test]
+    fn the_example_experiments_can_be_planned() {
+        let caches = Experiment::parse(include_str!("../../experiments/caches.toml")).unwrap();
+        assert_eq!(caches.points().unwrap().len(), 48);
+        let choices =
+            Experiment::parse(include_str!("../../experiments/open-choices.toml")).unwrap();
+        assert_eq!(choices.points().unwrap().len() % 3, 0);
+    }
+
+    #[test]
     fn an_impossible_point_is_named() {
         let experiment =
             Experiment::parse("[axes]\nl1.size_bytes = [\"8KiB\", \"6KiB\"]\n").unwrap();

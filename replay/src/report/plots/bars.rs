@@ -76,7 +76,7 @@ impl BarChart {
         let per_group = self.series.len().max(1) as f64;
         let bar_px = self.bar_width_px();
         let gap_px = (bar_px * 0.8).max(14.0);
-        let group_px = bar_px * per_group + gap_px;
+        let group_px = (bar_px * per_group + gap_px).max(self.widest_word_px() + 10.0);
         let plot_width = (group_px * self.groups.len() as f64).max(320.0);
         let group_px = plot_width / self.groups.len().max(1) as f64;
         let label_lines = self
@@ -209,6 +209,15 @@ impl BarChart {
         )
     }
 
+    /// Group names break at spaces, so that neighbours cannot touch when a group has this width.
+    fn widest_word_px(&self) -> f64 {
+        self.groups
+            .iter()
+            .flat_map(|g| wrap(&g.label, 0.0, theme::LABEL_PX))
+            .map(|word| theme::text_width_px(&word, theme::LABEL_PX))
+            .fold(0.0, f64::max)
+    }
+
     /// Wide enough that the numbers over neighbouring bars do not touch.
     fn bar_width_px(&self) -> f64 {
         let Some(decimals) = self.decimals else {
@@ -279,6 +288,24 @@ mod tests {
             bad.svg().unwrap_err().to_string(),
             "plot `Crytek`: group `8/128` holds NaN"
         );
+    }
+
+    #[test]
+    fn long_group_names_do_not_touch() {
+        let mut long = chart();
+        long.groups[0].label = "layout.base_align_bytes = 65536".into();
+        let mut second = long.groups[0].clone();
+        second.label = "sampling.helper_lanes = true".into();
+        long.groups.push(second);
+        let svg = long.svg().unwrap();
+        let centre = |word: &str| -> f64 {
+            let end = svg.find(&format!("\n{word}\n")).unwrap();
+            let x = svg[..end].rfind(" x=\"").unwrap() + 4;
+            svg[x..].split('"').next().unwrap().parse().unwrap()
+        };
+        let apart = centre("sampling.helper_lanes =") - centre("layout.base_align_bytes =");
+        let widest = theme::text_width_px("layout.base_align_bytes =", theme::LABEL_PX);
+        assert!(apart >= widest, "{apart} < {widest}");
     }
 
     #[test]

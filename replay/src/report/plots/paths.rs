@@ -144,7 +144,8 @@ impl PathPlot {
         }
         for (step, stop) in self.numbering() {
             let (x, y) = centre(stop);
-            fill(area, (x - 8.0, y - 6.0), (x + 8.0, y + 6.0), theme::PAPER)?;
+            let half = theme::text_width_px(&step.to_string(), theme::TICK_PX) / 2.0 + 1.0;
+            fill(area, (x - half, y - 6.0), (x + half, y + 6.0), theme::PAPER)?;
             text(
                 area,
                 centre(stop),

@@ -356,7 +356,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / count as f64)
 }
 
-/// Means a scene, then over all scenes, for every order but the baseline.
+/// Means a scene, then over all scenes if there are several, for every order but the baseline.
 fn averages(report: &PaperReport) -> Vec<Average> {
     let paper: Vec<(&str, OrderKind, Figures)> = z2_table()
         .iter()
@@ -391,7 +391,8 @@ fn averages(report: &PaperReport) -> Vec<Average> {
         .into_iter()
         .filter(|o| *o != OrderKind::Morton)
         .collect();
-    let scenes = report.traces.iter().map(Some).chain(std::iter::once(None));
+    let overall = (report.traces.len() > 1).then_some(None);
+    let scenes = report.traces.iter().map(Some).chain(overall);
     scenes
         .flat_map(|scene| {
             orders

@@ -58,12 +58,37 @@ pub fn page(report: &PaperReport, pictures: &[Picture]) -> Result<String, PlotEr
             (report.orders().len()) " tile orders, with its published figures beside ours. "
             "The same numbers are in the JSON and CSV files next to this page."
         }
+        (in_short(report))
     };
     Ok(html::page(
         "Parallax: tile orders for stereo rendering",
         &lead,
         &sections,
     ))
+}
+
+/// The means over everything, in words.
+fn in_short(report: &PaperReport) -> Markup {
+    let Some(last) = report.averages.last() else {
+        return html! {};
+    };
+    let means = report.averages.iter().filter(|a| a.scene == last.scene);
+    html! {
+        ul {
+            @for mean in means {
+                li {
+                    (order_title(mean.order)) " against Morton, mean of " (last.scene) ": external traffic "
+                    strong { (format!("{:+.1} %", -mean.reduction_pct)) }
+                    @if let Some(ratio) = mean.tmu_ratio { ", texture-unit utilisation " strong { "\u{d7}" (format!("{ratio:.3}")) } }
+                    @if let Some(paper) = mean.paper_reduction_pct {
+                        " (paper: " (format!("{:+.1} %", -paper))
+                        @if let Some(ratio) = mean.paper_tmu_ratio { ", \u{d7}" (format!("{ratio:.3}")) }
+                        ")"
+                    }
+                }
+            }
+        }
+    }
 }
 
 fn runs(report: &PaperReport) -> Markup {

@@ -274,6 +274,7 @@ pub fn by_texture(details: &[&Detail], most: usize) -> Vec<HBarChart> {
         return Vec::new();
     };
     let chart = |title: &str, value_label: &str, value: &dyn Fn(&Part) -> Option<f64>| HBarChart {
+        decimals: None,
         title: format!("{}: {title}", first.scene),
         value_label: value_label.to_owned(),
         series: details.iter().map(|d| style(d.order)).collect(),

@@ -147,7 +147,7 @@ pub fn modes(rows: &[Row]) -> Table {
             number(Some(functional.l2_miss_pct), 2),
             number(Some(row.external_mb_per_frame), 2),
             number(Some(functional.external_mb_per_frame), 2),
-            number(Some(functional.external_difference_pct), 1),
+            number(Some(functional.external_difference_pct), 2),
         ]);
     }
     table
