@@ -46,7 +46,7 @@ pub struct ExperimentError {
     /// The order.
     pub order: &'static str,
     /// What went wrong.
-    pub source: ReplayError,
+    pub source: Box<ReplayError>,
 }
 
 impl Plan {
@@ -84,10 +84,10 @@ impl Plan {
                         config,
                         result,
                     })
-                    .map_err(|source| ExperimentError {
+                    .map_err(|error| ExperimentError {
+                        source: Box::new(error),
                         label: subjects[trace].label.clone(),
                         order: config.order.name(),
-                        source,
                     })
             })
             .collect::<Vec<_>>()

@@ -253,7 +253,9 @@ fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
         for (measure, depends_on_order) in TileMeasure::ALL {
             let mut maps: Vec<_> = details
                 .iter()
-                .filter(|d| MAPPED_ORDERS[..if depends_on_order { 2 } else { 1 }].contains(&d.order))
+                .filter(|d| {
+                    MAPPED_ORDERS[..if depends_on_order { 2 } else { 1 }].contains(&d.order)
+                })
                 .filter_map(|d| plots::heat_map(info, d, measure))
                 .collect();
             // Orders are compared on one scale.

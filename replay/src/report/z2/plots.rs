@@ -50,7 +50,10 @@ fn by_caches(
         })
         .collect();
     let marked = groups.iter().any(|g| g.marks.iter().any(Option::is_some));
-    let largest = groups.iter().flat_map(|g| g.values.iter().flatten().copied()).fold(0.0, f64::max);
+    let largest = groups
+        .iter()
+        .flat_map(|g| g.values.iter().flatten().copied())
+        .fold(0.0, f64::max);
     BarChart {
         title: format!("{scene}: {title}"),
         value_label: value_label.to_owned(),
