@@ -4,15 +4,16 @@ use super::capture::Pictures;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes both eyes side by side as a PNG, through a temporary file beside `path`.
+/// Writes both eyes side by side as a PNG into a temporary file beside `path`, to be persisted
+/// there once everything else has succeeded.
 ///
 /// # Errors
 /// What the file system or the encoder reports.
-pub fn write_side_by_side(
+pub fn prepare_side_by_side(
     path: &Path,
     pictures: &Pictures,
     size_px: [u32; 2],
-) -> anyhow::Result<()> {
+) -> anyhow::Result<tempfile::NamedTempFile> {
     let [width, height] = size_px;
     let row_bytes = width as usize * 4;
     let mut pixels = Vec::with_capacity(2 * row_bytes * height as usize);
@@ -38,6 +39,5 @@ pub fn write_side_by_side(
         image::ImageFormat::Png,
     )?;
     file.write_all(bytes.get_ref())?;
-    file.persist(path)?;
-    Ok(())
+    Ok(file)
 }
