@@ -122,10 +122,12 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         _ => None,
     };
     let start = Instant::now();
-    writer.finish().with_context(|| cannot_write(&args.output))?;
+    writer
+        .finish()
+        .with_context(|| cannot_write(&args.output))?;
     summary.captured += start.elapsed();
     if let Some((path, prepared)) = image {
-        prepared.persist(path).with_context(|| cannot_write(path))?;
+        prepared.persist().with_context(|| cannot_write(path))?;
     }
     let file_bytes = std::fs::metadata(&args.output)?.len();
     summary.print(setup.frames.len(), size_px, file_bytes);

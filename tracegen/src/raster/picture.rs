@@ -1,6 +1,7 @@
 //! The picture of both eyes side by side.
 
 use super::capture::Pictures;
+use formats::container::AtomicFile;
 use std::io::Write;
 use std::path::Path;
 
@@ -13,7 +14,7 @@ pub fn prepare_side_by_side(
     path: &Path,
     pictures: &Pictures,
     size_px: [u32; 2],
-) -> anyhow::Result<tempfile::NamedTempFile> {
+) -> anyhow::Result<AtomicFile> {
     let [width, height] = size_px;
     let row_bytes = width as usize * 4;
     let mut pixels = Vec::with_capacity(2 * row_bytes * height as usize);
@@ -24,11 +25,7 @@ pub fn prepare_side_by_side(
         pixels.extend_from_slice(left);
         pixels.extend_from_slice(right);
     }
-    let directory = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let mut file = tempfile::NamedTempFile::new_in(directory)?;
+    let mut file = AtomicFile::create(path)?;
     let mut bytes = std::io::Cursor::new(Vec::new());
     image::write_buffer_with_format(
         &mut bytes,
