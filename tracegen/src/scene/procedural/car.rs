@@ -111,7 +111,7 @@ pub fn scene() -> Scene {
     studio(&mut scene, &kit);
     scene.camera(
         "default",
-        vec3(2.5, 1.12, 1.72),
+        vec3(2.2, 1.02, 1.5),
         vec3(0.35, 0.55, 0.0),
         0.05,
         60.0,
