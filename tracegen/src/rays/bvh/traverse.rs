@@ -91,16 +91,18 @@ impl Width for Two {
     ) -> Option<Child> {
         let node = &bvh.nodes2[node as usize];
         let (near, mask) = K::step2(ray, node, t_max);
-        if mask == 0 {
-            return None;
+        // Branches beat selects here: a guessed child is fetched while its box is still tested.
+        match mask {
+            0 => None,
+            1 => Some(node.children[0]),
+            2 => Some(node.children[1]),
+            _ => {
+                let far = usize::from(near[0] <= near[1]);
+                stack[*top] = pack(near[far], node.children[far]);
+                *top += 1;
+                Some(node.children[far ^ 1])
+            }
         }
-        // Without branches on which children are hit: those are hard to predict.
-        let both = mask == 3;
-        let first = usize::from(mask == 2) | usize::from(both & (near[1] < near[0]));
-        let other = first ^ 1;
-        stack[*top] = pack(near[other], node.children[other]);
-        *top += usize::from(both);
-        Some(node.children[first])
     }
 }
 
