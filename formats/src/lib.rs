@@ -7,11 +7,15 @@
 pub mod container;
 pub mod error;
 pub mod footprint;
+pub mod interop;
 pub mod layout;
 pub mod parse;
 pub mod raytrace;
 pub mod textrace;
 pub mod texture;
 pub mod view;
+
+#[cfg(test)]
+mod spec;
 
 pub use error::{FormatError, Result};
