@@ -59,7 +59,10 @@ fn documented_sizes_are_the_codes() {
         ("raw record", textrace::RAW_RECORD_BYTES),
         ("delta padding", textrace::DELTA_PADDING_BYTES),
         ("ray tile index entry", RAY_INDEX_ENTRY_BYTES),
-        ("ray triangle", crate::raytrace::tables::TRIANGLE_ENTRY_BYTES),
+        (
+            "ray triangle",
+            crate::raytrace::tables::TRIANGLE_ENTRY_BYTES,
+        ),
     ]);
     let rows = table("## Sizes");
     assert_eq!(rows.len(), code.len());
