@@ -205,6 +205,7 @@ fn decode(runs: u32, bytes: &[u8]) -> Tile {
                 group,
                 ..QuadRecord::default()
             };
+            #[allow(clippy::needless_range_loop, reason = "the text says: u and v alike")]
             for a in 0..2 {
                 let mul = i32::wrapping_mul;
                 let sum = |terms: &[i32]| terms.iter().fold(0i32, |s, t| s.wrapping_add(*t));
