@@ -1,1 +1,31 @@
-//! The SGRT paper's model: reprojection, traversal and intersection, energy.
+//! Stereo reprojection on a mobile ray-tracing GPU (Lee et al., "Fast Stereoscopic Rendering on
+//! Mobile Ray Tracing GPU for Virtual Reality Applications").
+//!
+//! The left image is traced in full. Its hits are projected into the right eye, where the nearest
+//! one a pixel is a candidate ([`reproject`]); error detection rejects doubtful candidates
+//! ([`reject`]); what stands is reused, the rest is traced ([`compose`]). The trace holds both
+//! eyes traced in full, so each reuse is held against the truth ([`accuracy`]), and the work that
+//! it saves is known ray by ray: [`tni`] and [`srp`] turn work into cycles, [`energy`] into
+//! joules, [`gbuffer`] counts what the tile buffers and DRAM move. [`evaluate`] puts them together.
+
+pub mod accuracy;
+pub mod cache;
+pub mod compose;
+pub mod config;
+pub mod energy;
+pub mod evaluate;
+pub mod frame;
+pub mod gbuffer;
+pub mod paper;
+pub mod picture;
+pub mod reject;
+pub mod reproject;
+pub mod srp;
+pub mod tni;
+pub mod work;
+
+#[cfg(test)]
+pub(crate) mod synthetic;
+
+/// The rule of `replay reproject` unless told otherwise; `benches/reprojection.md` measures why.
+pub const DEFAULT_RULE: &str = "depth=0.02+object+triangles";
