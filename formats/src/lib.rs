@@ -4,7 +4,14 @@
 //! crate, and the files it describes are the only joint between the two programs. FORMAT.md in
 //! the repository root is the byte-level specification.
 
+pub mod container;
+pub mod error;
+pub mod footprint;
+pub mod layout;
+pub mod parse;
 pub mod raytrace;
 pub mod textrace;
 pub mod texture;
 pub mod view;
+
+pub use error::{FormatError, Result};

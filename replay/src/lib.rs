@@ -3,10 +3,13 @@
 
 pub mod cache;
 pub mod cli;
+pub mod config;
+pub mod engine;
 pub mod image;
 pub mod order;
 pub mod report;
 pub mod result;
 pub mod sgrt;
+pub mod size;
 pub mod sweep;
 pub mod tmu;

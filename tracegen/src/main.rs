@@ -1,3 +1,5 @@
 //! `tracegen`: scene to trace.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    tracegen::cli::main()
+}

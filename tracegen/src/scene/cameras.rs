@@ -1,1 +1,199 @@
-//! Head poses and HMD presets: from a scene's camera to the matrices of both eyes.
+//! Head poses: a scene's cameras, the pose given by flags, the path of a moving head, and the
+//! matrices of both eyes.
+//!
+//! Conventions: right-handed, y up, each eye looks down its own -z; clip space has y up and depth
+//! 0 at the near plane to 1 at the far plane (not reversed: compare with `Less`).
+
+use super::{Camera, Scene};
+use formats::view::{EyeView, FovTangents, FrameViews, Hmd};
+use glam::{Affine3A, Mat3, Mat4, Vec3, Vec4};
+
+/// Frames per second of the camera path.
+pub const PATH_FPS: f32 = 72.0;
+/// Forward speed of the head along the camera path, metres per second.
+const PATH_FORWARD_M_PER_S: f32 = 0.4;
+/// Amplitude of the head's sideways sway, metres.
+const PATH_SWAY_M: f32 = 0.05;
+/// Sways per second.
+const PATH_SWAY_HZ: f32 = 0.5;
+
+/// A view of the whole scene from outside, for files without a camera.
+#[must_use]
+pub fn default_camera(scene: &Scene) -> Camera {
+    let (low, high) = scene.bounds().unwrap_or((-Vec3::ONE, Vec3::ONE));
+    let target = (low + high) / 2.0;
+    let radius = ((high - low).length() / 2.0).max(1e-3);
+    Camera {
+        name: "default".into(),
+        eye: target + Vec3::new(0.55, 0.4, 1.0).normalize() * radius * 1.9,
+        target,
+        up: Vec3::Y,
+        vfov_deg: 60.0,
+        near: radius * 0.01,
+        far: radius * 10.0,
+    }
+}
+
+/// A camera that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// No camera of that name.
+    #[error("no camera '{name}': expected one of {known}")]
+    Unknown {
+        /// As asked.
+        name: String,
+        /// The scene's cameras.
+        known: String,
+    },
+    /// A pose without a direction, or planes in the wrong order.
+    #[error("camera '{camera}': expected {expected}, found {found}")]
+    Invalid {
+        /// Name.
+        camera: String,
+        /// What should be there.
+        expected: &'static str,
+        /// What is there.
+        found: String,
+    },
+}
+
+/// Finds a scene's camera by its exact name, or by its name without the prefix `cam_`; the first
+/// camera where no name is given.
+///
+/// # Errors
+/// [`CameraError::Unknown`] lists the names.
+pub fn find<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera, CameraError> {
+    let wanted = name.unwrap_or_default();
+    let matches = |c: &&Camera| c.name == wanted || c.name.strip_prefix("cam_") == Some(wanted);
+    let found = match name {
+        None => scene.cameras.first(),
+        Some(_) => (scene.cameras.iter().find(|c| c.name == wanted))
+            .or_else(|| scene.cameras.iter().find(matches)),
+    };
+    found.ok_or_else(|| CameraError::Unknown {
+        name: wanted.to_owned(),
+        known: (scene.cameras.iter().map(|c| c.name.as_str()))
+            .collect::<Vec<_>>()
+            .join(", "),
+    })
+}
+
+/// Checks that a camera has a direction and that its planes are in order.
+///
+/// # Errors
+/// [`CameraError::Invalid`] says what is wrong.
+pub fn validate(camera: &Camera) -> Result<(), CameraError> {
+    let invalid = |expected, found: String| CameraError::Invalid {
+        camera: camera.name.clone(),
+        expected,
+        found,
+    };
+    let Camera {
+        eye, target, up, ..
+    } = *camera;
+    if !(eye.is_finite() && target.is_finite() && up.is_finite()) {
+        return Err(invalid(
+            "finite coordinates",
+            format!("eye {eye}, target {target}, up {up}"),
+        ));
+    }
+    let forward = target - eye;
+    if forward.length() < 1e-6 * eye.length().max(1.0) {
+        return Err(invalid(
+            "a target away from the eye",
+            format!("eye {eye}, target {target}"),
+        ));
+    }
+    if forward.normalize().cross(up.normalize_or_zero()).length() < 1e-4 {
+        return Err(invalid(
+            "an up vector that is not along the viewing direction",
+            format!("up {up}, direction {forward}"),
+        ));
+    }
+    let (near, far) = (camera.near, camera.far);
+    if !(near.is_finite() && far.is_finite() && near > 0.0 && far > near) {
+        return Err(invalid("0 < near < far", format!("near {near}, far {far}")));
+    }
+    Ok(())
+}
+
+/// The head's frame: columns right, up, backwards, and the point between the eyes.
+#[must_use]
+pub fn head_pose(camera: &Camera) -> Affine3A {
+    let back = (camera.eye - camera.target).normalize();
+    let right = camera.up.cross(back).normalize();
+    let up = back.cross(right);
+    Affine3A::from_mat3_translation(Mat3::from_cols(right, up, back), camera.eye)
+}
+
+/// The camera at frame `frame` of the camera path.
+///
+/// A person walking slowly: at time t = frame / 72 s the head is 0.4 t metres ahead of the camera
+/// and 0.05 sin(pi t) metres to its right, looking the same way. Frame 0 is the camera itself.
+#[must_use]
+pub fn path_camera(camera: &Camera, frame: u32) -> Camera {
+    let t = frame as f32 / PATH_FPS;
+    let head = head_pose(camera).matrix3;
+    let sway = PATH_SWAY_M * (std::f32::consts::TAU * PATH_SWAY_HZ * t).sin();
+    let offset = Vec3::from(head.x_axis * sway - head.z_axis * (PATH_FORWARD_M_PER_S * t));
+    Camera {
+        eye: camera.eye + offset,
+        target: camera.target + offset,
+        ..camera.clone()
+    }
+}
+
+/// Off-axis perspective from tangents, depth 0 (near) to 1 (far).
+#[must_use]
+pub fn projection(fov: &FovTangents, near: f32, far: f32) -> Mat4 {
+    let (width, height) = (fov.left + fov.right, fov.up + fov.down);
+    let depth = far / (near - far);
+    Mat4::from_cols(
+        Vec4::new(2.0 / width, 0.0, 0.0, 0.0),
+        Vec4::new(0.0, 2.0 / height, 0.0, 0.0),
+        Vec4::new(
+            (fov.right - fov.left) / width,
+            (fov.up - fov.down) / height,
+            depth,
+            -1.0,
+        ),
+        Vec4::new(0.0, 0.0, near * depth, 0.0),
+    )
+}
+
+/// Both eyes' matrices for one head pose.
+#[must_use]
+pub fn eye_views(camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
+    let head = head_pose(camera);
+    [-1.0f32, 1.0].map(|side| {
+        // Outwards is left for the left eye: a positive turn about +y.
+        let turn = Mat3::from_rotation_y(-side * hmd.cant_deg.to_radians());
+        let eye_in_head =
+            Affine3A::from_mat3_translation(turn, Vec3::new(side * hmd.ipd_m / 2.0, 0.0, 0.0));
+        let eye_to_world = head * eye_in_head;
+        let fov = &hmd.fov[usize::from(side > 0.0)];
+        EyeView {
+            world_to_eye: Mat4::from(eye_to_world.inverse()).to_cols_array_2d(),
+            eye_to_clip: projection(fov, camera.near, camera.far).to_cols_array_2d(),
+            position: Vec3::from(eye_to_world.translation).to_array(),
+        }
+    })
+}
+
+/// The views of `frames` frames along the camera path.
+///
+/// # Errors
+/// [`CameraError::Invalid`] for a camera that cannot be used.
+pub fn frame_views(
+    camera: &Camera,
+    hmd: &Hmd,
+    frames: u32,
+) -> Result<Vec<FrameViews>, CameraError> {
+    validate(camera)?;
+    Ok((0..frames)
+        .map(|frame| FrameViews {
+            frame,
+            eyes: eye_views(&path_camera(camera, frame), hmd),
+        })
+        .collect())
+}

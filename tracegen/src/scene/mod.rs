@@ -3,10 +3,17 @@
 //! World space is right-handed, y up, metres. Front faces wind counter-clockwise.
 
 pub mod cameras;
+pub mod geometry;
 pub mod gltf;
+pub mod hmd;
+pub mod images;
+pub mod load;
 pub mod obj;
 pub mod procedural;
 pub mod textures;
+mod uri;
+
+pub use load::{LoadOptions, Loaded, SceneError, load, load_with};
 
 use formats::texture::{ColorSpace, Sampler};
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
@@ -31,6 +38,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Background and ambient radiance, linear RGB.
     pub sky: Vec3,
+    /// The scene's own choice of `--shadows`: 0 none, 1 one shadow map, more: that many cascades.
+    pub shadow_cascades: u32,
 }
 
 /// An indexed triangle list with one material.

@@ -1,10 +1,23 @@
-//! The texture-address trace (`.textrace`): its data model.
+//! The texture-address trace (`.textrace`): its data model, and reading and writing it.
 //!
 //! A trace holds, for every pass (one view of one frame), for every 16x16 tile, the primitives in
 //! submission order, and for each primitive the covered 2x2 quads with the texture coordinates of
 //! every uv group that its draw samples. Addresses are not stored: they follow from the texture
 //! table and from the layout that replay chooses.
 
+mod index;
+mod invariant;
+mod raw;
+mod reader;
+pub mod tables;
+mod writer;
+
+pub use index::INDEX_ENTRY_BYTES;
+pub use invariant::{TILE_QUADS, quad_morton};
+pub use reader::{Textrace, TileStats};
+pub use writer::{EncodedTile, TextraceWriter, encode_tile, encode_tile_as};
+
+use crate::container::ChunkTag;
 use crate::texture::{Sampler, Texture};
 use crate::view::{Eye, FrameViews, Hmd};
 use serde::{Deserialize, Serialize};
@@ -14,6 +27,37 @@ use serde::{Deserialize, Serialize};
 /// A lane's coordinate is the sum of at most four rounded terms, so it is exact to
 /// `4 * 0.5 / 2048` = 1/1024 texel.
 pub const SUBTEXELS: i32 = 2048;
+
+/// The tile index: one fixed-size entry for every tile of every pass.
+pub const TILE_INDEX: ChunkTag = ChunkTag(*b"TIDX");
+/// The encoded tiles, in index order.
+pub const TILES: ChunkTag = ChunkTag(*b"TILE");
+
+/// How a tile's bytes are encoded. Each tile names its own, so later encodings (a primitive's
+/// plane equations stored once, say) can be added beside these.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum Encoding {
+    /// Records as they are in memory.
+    #[default]
+    Raw = 0,
+}
+
+impl Encoding {
+    fn from_id(id: u64) -> Option<Self> {
+        [Self::Raw]
+            .into_iter()
+            .find(|encoding| *encoding as u64 == id)
+    }
+
+    /// Most records that `bytes` bytes can hold, however well they compress.
+    fn most_records(self, bytes: u32) -> u64 {
+        match self {
+            Self::Raw => u64::from(bytes) / raw::RECORD_BYTES as u64,
+        }
+    }
+}
 
 /// The whole description of a trace but for its quads.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,6 +115,11 @@ impl Pass {
     #[must_use]
     pub fn tile_count(&self) -> u32 {
         self.tiles[0] * self.tiles[1]
+    }
+
+    /// Number of tiles of a pass that has not been checked.
+    pub(crate) fn tile_count_u64(&self) -> u64 {
+        u64::from(self.tiles[0]) * u64::from(self.tiles[1])
     }
 }
 
@@ -205,3 +254,6 @@ pub struct Tables {
     /// Passes in submission order; a stereo frame is left eye then right eye.
     pub passes: Vec<Pass>,
 }
+
+#[cfg(test)]
+mod tests;

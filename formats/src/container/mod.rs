@@ -1,0 +1,83 @@
+//! The container that every trace file is: a header, chunks, and a directory of the chunks.
+//!
+//! The directory stands at the end, so that chunks can be streamed; the header, written last,
+//! points at it. Header, directory and every chunk have a CRC-32, and the bytes between chunks
+//! must be zero, so that no flipped bit goes unseen. FORMAT.md has the byte layout.
+
+mod header;
+mod reader;
+mod writer;
+
+pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
+pub use reader::Container;
+pub use writer::{AtomicFile, ContainerWriter, crc32_of_file};
+
+use std::fmt;
+
+/// First eight bytes of every trace file.
+pub const MAGIC: [u8; 8] = *b"PLXTRACE";
+/// Readers refuse another major version.
+pub const VERSION_MAJOR: u16 = 1;
+/// Readers accept a later minor version, which may only add chunks.
+pub const VERSION_MINOR: u16 = 0;
+/// Chunks start at multiples of this many bytes.
+pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;
+
+/// What a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
+pub enum Kind {
+    /// Texture addresses (`.textrace`).
+    Textrace = 1,
+    /// Rays (`.raytrace`).
+    Raytrace = 2,
+}
+
+impl Kind {
+    fn from_id(id: u16) -> Option<Self> {
+        [Self::Textrace, Self::Raytrace]
+            .into_iter()
+            .find(|kind| *kind as u16 == id)
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Textrace => "textrace",
+            Self::Raytrace => "raytrace",
+        })
+    }
+}
+
+/// Four printable ASCII characters that name a chunk.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ChunkTag(pub [u8; 4]);
+
+impl fmt::Display for ChunkTag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.0.escape_ascii())
+    }
+}
+
+impl fmt::Debug for ChunkTag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ChunkTag({self})")
+    }
+}
+
+/// One entry of the chunk directory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChunkEntry {
+    /// Name, unique in the file.
+    pub tag: ChunkTag,
+    /// CRC-32 of the chunk's bytes.
+    pub crc32: u32,
+    /// Offset from the start of the file.
+    pub offset_bytes: u64,
+    /// Length without padding.
+    pub length_bytes: u64,
+}
+
+#[cfg(test)]
+mod tests;

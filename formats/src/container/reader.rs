@@ -1,0 +1,339 @@
+//! Reading a container through a memory map.
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+use super::header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES, Header};
+use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind};
+use crate::error::{FormatError, Place, Result};
+use crate::parse::{Fault, parse_all};
+use memmap2::Mmap;
+use std::fs::File;
+use std::path::Path;
+
+/// A file's bytes, mapped or owned.
+#[derive(Debug)]
+enum Bytes {
+    Mapped(Mmap),
+    Owned(Vec<u8>),
+}
+
+impl Bytes {
+    fn as_slice(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Owned(bytes) => bytes,
+        }
+    }
+}
+
+/// An opened trace file whose header, directory and padding have been checked.
+///
+/// Chunks are checked when they are asked for, so that opening a large trace is quick.
+#[derive(Debug)]
+pub struct Container {
+    file: String,
+    bytes: Bytes,
+    header: Header,
+    directory: Vec<ChunkEntry>,
+}
+
+impl Container {
+    /// Maps `path` and checks header and directory.
+    ///
+    /// # Errors
+    /// When the file cannot be mapped or is not a well-formed container.
+    pub fn open(path: &Path) -> Result<Self> {
+        let name = path.display().to_string();
+        let io = |action| {
+            let name = name.clone();
+            move |source| FormatError::io(&name, action, source)
+        };
+        let file = File::open(path).map_err(io("open"))?;
+        let metadata = file.metadata().map_err(io("read the size of"))?;
+        if metadata.is_dir() {
+            return Err(io("read")(std::io::ErrorKind::IsADirectory.into()));
+        }
+        if metadata.len() == 0 {
+            // An empty file cannot be mapped; let the header parser name what is missing.
+            return Self::from_named_bytes(name, Bytes::Owned(Vec::new()));
+        }
+        // SAFETY: the map is read only; a trace is written under another name and renamed, so
+        // a well-behaved writer never changes a file that is open here.
+        let map = unsafe { Mmap::map(&file) }.map_err(io("map"))?;
+        Self::from_named_bytes(name, Bytes::Mapped(map))
+    }
+
+    /// Reads a container from memory.
+    ///
+    /// # Errors
+    /// When the bytes are not a well-formed container.
+    pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
+        Self::from_named_bytes("memory".to_owned(), Bytes::Owned(bytes))
+    }
+
+    fn from_named_bytes(file: String, bytes: Bytes) -> Result<Self> {
+        let all = bytes.as_slice();
+        let malformed = |place, offset, expected: String, found: String| FormatError::Malformed {
+            file: file.clone(),
+            place,
+            offset,
+            expected,
+            found,
+        };
+        let header_bytes = all.get(..HEADER_BYTES).unwrap_or(all);
+        let header = parse_all(&file, Place::Header, 0, header_bytes, Header::parse)?;
+        let file_bytes = all.len() as u64;
+        if header.file_bytes != file_bytes {
+            return Err(malformed(
+                Place::Header,
+                24,
+                format!("a file of {} bytes", header.file_bytes),
+                format!("{file_bytes} bytes"),
+            ));
+        }
+        let at = header.directory_offset;
+        let directory_bytes = usize::try_from(at)
+            .ok()
+            .filter(|at| *at >= HEADER_BYTES)
+            .and_then(|at| all.get(at..))
+            .filter(|rest| {
+                (rest.len() as u64)
+                    == u64::from(header.directory_count) * DIRECTORY_ENTRY_BYTES as u64
+            })
+            .ok_or_else(|| {
+                malformed(
+                    Place::Header,
+                    16,
+                    format!(
+                        "a directory of {} entries that ends with the file",
+                        header.directory_count
+                    ),
+                    format!("offset {at}"),
+                )
+            })?;
+        let crc32 = crc32fast::hash(directory_bytes);
+        if crc32 != header.directory_crc32 {
+            return Err(malformed(
+                Place::Directory,
+                at,
+                format!("CRC-32 {:08x}", header.directory_crc32),
+                format!("{crc32:08x}"),
+            ));
+        }
+        let entries = directory_bytes.len() / DIRECTORY_ENTRY_BYTES;
+        let directory = parse_all(&file, Place::Directory, at, directory_bytes, |input| {
+            ChunkEntry::parse_directory(entries, input)
+        })?;
+        check_placement(all, at, &directory)
+            .map_err(|(offset, fault)| malformed(Place::Directory, offset, fault.0, fault.1))?;
+        Ok(Self {
+            file,
+            bytes,
+            header,
+            directory,
+        })
+    }
+
+    /// Name for error messages.
+    #[must_use]
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// What the file holds.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        self.header.kind
+    }
+
+    /// Major and minor version.
+    #[must_use]
+    pub fn version(&self) -> (u16, u16) {
+        (super::VERSION_MAJOR, self.header.version_minor)
+    }
+
+    /// Size of the file.
+    #[must_use]
+    pub fn file_bytes(&self) -> u64 {
+        self.header.file_bytes
+    }
+
+    /// The chunks in file order.
+    #[must_use]
+    pub fn directory(&self) -> &[ChunkEntry] {
+        &self.directory
+    }
+
+    /// Fails unless the file is of `kind`.
+    ///
+    /// # Errors
+    /// When it is of another kind.
+    pub fn expect_kind(&self, kind: Kind) -> Result<()> {
+        if self.kind() == kind {
+            return Ok(());
+        }
+        Err(FormatError::Malformed {
+            file: self.file.clone(),
+            place: Place::Header,
+            offset: 12,
+            expected: format!("a {kind}"),
+            found: format!("a {}", self.kind()),
+        })
+    }
+
+    /// The directory entry of a chunk that must be there.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn entry(&self, tag: ChunkTag) -> Result<&ChunkEntry> {
+        self.directory
+            .iter()
+            .find(|entry| entry.tag == tag)
+            .ok_or_else(|| FormatError::Malformed {
+                file: self.file.clone(),
+                place: Place::Directory,
+                offset: self.header.directory_offset,
+                expected: format!("an entry for chunk {tag}"),
+                found: "none".to_owned(),
+            })
+    }
+
+    /// Bytes of a chunk, with its CRC checked.
+    ///
+    /// # Errors
+    /// When there is no such chunk or it is damaged.
+    pub fn chunk(&self, tag: ChunkTag) -> Result<&[u8]> {
+        let entry = self.entry(tag)?;
+        let bytes = self.chunk_unchecked(tag)?;
+        let crc32 = crc32fast::hash(bytes);
+        if crc32 == entry.crc32 {
+            return Ok(bytes);
+        }
+        Err(FormatError::Malformed {
+            file: self.file.clone(),
+            place: Place::Chunk(tag),
+            offset: entry.offset_bytes,
+            expected: format!("CRC-32 {:08x}", entry.crc32),
+            found: format!("{crc32:08x}"),
+        })
+    }
+
+    /// Bytes of a chunk whose parts have checksums of their own; its CRC is not checked.
+    ///
+    /// # Errors
+    /// When there is no such chunk.
+    pub fn chunk_unchecked(&self, tag: ChunkTag) -> Result<&[u8]> {
+        let entry = self.entry(tag)?;
+        // Placement was checked when the file was opened.
+        Ok(slice(self.bytes.as_slice(), entry).unwrap_or_default())
+    }
+
+    /// A located error at byte `offset_in_chunk` of a chunk.
+    #[must_use]
+    pub fn malformed(
+        &self,
+        tag: ChunkTag,
+        offset_in_chunk: u64,
+        expected: impl Into<String>,
+        found: impl ToString,
+    ) -> FormatError {
+        let start = self.entry(tag).map_or(0, |entry| entry.offset_bytes);
+        FormatError::Malformed {
+            file: self.file.clone(),
+            place: Place::Chunk(tag),
+            offset: start.saturating_add(offset_in_chunk),
+            expected: expected.into(),
+            found: found.to_string(),
+        }
+    }
+
+    /// Runs a nom parser over a whole checked chunk.
+    ///
+    /// # Errors
+    /// When the chunk is missing, damaged, or not what the parser expects.
+    pub fn parse_chunk<'a, T>(
+        &'a self,
+        tag: ChunkTag,
+        parser: impl nom::Parser<&'a [u8], Output = T, Error = Fault<'a>>,
+    ) -> Result<T> {
+        let bytes = self.chunk(tag)?;
+        let offset = self.entry(tag)?.offset_bytes;
+        parse_all(&self.file, Place::Chunk(tag), offset, bytes, parser)
+    }
+
+    /// CRC-32 of the whole file, which names it in results.
+    #[must_use]
+    pub fn file_checksum(&self) -> u32 {
+        crc32fast::hash(self.bytes.as_slice())
+    }
+}
+
+fn slice<'a>(all: &'a [u8], entry: &ChunkEntry) -> Option<&'a [u8]> {
+    let start = usize::try_from(entry.offset_bytes).ok()?;
+    let length = usize::try_from(entry.length_bytes).ok()?;
+    all.get(start..start.checked_add(length)?)
+}
+
+/// Checks that the chunks lie one after the other, each aligned, with nothing but zero padding
+/// between them: no overlap, no hidden bytes, no chunk past the end, no tag twice.
+fn check_placement(
+    all: &[u8],
+    directory_offset: u64,
+    directory: &[ChunkEntry],
+) -> std::result::Result<(), (u64, (String, String))> {
+    let mut end = HEADER_BYTES as u64;
+    for (index, entry) in directory.iter().enumerate() {
+        let at = directory_offset + (index * DIRECTORY_ENTRY_BYTES) as u64;
+        let tag = entry.tag;
+        if !tag.0.iter().all(u8::is_ascii_graphic) {
+            let found = tag.to_string();
+            return Err((at, ("a tag of printable ASCII".to_owned(), found)));
+        }
+        if directory
+            .iter()
+            .take(index)
+            .any(|earlier| earlier.tag == tag)
+        {
+            return Err((at, ("each tag once".to_owned(), format!("{tag} twice"))));
+        }
+        let start = end.next_multiple_of(CHUNK_ALIGNMENT_BYTES);
+        if entry.offset_bytes != start {
+            let expected = format!("chunk {tag} at byte {start}");
+            return Err((at + 8, (expected, format!("offset {}", entry.offset_bytes))));
+        }
+        check_padding(all, end, start)?;
+        end = start
+            .checked_add(entry.length_bytes)
+            .filter(|end| *end <= directory_offset)
+            .ok_or_else(|| {
+                let room = directory_offset.saturating_sub(start);
+                let expected = format!("chunk {tag} of at most {room} bytes");
+                (at + 16, (expected, format!("{} bytes", entry.length_bytes)))
+            })?;
+    }
+    let start = end.next_multiple_of(CHUNK_ALIGNMENT_BYTES);
+    if start != directory_offset {
+        let expected = format!("the directory at byte {start}, after the last chunk");
+        return Err((
+            directory_offset,
+            (expected, format!("it at {directory_offset}")),
+        ));
+    }
+    check_padding(all, end, start)
+}
+
+fn check_padding(
+    all: &[u8],
+    end: u64,
+    start: u64,
+) -> std::result::Result<(), (u64, (String, String))> {
+    let range = usize::try_from(end).ok().zip(usize::try_from(start).ok());
+    let padding = range.and_then(|(end, start)| all.get(end..start));
+    match padding {
+        Some(bytes) if bytes.iter().all(|byte| *byte == 0) => Ok(()),
+        Some(bytes) => Err((end, ("zero padding".to_owned(), format!("{bytes:02x?}")))),
+        None => Err((
+            end,
+            ("padding".to_owned(), "the end of the file".to_owned()),
+        )),
+    }
+}

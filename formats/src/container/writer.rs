@@ -1,0 +1,257 @@
+//! Writing a container: chunks streamed to a temporary file, renamed when complete.
+
+use super::header::{HEADER_BYTES, Header};
+use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind};
+use crate::error::{FormatError, Result};
+use std::fs::File;
+use std::io::{self, BufWriter, Cursor, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// A file that appears under its name only once it is complete; dropped before, it leaves
+/// nothing behind.
+#[derive(Debug)]
+pub struct AtomicFile {
+    writer: BufWriter<NamedTempFile>,
+    target: PathBuf,
+}
+
+impl AtomicFile {
+    /// Opens a temporary file beside `target`.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub fn create(target: &Path) -> io::Result<Self> {
+        let folder = match target.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".").suffix(".part");
+        #[cfg(unix)]
+        {
+            // Temporary files are private; a trace should get the modes of any other output.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        Ok(Self {
+            writer: BufWriter::with_capacity(1 << 20, builder.tempfile_in(folder)?),
+            target: target.to_owned(),
+        })
+    }
+
+    /// Flushes and renames the file over its target.
+    ///
+    /// # Errors
+    /// When either fails; the target is then untouched.
+    pub fn persist(self) -> io::Result<()> {
+        let file = self.writer.into_inner().map_err(io::Error::from)?;
+        file.persist(&self.target).map_err(io::Error::from)?;
+        Ok(())
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.writer.seek(position)
+    }
+}
+
+/// Writes a container chunk by chunk.
+#[derive(Debug)]
+pub struct ContainerWriter<W = AtomicFile> {
+    file: String,
+    sink: W,
+    position: u64,
+    header: Header,
+    directory: Vec<ChunkEntry>,
+    open: Option<(ChunkTag, u64, crc32fast::Hasher)>,
+}
+
+impl ContainerWriter<AtomicFile> {
+    /// Starts a file of `kind` that will be renamed to `path` by [`Self::finish`].
+    ///
+    /// # Errors
+    /// When the temporary file beside `path` cannot be written.
+    pub fn create(path: &Path, kind: Kind) -> Result<Self> {
+        let name = path.display().to_string();
+        let sink = AtomicFile::create(path)
+            .map_err(|source| FormatError::io(&name, "create a temporary file beside", source))?;
+        Self::start(name, sink, kind)
+    }
+
+    /// Writes directory and header, and renames the file to its name.
+    ///
+    /// # Errors
+    /// When writing or renaming fails; no file is left then.
+    pub fn finish(self) -> Result<()> {
+        let name = self.file.clone();
+        let sink = self.seal()?;
+        sink.persist()
+            .map_err(|source| FormatError::io(&name, "rename the finished file to", source))
+    }
+}
+
+impl ContainerWriter<Cursor<Vec<u8>>> {
+    /// Starts a container in memory.
+    ///
+    /// # Errors
+    /// None in practice; the signature is that of the file's.
+    pub fn in_memory(kind: Kind) -> Result<Self> {
+        Self::start("memory".to_owned(), Cursor::new(Vec::new()), kind)
+    }
+
+    /// Writes directory and header, and yields the bytes.
+    ///
+    /// # Errors
+    /// As [`Self::in_memory`].
+    pub fn into_bytes(self) -> Result<Vec<u8>> {
+        Ok(self.seal()?.into_inner())
+    }
+}
+
+impl<W: Write + Seek> ContainerWriter<W> {
+    fn start(file: String, sink: W, kind: Kind) -> Result<Self> {
+        let mut writer = Self {
+            file,
+            sink,
+            position: 0,
+            header: Header::new(kind),
+            directory: Vec::new(),
+            open: None,
+        };
+        // A placeholder that no reader takes for a header, should the writer die here.
+        writer.raw(&[0; HEADER_BYTES])?;
+        Ok(writer)
+    }
+
+    /// Writes a whole chunk.
+    ///
+    /// # Errors
+    /// When writing fails.
+    pub fn chunk(&mut self, tag: ChunkTag, bytes: &[u8]) -> Result<()> {
+        self.begin_chunk(tag)?;
+        self.append(bytes)?;
+        self.end_chunk()
+    }
+
+    /// Starts a chunk that [`Self::append`] fills.
+    ///
+    /// # Errors
+    /// When writing fails or the tag has been used.
+    pub fn begin_chunk(&mut self, tag: ChunkTag) -> Result<()> {
+        self.end_chunk()?;
+        if self.directory.iter().any(|entry| entry.tag == tag) {
+            return Err(FormatError::Unwritable {
+                what: format!("chunk {tag}"),
+                expected: "each tag once".to_owned(),
+                found: "the same tag again".to_owned(),
+            });
+        }
+        self.pad()?;
+        self.open = Some((tag, self.position, crc32fast::Hasher::new()));
+        Ok(())
+    }
+
+    /// Adds bytes to the chunk that is open.
+    ///
+    /// # Errors
+    /// When writing fails or no chunk is open.
+    pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
+        let Some((_, _, crc32)) = &mut self.open else {
+            return Err(FormatError::Unwritable {
+                what: format!("{} bytes", bytes.len()),
+                expected: "an open chunk".to_owned(),
+                found: "none".to_owned(),
+            });
+        };
+        crc32.update(bytes);
+        self.raw(bytes)
+    }
+
+    /// Ends the chunk that is open, if any.
+    ///
+    /// # Errors
+    /// None in practice.
+    pub fn end_chunk(&mut self) -> Result<()> {
+        if let Some((tag, offset_bytes, crc32)) = self.open.take() {
+            self.directory.push(ChunkEntry {
+                tag,
+                crc32: crc32.finalize(),
+                offset_bytes,
+                length_bytes: self.position - offset_bytes,
+            });
+        }
+        Ok(())
+    }
+
+    /// Bytes written so far, the header's included.
+    #[must_use]
+    pub fn position_bytes(&self) -> u64 {
+        self.position
+    }
+
+    fn seal(mut self) -> Result<W> {
+        self.end_chunk()?;
+        self.pad()?;
+        let mut directory = Vec::new();
+        for entry in &self.directory {
+            entry.write(&mut directory);
+        }
+        self.header.directory_offset = self.position;
+        self.header.directory_count = u32::try_from(self.directory.len()).unwrap_or(u32::MAX);
+        self.header.directory_crc32 = crc32fast::hash(&directory);
+        self.raw(&directory)?;
+        self.header.file_bytes = self.position;
+        let header = self.header.to_bytes();
+        self.sink
+            .seek(SeekFrom::Start(0))
+            .and_then(|_| self.sink.write_all(&header))
+            .and_then(|()| self.sink.flush())
+            .map_err(|source| FormatError::io(&self.file, "write the header of", source))?;
+        Ok(self.sink)
+    }
+
+    fn pad(&mut self) -> Result<()> {
+        let padding = self.position.next_multiple_of(CHUNK_ALIGNMENT_BYTES) - self.position;
+        self.raw(&[0; CHUNK_ALIGNMENT_BYTES as usize][..padding as usize])
+    }
+
+    fn raw(&mut self, bytes: &[u8]) -> Result<()> {
+        self.sink
+            .write_all(bytes)
+            .map_err(|source| FormatError::io(&self.file, "write", source))?;
+        self.position += bytes.len() as u64;
+        Ok(())
+    }
+}
+
+/// CRC-32 of a whole file, as results name traces by.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn crc32_of_file(path: &Path) -> Result<u32> {
+    let name = path.display().to_string();
+    let mut file = File::open(path).map_err(|source| FormatError::io(&name, "open", source))?;
+    let mut crc32 = crc32fast::Hasher::new();
+    let mut buffer = vec![0; 1 << 20];
+    loop {
+        let read = file
+            .read(&mut buffer)
+            .map_err(|source| FormatError::io(&name, "read", source))?;
+        if read == 0 {
+            return Ok(crc32.finalize());
+        }
+        crc32.update(&buffer[..read]);
+    }
+}

@@ -1,0 +1,101 @@
+//! Errors that name the file, the place in it, what was expected and what was found.
+
+use crate::container::ChunkTag;
+use std::fmt;
+use std::io;
+use thiserror::Error;
+
+/// Result of everything in this crate that reads or writes traces.
+pub type Result<T> = std::result::Result<T, FormatError>;
+
+/// Part of a file that an error points into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The fixed header at the start.
+    Header,
+    /// The chunk directory at the end.
+    Directory,
+    /// A chunk.
+    Chunk(ChunkTag),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Header => f.write_str("header"),
+            Self::Directory => f.write_str("chunk directory"),
+            Self::Chunk(tag) => write!(f, "chunk {tag}"),
+        }
+    }
+}
+
+/// Why a trace could not be read or written.
+#[derive(Debug, Error)]
+pub enum FormatError {
+    /// The operating system refused.
+    #[error("{file}: cannot {action}")]
+    Io {
+        /// File as given.
+        file: String,
+        /// What was tried, `open`, `write`, ...
+        action: &'static str,
+        /// The system's reason.
+        #[source]
+        source: io::Error,
+    },
+    /// The bytes are not what the specification asks for.
+    #[error("{file}: {place} at byte {offset}: expected {expected}, found {found}")]
+    Malformed {
+        /// File as given.
+        file: String,
+        /// Part of the file.
+        place: Place,
+        /// Offset from the start of the file.
+        offset: u64,
+        /// What the specification asks for there.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// The caller asked for something that the trace does not have.
+    #[error("{file}: no {what} {index}, the trace has {count}")]
+    OutOfRange {
+        /// File as given.
+        file: String,
+        /// `pass`, `tile`, ...
+        what: &'static str,
+        /// What was asked for.
+        index: u64,
+        /// How many there are.
+        count: u64,
+    },
+    /// The data that should be written breaks an invariant of the format.
+    #[error("cannot write {what}: expected {expected}, found {found}")]
+    Unwritable {
+        /// What was to be written, `tile record 12`, `draw 3`, ...
+        what: String,
+        /// The invariant.
+        expected: String,
+        /// The value.
+        found: String,
+    },
+}
+
+impl FormatError {
+    pub(crate) fn io(file: &str, action: &'static str, source: io::Error) -> Self {
+        Self::Io {
+            file: file.to_owned(),
+            action,
+            source,
+        }
+    }
+
+    /// Offset of the first bad byte, where the error has one.
+    #[must_use]
+    pub fn offset(&self) -> Option<u64> {
+        match self {
+            Self::Malformed { offset, .. } => Some(*offset),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! Level of detail of a quad.
+
+use super::LodFormula;
+use crate::textrace::{QuadRecord, SUBTEXELS};
+
+/// llvmpipe's base-2 logarithm: the exponent plus the mantissa minus one. It is exact at powers
+/// of two and at most 0.086 too low between them.
+#[must_use]
+pub fn fast_log2(x: f32) -> f32 {
+    let bits = x.to_bits();
+    let exponent = (bits >> 23 & 0xff) as f32 - 127.0;
+    let mantissa = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000);
+    exponent + (mantissa - 1.0)
+}
+
+/// Level of detail of a quad in a texture whose level 0 has `size` texels, without bias: from
+/// the derivatives of the top-left lane, in f32, one rounding an operation.
+#[must_use]
+pub fn quad_lod(record: &QuadRecord, extent: [u32; 2], size: [u32; 2], formula: LodFormula) -> f32 {
+    let texels = |derivative: [i32; 2]| {
+        [0, 1].map(|a| {
+            let scale = size[a] as f32 / (SUBTEXELS as f32 * extent[a] as f32);
+            derivative[a] as f32 * scale
+        })
+    };
+    let dx = texels(record.dx);
+    let dy = texels(record.dy);
+    let squared = |d: [f32; 2]| d[0] * d[0] + d[1] * d[1];
+    match formula {
+        LodFormula::Llvmpipe => 0.5 * fast_log2(squared(dx).max(squared(dy))),
+        LodFormula::Exact => 0.5 * squared(dx).max(squared(dy)).log2(),
+        LodFormula::Softpipe => {
+            let largest = |d: [f32; 2]| d[0].abs().max(d[1].abs());
+            largest(dx).max(largest(dy)).log2()
+        }
+    }
+}

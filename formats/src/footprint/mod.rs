@@ -1,0 +1,194 @@
+//! From a quad record to the texels that it reads: the reference that faster engines are tested
+//! against, so it is written to be read.
+//!
+//! Footprints come in a fixed order: record by record, sample by sample in shader order, the
+//! finer mip level before the coarser one, then lane by lane. Everything that counts or writes
+//! accesses follows it.
+
+mod lod;
+mod options;
+
+pub use lod::{fast_log2, quad_lod};
+pub use options::{FilterOverride, LodFormula, SamplingOptions};
+
+use crate::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Sample, Tables, UvGroup};
+use crate::texture::{Filter, MipFilter, Sampler, Texture, Wrap};
+
+/// Texels that one lane reads at one level of one sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Footprint {
+    /// Lane of the quad, 0 to 3.
+    pub lane: u8,
+    /// Mip level.
+    pub level: u8,
+    /// Array layer.
+    pub layer: u16,
+    /// Left and right texel column, equal for a nearest fetch or where the wrap mode joins them.
+    pub i: [u32; 2],
+    /// Upper and lower texel row.
+    pub j: [u32; 2],
+}
+
+impl Footprint {
+    /// The distinct texels, row by row: one, two or four.
+    pub fn texels(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let Self { i, j, .. } = *self;
+        let rows = if j[0] == j[1] { 1 } else { 2 };
+        let columns = if i[0] == i[1] { 1 } else { 2 };
+        j.into_iter()
+            .take(rows)
+            .flat_map(move |y| i.into_iter().take(columns).map(move |x| [x, y]))
+    }
+}
+
+/// Mip levels that a sample reads and the filter within them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LevelSelection {
+    /// The finer level.
+    pub first: u32,
+    /// Number of levels, 1 or 2.
+    pub count: u32,
+    /// Filter within a level.
+    pub filter: Filter,
+}
+
+/// Chooses the levels for a level of detail, as Vulkan and llvmpipe do.
+///
+/// `lod <= 0` magnifies: level 0 with the `mag` filter. Linear mip filtering reads `floor(lod)`
+/// and the next one, and the last level alone from there on.
+#[must_use]
+pub fn select_levels(lod: f32, sampler: &Sampler, levels: u32) -> LevelSelection {
+    let last = levels.saturating_sub(1);
+    let magnified = lod <= 0.0;
+    let filter = if magnified { sampler.mag } else { sampler.min };
+    // A float cast saturates, so a negative level of detail gives level 0.
+    let (first, count) = match sampler.mip {
+        MipFilter::None => (0, 1),
+        _ if magnified => (0, 1),
+        MipFilter::Nearest => (((lod + 0.5).floor() as u32).min(last), 1),
+        MipFilter::Linear => {
+            let first = (lod.floor() as u32).min(last);
+            (first, if first == last { 1 } else { 2 })
+        }
+    };
+    LevelSelection {
+        first,
+        count,
+        filter,
+    }
+}
+
+/// Left (or upper) texel of a fetch along one axis, before wrapping:
+/// `floor(coordinate * size / (SUBTEXELS * extent) - 0.5)` for a linear filter, without the half
+/// texel for a nearest one. Exact.
+#[must_use]
+pub fn texel_before_wrap(coordinate: i32, size: u32, extent: u32, filter: Filter) -> i64 {
+    let unit = i64::from(SUBTEXELS) * i64::from(extent);
+    let position = i64::from(coordinate) * i64::from(size);
+    match filter {
+        Filter::Nearest => position.div_euclid(unit),
+        Filter::Linear => (2 * position - unit).div_euclid(2 * unit),
+    }
+}
+
+/// Brings a texel coordinate into `0..size`.
+#[must_use]
+pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> u32 {
+    let size = i64::from(size);
+    let wrapped = match wrap {
+        Wrap::Repeat => texel.rem_euclid(size),
+        Wrap::MirroredRepeat => {
+            let folded = texel.rem_euclid(2 * size);
+            folded.min(2 * size - 1 - folded)
+        }
+        Wrap::ClampToEdge => texel.clamp(0, size - 1),
+    };
+    wrapped as u32
+}
+
+/// Yields the footprints of one sample of a quad record: levels from fine to coarse, lanes
+/// ascending within a level.
+pub fn footprints(
+    record: &QuadRecord,
+    extent: [u32; 2],
+    sample: &Sample,
+    texture: &Texture,
+    sampler: &Sampler,
+    options: &SamplingOptions,
+    mut visit: impl FnMut(Footprint),
+) {
+    let sampler = options.filter.apply(sampler);
+    let lod = quad_lod(record, extent, texture.size, options.lod) + options.lod_bias;
+    let selection = select_levels(lod, &sampler, texture.levels);
+    let mask = if options.helper_lanes {
+        15
+    } else {
+        record.mask
+    };
+    for level in selection.first..selection.first + selection.count {
+        let size = texture.level_size(level);
+        for lane in (0..4).filter(|lane| mask >> lane & 1 == 1) {
+            let uv = record.lane_uv(lane);
+            let axis = |a: usize| {
+                let low = texel_before_wrap(uv[a], size[a], extent[a], selection.filter)
+                    + i64::from(sample.offset[a]);
+                let high = match selection.filter {
+                    Filter::Nearest => low,
+                    Filter::Linear => low + 1,
+                };
+                [low, high].map(|texel| wrap_texel(texel, size[a], sampler.wrap[a]))
+            };
+            visit(Footprint {
+                lane: lane as u8,
+                level: level as u8,
+                layer: sample.layer,
+                i: axis(0),
+                j: axis(1),
+            });
+        }
+    }
+}
+
+/// Yields every footprint of a record of `draw`, sample by sample, with the sample it belongs to.
+///
+/// Nothing is read by a record without a group, nor by one whose indices the tables do not have.
+pub fn record_footprints(
+    tables: &Tables,
+    draw: u32,
+    record: &QuadRecord,
+    options: &SamplingOptions,
+    mut visit: impl FnMut(&Sample, Footprint),
+) {
+    for (group, sample) in record_samples(tables, draw, record) {
+        let texture = tables.textures.get(sample.texture as usize);
+        let sampler = tables.samplers.get(usize::from(sample.sampler));
+        if let Some((texture, sampler)) = texture.zip(sampler) {
+            footprints(
+                record,
+                group.extent,
+                sample,
+                texture,
+                sampler,
+                options,
+                |footprint| visit(sample, footprint),
+            );
+        }
+    }
+}
+
+fn record_samples<'a>(
+    tables: &'a Tables,
+    draw: u32,
+    record: &QuadRecord,
+) -> impl Iterator<Item = (&'a UvGroup, &'a Sample)> + use<'a> {
+    tables
+        .draws
+        .get(draw as usize)
+        .filter(|_| record.group != NO_GROUP)
+        .and_then(|draw| draw.groups.get(usize::from(record.group)))
+        .into_iter()
+        .flat_map(|group| group.samples.iter().map(move |sample| (group, sample)))
+}
+
+#[cfg(test)]
+mod tests;

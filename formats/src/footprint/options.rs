@@ -1,0 +1,65 @@
+//! What replay may change about sampling.
+
+use crate::texture::{Filter, MipFilter, Sampler};
+use serde::{Deserialize, Serialize};
+
+/// Filter used in place of a sampler's own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FilterOverride {
+    /// Each sample's own sampler.
+    #[default]
+    AsRecorded,
+    /// Linear within a level, linear between levels.
+    Trilinear,
+    /// Linear within the nearest level.
+    Bilinear,
+    /// One texel of the nearest level.
+    Nearest,
+}
+
+impl FilterOverride {
+    /// The sampler that results; the wrap modes stay.
+    #[must_use]
+    pub fn apply(self, sampler: &Sampler) -> Sampler {
+        let (filter, mip) = match self {
+            Self::AsRecorded => return *sampler,
+            Self::Trilinear => (Filter::Linear, MipFilter::Linear),
+            Self::Bilinear => (Filter::Linear, MipFilter::Nearest),
+            Self::Nearest => (Filter::Nearest, MipFilter::Nearest),
+        };
+        Sampler {
+            wrap: sampler.wrap,
+            mag: filter,
+            min: filter,
+            mip,
+        }
+    }
+}
+
+/// How the level of detail follows from the derivatives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LodFormula {
+    /// `fastlog2(max(|dx|^2, |dy|^2)) / 2`, as llvmpipe.
+    #[default]
+    Llvmpipe,
+    /// `log2` of the largest absolute component, as softpipe.
+    Softpipe,
+    /// As llvmpipe with the exact logarithm.
+    Exact,
+}
+
+/// Everything about sampling that is not in the trace.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct SamplingOptions {
+    /// Filter.
+    pub filter: FilterOverride,
+    /// Added to the level of detail.
+    pub lod_bias: f32,
+    /// Level-of-detail formula.
+    pub lod: LodFormula,
+    /// Helper lanes of partly covered quads read, too.
+    pub helper_lanes: bool,
+}

@@ -1,0 +1,209 @@
+use super::*;
+use crate::texture::{ColorSpace, TexelFormat};
+use proptest::prelude::*;
+
+fn texture(size: [u32; 2], levels: u32) -> Texture {
+    Texture {
+        name: String::new(),
+        size,
+        levels,
+        layers: 1,
+        format: TexelFormat::Bc1,
+        color_space: ColorSpace::Linear,
+    }
+}
+
+/// A quad whose lanes are `step` texels of a 256x256 texture apart, the first at `at`.
+fn record(at: [f64; 2], step: f64) -> QuadRecord {
+    let fixed = |texels: f64| (texels * f64::from(SUBTEXELS)).round() as i32;
+    QuadRecord {
+        mask: 15,
+        uv: at.map(fixed),
+        dx: [fixed(step), 0],
+        dy: [0, fixed(step)],
+        ..QuadRecord::default()
+    }
+}
+
+const SAMPLE: Sample = Sample {
+    texture: 0,
+    sampler: 0,
+    layer: 3,
+    offset: [0, 0],
+};
+
+fn all(
+    record: &QuadRecord,
+    sample: &Sample,
+    sampler: &Sampler,
+    options: &SamplingOptions,
+) -> Vec<Footprint> {
+    let mut found = Vec::new();
+    let texture = texture([256; 2], 9);
+    footprints(record, [256; 2], sample, &texture, sampler, options, |f| {
+        found.push(f)
+    });
+    found
+}
+
+#[test]
+fn fast_log2_is_exact_at_powers_of_two_and_slightly_low_between() {
+    for exponent in -20..20 {
+        assert_eq!(fast_log2(2f32.powi(exponent)), exponent as f32);
+    }
+    for step in 0..1000 {
+        let x = 1.0 + step as f32 / 1000.0;
+        let error = x.log2() - fast_log2(x);
+        assert!((-1e-6..0.0861).contains(&error), "{x}: {error}");
+    }
+}
+
+#[test]
+fn level_of_detail_counts_octaves_of_minification() {
+    for octave in 0..6 {
+        let quad = record([10.0; 2], f64::from(1 << octave));
+        let lod = quad_lod(&quad, [256; 2], [256; 2], LodFormula::Llvmpipe);
+        assert_eq!(lod, octave as f32);
+        // A texture of the same group that is half as large sees half the derivatives.
+        let lod = quad_lod(&quad, [256; 2], [128; 2], LodFormula::Llvmpipe);
+        assert_eq!(lod, octave as f32 - 1.0);
+    }
+}
+
+#[test]
+fn trilinear_reads_two_levels_between_the_first_and_the_last() {
+    let levels = |lod| {
+        let selection = select_levels(lod, &Sampler::TRILINEAR_REPEAT, 9);
+        (selection.first, selection.count)
+    };
+    assert_eq!(levels(-63.5), (0, 1));
+    assert_eq!(levels(0.0), (0, 1));
+    assert_eq!(levels(0.01), (0, 2));
+    assert_eq!(levels(3.7), (3, 2));
+    assert_eq!(levels(7.99), (7, 2));
+    assert_eq!(levels(8.0), (8, 1));
+    assert_eq!(levels(40.0), (8, 1));
+}
+
+#[test]
+fn a_magnified_quad_takes_the_mag_filter() {
+    let sampler = Sampler {
+        mag: Filter::Nearest,
+        ..Sampler::TRILINEAR_REPEAT
+    };
+    let found = all(
+        &record([10.75; 2], 0.25),
+        &SAMPLE,
+        &sampler,
+        &SamplingOptions::default(),
+    );
+    assert_eq!(found.len(), 4);
+    assert_eq!((found[0].i, found[0].j), ([10, 10], [10, 10]));
+    assert_eq!(found[0].texels().count(), 1);
+}
+
+#[test]
+fn a_texel_centre_reads_the_texel_and_its_right_and_lower_neighbours() {
+    let found = all(
+        &record([10.5, 20.5], 1.0),
+        &SAMPLE,
+        &Sampler::TRILINEAR_REPEAT,
+        &SamplingOptions::default(),
+    );
+    let first = found[0];
+    assert_eq!((first.i, first.j, first.layer), ([10, 11], [20, 21], 3));
+    let texels: Vec<_> = first.texels().collect();
+    assert_eq!(texels, [[10, 20], [11, 20], [10, 21], [11, 21]]);
+}
+
+#[test]
+fn levels_come_before_lanes() {
+    let quad = QuadRecord {
+        mask: 0b1010,
+        ..record([10.5, 20.5], 2.5)
+    };
+    let order = |options: &SamplingOptions| -> Vec<_> {
+        let found = all(&quad, &SAMPLE, &Sampler::TRILINEAR_REPEAT, options);
+        found.iter().map(|f| (f.level, f.lane)).collect()
+    };
+    let options = SamplingOptions::default();
+    assert_eq!(order(&options), [(1, 1), (1, 3), (2, 1), (2, 3)]);
+    let helpers = SamplingOptions {
+        helper_lanes: true,
+        lod_bias: 1.0,
+        filter: FilterOverride::Bilinear,
+        ..options
+    };
+    assert_eq!(order(&helpers), [(2, 0), (2, 1), (2, 2), (2, 3)]);
+}
+
+#[test]
+fn offsets_move_by_texels_of_the_sampled_level() {
+    let sample = Sample {
+        offset: [-2, 1],
+        ..SAMPLE
+    };
+    let quad = record([1.0, 255.0], 1.0);
+    let found = all(
+        &quad,
+        &sample,
+        &Sampler::SHADOW,
+        &SamplingOptions::default(),
+    );
+    assert_eq!(
+        (found[0].i, found[0].j),
+        ([0, 0], [255, 255]),
+        "clamped at both corners"
+    );
+    let repeat = Sampler {
+        mip: MipFilter::None,
+        ..Sampler::TRILINEAR_REPEAT
+    };
+    let found = all(&quad, &sample, &repeat, &SamplingOptions::default());
+    assert_eq!(
+        (found[0].i, found[0].j),
+        ([254, 255], [255, 0]),
+        "wrapped at both corners"
+    );
+}
+
+#[test]
+fn mirrored_coordinates_fold_at_every_edge() {
+    let folded: Vec<u32> = (-5..9)
+        .map(|t| wrap_texel(t, 4, Wrap::MirroredRepeat))
+        .collect();
+    assert_eq!(folded, [3, 3, 2, 1, 0, 0, 1, 2, 3, 3, 2, 1, 0, 0]);
+}
+
+proptest! {
+    /// The integer formula against the definition in floating point, away from texel edges.
+    #[test]
+    fn texel_position_is_the_rounded_down_coordinate(
+        coordinate in -40_000_000..40_000_000i32,
+        size in 1..5000u32,
+        extent in 1..5000u32,
+    ) {
+        let exact = f64::from(coordinate) * f64::from(size)
+            / (f64::from(SUBTEXELS) * f64::from(extent));
+        for (filter, half) in [(Filter::Linear, 0.5), (Filter::Nearest, 0.0)] {
+            let position = exact - half;
+            if (position - position.round()).abs() > 1e-6 {
+                let texel = texel_before_wrap(coordinate, size, extent, filter);
+                prop_assert_eq!(texel, position.floor() as i64);
+            }
+        }
+    }
+
+    #[test]
+    fn repeating_a_whole_texture_later_reads_the_same_texels(
+        u in -1000.0..1000.0f64, v in -1000.0..1000.0f64, step in 0.01..100.0f64,
+    ) {
+        let quad = record([u, v], step);
+        let mut later = quad;
+        later.uv[0] += 256 * SUBTEXELS;
+        let read = |quad| {
+            all(quad, &SAMPLE, &Sampler::TRILINEAR_REPEAT, &SamplingOptions::default())
+        };
+        prop_assert_eq!(read(&quad), read(&later));
+    }
+}

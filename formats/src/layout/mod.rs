@@ -1,0 +1,279 @@
+//! Where texels lie in memory: a pure function of the texture table and of a [`LayoutConfig`].
+//!
+//! A texture's layers follow one another, each with its levels from fine to coarse, tightly
+//! packed. A level is an array of blocks (4x4 texels for BC1, one texel for uncompressed formats)
+//! in the configured order.
+
+mod placement;
+
+pub use placement::BlockPlacement;
+
+use crate::texture::{TexelFormat, Texture};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Order of the blocks of a level in memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BlockOrder {
+    /// Row by row.
+    #[default]
+    Linear,
+    /// Z-order curve; the level is padded to powers of two.
+    Morton,
+    /// Tiles of 4x4 blocks, row by row within and between; the level is padded to whole tiles.
+    Tiled,
+}
+
+/// Order in which textures are given their places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TextureOrder {
+    /// As in the texture table.
+    #[default]
+    Table,
+    /// Largest first, as allocators that fight fragmentation do.
+    LargestFirst,
+}
+
+/// Alignment that lets same-size textures collide in the same cache sets.
+pub const PAGE_ALIGNMENT_BYTES: u64 = 64 << 10;
+
+/// Everything that decides a layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct LayoutConfig {
+    /// Format of the colour textures; `None` keeps the captured one. Shadow maps (R32F) always
+    /// keep theirs.
+    pub texel_format: Option<TexelFormat>,
+    /// Block order within a level.
+    pub block_order: BlockOrder,
+    /// Block order of uncompressed textures; `None` takes `block_order`.
+    pub uncompressed_order: Option<BlockOrder>,
+    /// Alignment of a texture's first byte, a power of two.
+    pub base_align_bytes: u64,
+    /// Order of the textures in memory.
+    pub texture_order: TextureOrder,
+}
+
+impl Default for LayoutConfig {
+    fn default() -> Self {
+        Self {
+            texel_format: None,
+            block_order: BlockOrder::Linear,
+            uncompressed_order: None,
+            base_align_bytes: 64,
+            texture_order: TextureOrder::Table,
+        }
+    }
+}
+
+/// Why textures cannot be laid out.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum LayoutError {
+    /// The alignment is not usable.
+    #[error("base alignment: expected a power of two of bytes, found {0}")]
+    Alignment(u64),
+    /// The textures do not fit into the address space.
+    #[error("texture {index} ({name}): expected addresses below 2^63, found more")]
+    TooLarge {
+        /// Index in the table.
+        index: usize,
+        /// Name.
+        name: String,
+    },
+}
+
+/// Size of a format's unit of storage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BlockInfo {
+    /// Width and height in texels.
+    pub texels: [u32; 2],
+    /// Size in bytes.
+    pub bytes: u32,
+}
+
+impl TexelFormat {
+    /// The format's block.
+    #[must_use]
+    pub const fn block(self) -> BlockInfo {
+        let (edge, bytes) = match self {
+            Self::Bc1 | Self::Etc2 => (4, 8),
+            Self::Bc3 | Self::Bc7 | Self::Etc2Rgba | Self::Astc4x4 => (4, 16),
+            Self::Astc5x5 => (5, 16),
+            Self::Astc6x6 => (6, 16),
+            Self::Astc8x8 => (8, 16),
+            Self::Rgba8 | Self::R32f => (1, 4),
+        };
+        BlockInfo {
+            texels: [edge, edge],
+            bytes,
+        }
+    }
+}
+
+/// Placement of one mip level within a layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LevelLayout {
+    /// Offset from the start of the layer.
+    pub offset_bytes: u64,
+    /// Width and height in texels.
+    pub size: [u32; 2],
+    /// Order of the blocks.
+    pub placement: BlockPlacement,
+}
+
+/// Placement of one texture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TextureLayout {
+    /// Address of the first byte.
+    pub base: u64,
+    /// Format in memory.
+    pub format: TexelFormat,
+    /// The format's block.
+    pub block: BlockInfo,
+    /// Distance between layers.
+    pub layer_bytes: u64,
+    /// Levels from fine to coarse.
+    pub levels: Vec<LevelLayout>,
+}
+
+impl TextureLayout {
+    /// Size of all layers.
+    #[must_use]
+    pub fn size_bytes(&self, layers: u32) -> u64 {
+        self.layer_bytes * u64::from(layers)
+    }
+
+    /// Address of the block that holds a texel; `None` where the level does not exist.
+    #[must_use]
+    pub fn address(&self, layer: u32, level: u32, texel: [u32; 2]) -> Option<u64> {
+        let level = self.levels.get(level as usize)?;
+        let block = [
+            texel[0] / self.block.texels[0],
+            texel[1] / self.block.texels[1],
+        ];
+        let within = level.placement.index(block) * u64::from(self.block.bytes);
+        Some(self.base + u64::from(layer) * self.layer_bytes + level.offset_bytes + within)
+    }
+}
+
+/// Placement of all textures of a trace.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    textures: Vec<TextureLayout>,
+    end: u64,
+}
+
+impl Layout {
+    /// Lays out `textures`, from address 0.
+    ///
+    /// # Errors
+    /// When the alignment is no power of two or the textures are too large to address.
+    pub fn new(textures: &[Texture], config: &LayoutConfig) -> Result<Self, LayoutError> {
+        let align = config.base_align_bytes;
+        if !align.is_power_of_two() {
+            return Err(LayoutError::Alignment(align));
+        }
+        let mut placed = Vec::with_capacity(textures.len());
+        for (index, texture) in textures.iter().enumerate() {
+            placed.push(place(texture, config).ok_or_else(|| too_large(index, texture))?);
+        }
+        let mut order: Vec<usize> = (0..textures.len()).collect();
+        if config.texture_order == TextureOrder::LargestFirst {
+            order.sort_by_key(|&index| {
+                std::cmp::Reverse(placed[index].layer_bytes * u64::from(textures[index].layers))
+            });
+        }
+        let mut end = 0u64;
+        for index in order {
+            let texture = &textures[index];
+            let size = placed[index].layer_bytes * u64::from(texture.layers);
+            let base = end.checked_next_multiple_of(align);
+            let after = base.and_then(|base| base.checked_add(size));
+            (placed[index].base, end) = base
+                .zip(after)
+                .filter(|(_, end)| *end < 1 << 63)
+                .ok_or_else(|| too_large(index, texture))?;
+        }
+        Ok(Self {
+            textures: placed,
+            end,
+        })
+    }
+
+    /// Placement of each texture, in table order.
+    #[must_use]
+    pub fn textures(&self) -> &[TextureLayout] {
+        &self.textures
+    }
+
+    /// First address after the last texture.
+    #[must_use]
+    pub fn end(&self) -> u64 {
+        self.end
+    }
+
+    /// Address of the block that holds a texel; `None` where texture or level does not exist.
+    #[must_use]
+    pub fn address(&self, texture: u32, layer: u32, level: u32, texel: [u32; 2]) -> Option<u64> {
+        let texture = self.textures.get(texture as usize)?;
+        texture.address(layer, level, texel)
+    }
+}
+
+fn too_large(index: usize, texture: &Texture) -> LayoutError {
+    LayoutError::TooLarge {
+        index,
+        name: texture.name.clone(),
+    }
+}
+
+/// Format in memory: the override is for colour, and depth cannot be stored as colour blocks.
+fn memory_format(texture: &Texture, config: &LayoutConfig) -> TexelFormat {
+    match (texture.format, config.texel_format) {
+        (TexelFormat::R32f, _) | (_, None) => texture.format,
+        (_, Some(format)) => format,
+    }
+}
+
+/// Lays out one texture from address 0.
+fn place(texture: &Texture, config: &LayoutConfig) -> Option<TextureLayout> {
+    let format = memory_format(texture, config);
+    let block = format.block();
+    let order = if block.texels == [1, 1] {
+        config.uncompressed_order.unwrap_or(config.block_order)
+    } else {
+        config.block_order
+    };
+    let mut offset_bytes = 0u64;
+    let levels = (0..texture.levels)
+        .map(|level| {
+            let size = texture.level_size(level);
+            let blocks = [0, 1].map(|a| size[a].div_ceil(block.texels[a]));
+            let placement = BlockPlacement::new(order, blocks);
+            let layout = LevelLayout {
+                offset_bytes,
+                size,
+                placement,
+            };
+            let bytes = placement
+                .blocks(blocks)
+                .checked_mul(u64::from(block.bytes))?;
+            offset_bytes = offset_bytes.checked_add(bytes)?;
+            Some(layout)
+        })
+        .collect::<Option<Vec<_>>>()?;
+    // Every layer's size times the layers must stay an address.
+    offset_bytes.checked_mul(u64::from(texture.layers))?;
+    Some(TextureLayout {
+        base: 0,
+        format,
+        block,
+        layer_bytes: offset_bytes,
+        levels,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,90 @@
+//! Block orders within a level.
+
+use super::BlockOrder;
+
+/// Edge of a tile of blocks, as a shift.
+const TILE_SHIFT: u32 = 2;
+
+/// A block order with what it needs to know about its level, ready for fast engines to tabulate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BlockPlacement {
+    /// `y * pitch + x`.
+    Linear {
+        /// Blocks in a row.
+        pitch: u32,
+    },
+    /// Bits of x and y interleaved, x lowest, until the shorter axis runs out; the rest of the
+    /// longer axis lies above.
+    Morton {
+        /// Bits of x and of y.
+        bits: [u32; 2],
+    },
+    /// Tile row by tile row, tile by tile, row by row within.
+    Tiled {
+        /// Width and height of a tile, as shifts; smaller than 4x4 only in levels that are.
+        shift: [u32; 2],
+        /// Tiles in a row.
+        pitch: u32,
+    },
+}
+
+impl BlockPlacement {
+    pub(super) fn new(order: BlockOrder, blocks: [u32; 2]) -> Self {
+        let bits = blocks.map(|count| count.next_power_of_two().ilog2());
+        match order {
+            BlockOrder::Linear => Self::Linear { pitch: blocks[0] },
+            BlockOrder::Morton => Self::Morton { bits },
+            BlockOrder::Tiled => {
+                let shift = bits.map(|bits| bits.min(TILE_SHIFT));
+                let pitch = blocks[0].div_ceil(1 << shift[0]);
+                Self::Tiled { shift, pitch }
+            }
+        }
+    }
+
+    /// Blocks that a level of `blocks` takes in memory, padding included.
+    pub(super) fn blocks(&self, blocks: [u32; 2]) -> u64 {
+        match *self {
+            Self::Linear { pitch } => u64::from(pitch) * u64::from(blocks[1]),
+            Self::Morton { bits } => 1 << (bits[0] + bits[1]),
+            Self::Tiled { shift, pitch } => {
+                let rows = blocks[1].div_ceil(1 << shift[1]);
+                (u64::from(pitch) * u64::from(rows)) << (shift[0] + shift[1])
+            }
+        }
+    }
+
+    /// Number of a block in memory order.
+    #[must_use]
+    pub fn index(&self, [x, y]: [u32; 2]) -> u64 {
+        match *self {
+            Self::Linear { pitch } => u64::from(y) * u64::from(pitch) + u64::from(x),
+            Self::Morton { bits } => {
+                let common = bits[0].min(bits[1]);
+                let low = (1u32 << common) - 1;
+                let rest = u64::from((x >> common) | (y >> common));
+                interleave(x & low) | interleave(y & low) << 1 | rest << (2 * common)
+            }
+            Self::Tiled { shift, pitch } => {
+                let tile = u64::from(y >> shift[1]) * u64::from(pitch) + u64::from(x >> shift[0]);
+                let within = |v: u32, a: usize| u64::from(v & ((1 << shift[a]) - 1));
+                (tile << (shift[0] + shift[1])) | within(y, 1) << shift[0] | within(x, 0)
+            }
+        }
+    }
+}
+
+/// Spreads 32 bits so that a zero follows each.
+fn interleave(v: u32) -> u64 {
+    let mut v = u64::from(v);
+    for (shift, mask) in [
+        (16, 0x0000_ffff_0000_ffff),
+        (8, 0x00ff_00ff_00ff_00ff),
+        (4, 0x0f0f_0f0f_0f0f_0f0f),
+        (2, 0x3333_3333_3333_3333),
+        (1, 0x5555_5555_5555_5555),
+    ] {
+        v = (v | v << shift) & mask;
+    }
+    v
+}

@@ -1,0 +1,147 @@
+use super::*;
+use crate::texture::ColorSpace;
+use proptest::prelude::*;
+use std::collections::HashSet;
+
+fn texture(size: [u32; 2], levels: u32, layers: u32, format: TexelFormat) -> Texture {
+    Texture {
+        name: "t".to_owned(),
+        size,
+        levels,
+        layers,
+        format,
+        color_space: ColorSpace::Srgb,
+    }
+}
+
+fn config(block_order: BlockOrder) -> LayoutConfig {
+    LayoutConfig {
+        block_order,
+        ..LayoutConfig::default()
+    }
+}
+
+const ORDERS: [BlockOrder; 3] = [BlockOrder::Linear, BlockOrder::Morton, BlockOrder::Tiled];
+
+#[test]
+fn linear_bc1_puts_neighbouring_blocks_eight_bytes_apart() {
+    let textures = [texture([16, 8], 1, 1, TexelFormat::Bc1)];
+    let layout = Layout::new(&textures, &config(BlockOrder::Linear)).unwrap();
+    let at = |x, y| layout.address(0, 0, 0, [x, y]).unwrap();
+    assert_eq!(
+        [at(0, 0), at(3, 3), at(4, 0), at(0, 4), at(15, 7)],
+        [0, 0, 8, 32, 56]
+    );
+    assert_eq!(layout.end(), 64);
+}
+
+#[test]
+fn morton_of_a_wide_level_interleaves_the_common_bits() {
+    let placement = BlockPlacement::new(BlockOrder::Morton, [4, 2]);
+    let row = |y| (0..4).map(|x| placement.index([x, y])).collect::<Vec<_>>();
+    assert_eq!(row(0), [0, 1, 4, 5]);
+    assert_eq!(row(1), [2, 3, 6, 7]);
+}
+
+#[test]
+fn tiles_of_uncompressed_texels_are_four_lines_of_sixteen_bytes() {
+    let textures = [texture([8, 8], 1, 1, TexelFormat::R32f)];
+    let layout = Layout::new(&textures, &config(BlockOrder::Tiled)).unwrap();
+    let at = |x, y| layout.address(0, 0, 0, [x, y]).unwrap();
+    assert_eq!([at(1, 0), at(0, 1), at(4, 0), at(0, 4)], [4, 16, 64, 128]);
+}
+
+#[test]
+fn bases_are_aligned_and_in_the_configured_order() {
+    let textures = [
+        texture([4, 4], 1, 1, TexelFormat::Bc1),
+        texture([64, 64], 1, 1, TexelFormat::Bc1),
+    ];
+    let bases = |config: &LayoutConfig| {
+        let layout = Layout::new(&textures, config).unwrap();
+        layout.textures().iter().map(|t| t.base).collect::<Vec<_>>()
+    };
+    assert_eq!(bases(&LayoutConfig::default()), [0, 64]);
+    let pages = LayoutConfig {
+        base_align_bytes: PAGE_ALIGNMENT_BYTES,
+        ..LayoutConfig::default()
+    };
+    assert_eq!(bases(&pages), [0, 65536]);
+    let largest = LayoutConfig {
+        texture_order: TextureOrder::LargestFirst,
+        ..LayoutConfig::default()
+    };
+    assert_eq!(bases(&largest), [2048, 0]);
+}
+
+#[test]
+fn a_format_override_leaves_shadow_maps_alone() {
+    let textures = [
+        texture([8, 8], 1, 1, TexelFormat::Bc1),
+        texture([8, 8], 1, 4, TexelFormat::R32f),
+    ];
+    let config = LayoutConfig {
+        texel_format: Some(TexelFormat::Astc8x8),
+        ..LayoutConfig::default()
+    };
+    let layout = Layout::new(&textures, &config).unwrap();
+    let formats: Vec<_> = layout.textures().iter().map(|t| t.format).collect();
+    assert_eq!(formats, [TexelFormat::Astc8x8, TexelFormat::R32f]);
+    assert_eq!(layout.end(), 64 + 4 * 256);
+}
+
+#[test]
+fn an_alignment_that_is_no_power_of_two_is_refused() {
+    let config = LayoutConfig {
+        base_align_bytes: 48,
+        ..LayoutConfig::default()
+    };
+    let text = Layout::new(&[], &config).unwrap_err().to_string();
+    assert_eq!(
+        text,
+        "base alignment: expected a power of two of bytes, found 48"
+    );
+}
+
+#[test]
+fn textures_beyond_the_address_space_are_refused() {
+    let huge = texture([1 << 16, 1 << 16], 1, 1 << 16, TexelFormat::R32f);
+    let textures = vec![huge; 1 << 14];
+    assert!(Layout::new(&textures, &LayoutConfig::default()).is_err());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    /// Every block of every level and layer of every texture has bytes of its own.
+    #[test]
+    fn no_two_blocks_share_an_address(
+        width in 1..40u32, height in 1..40u32, layers in 1..3u32, order in 0..3usize,
+        format in prop::sample::select(vec![
+            TexelFormat::Bc1, TexelFormat::Bc7, TexelFormat::Astc5x5, TexelFormat::Rgba8,
+        ]),
+    ) {
+        let levels = width.max(height).ilog2() + 1;
+        let textures = [
+            texture([width, height], levels, layers, format),
+            texture([height, width], levels, layers, TexelFormat::R32f),
+        ];
+        let layout = Layout::new(&textures, &config(ORDERS[order])).unwrap();
+        let mut seen = HashSet::new();
+        for (index, texture) in textures.iter().enumerate() {
+            let block = layout.textures()[index].block;
+            for layer in 0..layers {
+                for level in 0..levels {
+                    let [w, h] = texture.level_size(level);
+                    for y in (0..h).step_by(block.texels[1] as usize) {
+                        for x in (0..w).step_by(block.texels[0] as usize) {
+                            let at = layout.address(index as u32, layer, level, [x, y]).unwrap();
+                            prop_assert!(at + u64::from(block.bytes) <= layout.end());
+                            prop_assert_eq!(at % u64::from(block.bytes), 0);
+                            prop_assert!(seen.insert(at));
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

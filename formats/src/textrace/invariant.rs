@@ -1,0 +1,129 @@
+//! What must hold for every tile, whoever writes it and however it was encoded.
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+use super::{Draw, NO_GROUP, QuadRecord, Tile};
+
+/// Quads along an edge of a tile.
+pub const TILE_QUADS: u8 = 8;
+
+/// A rule that a tile breaks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Broken {
+    /// `run 3` or `record 12`.
+    pub what: String,
+    /// The rule.
+    pub expected: String,
+    /// What breaks it.
+    pub found: String,
+}
+
+/// Position of a quad on the Morton curve of its tile, 0 to 63 (x in the even bits).
+#[must_use]
+pub fn quad_morton(x: u8, y: u8) -> u8 {
+    let spread = |v: u8| (v & 1) | (v & 2) << 1 | (v & 4) << 2;
+    spread(x) | spread(y) << 1
+}
+
+/// Checks a whole tile against the draw table.
+pub(super) fn check(draws: &[Draw], tile: &Tile) -> Result<(), Broken> {
+    let mut records = tile.records.as_slice();
+    let mut first = 0u32;
+    let mut previous: Option<u32> = None;
+    for (index, run) in tile.runs.iter().enumerate() {
+        let broken = |expected: String, found: String| Broken {
+            what: format!("run {index}"),
+            expected,
+            found,
+        };
+        let draw = usize::try_from(run.draw)
+            .ok()
+            .and_then(|draw| draws.get(draw))
+            .ok_or_else(|| {
+                broken(
+                    format!("a draw below {}", draws.len()),
+                    run.draw.to_string(),
+                )
+            })?;
+        let in_draw = run
+            .primitive
+            .checked_sub(draw.first_primitive)
+            .is_some_and(|number| number < draw.primitives);
+        if !in_draw {
+            let end = draw.first_primitive.wrapping_add(draw.primitives);
+            let expected = format!(
+                "a primitive of draw {}: {}..{end}",
+                run.draw, draw.first_primitive
+            );
+            return Err(broken(expected, run.primitive.to_string()));
+        }
+        if let Some(previous) = previous.filter(|previous| run.primitive <= *previous) {
+            let expected = format!("a primitive above {previous}");
+            return Err(broken(expected, run.primitive.to_string()));
+        }
+        previous = Some(run.primitive);
+        if run.first != first || run.count == 0 {
+            let expected = format!("records that start at {first}, at least one");
+            return Err(broken(
+                expected,
+                format!("{} from {}", run.count, run.first),
+            ));
+        }
+        let here = usize::try_from(run.count)
+            .ok()
+            .and_then(|count| records.split_at_checked(count));
+        let Some((of_run, rest)) = here else {
+            let expected = format!("at most {} records", records.len());
+            return Err(broken(expected, run.count.to_string()));
+        };
+        check_records(draw, first, of_run)?;
+        records = rest;
+        first = first.saturating_add(run.count);
+    }
+    if records.is_empty() {
+        return Ok(());
+    }
+    Err(Broken {
+        what: "runs".to_owned(),
+        expected: format!("{} records in all", tile.records.len()),
+        found: first.to_string(),
+    })
+}
+
+fn check_records(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(), Broken> {
+    let mut previous = 0;
+    for (index, record) in records.iter().enumerate() {
+        let morton = quad_morton(record.x, record.y);
+        let holds = record.x < TILE_QUADS
+            && record.y < TILE_QUADS
+            && (1..=15).contains(&record.mask)
+            && (usize::from(record.group) < draw.groups.len() || record.group == NO_GROUP)
+            && morton >= previous;
+        if !holds {
+            let number = u64::from(first) + index as u64;
+            return Err(explain(draw, number, record, previous));
+        }
+        previous = morton;
+    }
+    Ok(())
+}
+
+#[cold]
+fn explain(draw: &Draw, number: u64, record: &QuadRecord, previous: u8) -> Broken {
+    let (expected, found) = if record.x >= TILE_QUADS || record.y >= TILE_QUADS {
+        let expected = format!("x and y below {TILE_QUADS}");
+        (expected, format!("({}, {})", record.x, record.y))
+    } else if !(1..=15).contains(&record.mask) {
+        ("a mask of 1 to 15".to_owned(), record.mask.to_string())
+    } else if usize::from(record.group) >= draw.groups.len() && record.group != NO_GROUP {
+        let expected = format!("a group below {} or {NO_GROUP}", draw.groups.len());
+        (expected, record.group.to_string())
+    } else {
+        let expected = format!("Morton order: at least position {previous}");
+        (expected, quad_morton(record.x, record.y).to_string())
+    };
+    Broken {
+        what: format!("record {number}"),
+        expected,
+        found,
+    }
+}

@@ -1,0 +1,228 @@
+//! Reading a `.textrace`: tables at once, tiles one by one from any thread.
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+use super::index::IndexEntry;
+use super::{
+    Encoding, INDEX_ENTRY_BYTES, Pass, TILE_INDEX, TILES, Tables, Tile, invariant, raw, tables,
+};
+use crate::container::{Container, Kind};
+use crate::error::{FormatError, Place, Result};
+use crate::parse::parse_all;
+use nom::Parser;
+use nom::multi::count;
+use std::path::Path;
+
+/// What the index says about a tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TileStats {
+    /// Quad records.
+    pub records: u32,
+    /// Primitive runs.
+    pub runs: u32,
+    /// Encoded size.
+    pub bytes: u32,
+}
+
+/// An opened texture-address trace.
+#[derive(Debug)]
+pub struct Textrace {
+    container: Container,
+    tables: Tables,
+    index: Vec<IndexEntry>,
+    /// First index slot of each pass.
+    pass_slots: Vec<usize>,
+}
+
+impl Textrace {
+    /// Maps a trace and reads its tables and index.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is malformed; the error names the place.
+    pub fn open(path: &Path) -> Result<Self> {
+        Self::new(Container::open(path)?)
+    }
+
+    /// Reads a trace from memory.
+    ///
+    /// # Errors
+    /// When the bytes are malformed.
+    pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
+        Self::new(Container::from_bytes(bytes)?)
+    }
+
+    fn new(container: Container) -> Result<Self> {
+        container.expect_kind(Kind::Textrace)?;
+        let tables = tables::read(&container)?;
+        let slots: u64 = tables
+            .passes
+            .iter()
+            .map(Pass::tile_count_u64)
+            .fold(0, u64::saturating_add);
+        let bytes = container.chunk(TILE_INDEX)?.len();
+        let entries = bytes / INDEX_ENTRY_BYTES;
+        if slots.checked_mul(INDEX_ENTRY_BYTES as u64) != Some(bytes as u64) {
+            let expected = format!("32 bytes for each of {slots} tiles");
+            return Err(container.malformed(TILE_INDEX, 0, expected, format!("{bytes} bytes")));
+        }
+        let index: Vec<IndexEntry> = container.parse_chunk(TILE_INDEX, |input| {
+            count(IndexEntry::parse, entries).parse(input)
+        })?;
+        check_placement(&container, &index)?;
+        let mut next = 0usize;
+        let pass_slots = tables
+            .passes
+            .iter()
+            .map(|pass| {
+                let first = next;
+                // Cannot overflow: the sum was compared with the index's size above.
+                next += usize::try_from(pass.tile_count_u64()).unwrap_or(0);
+                first
+            })
+            .collect();
+        Ok(Self {
+            container,
+            tables,
+            index,
+            pass_slots,
+        })
+    }
+
+    /// The tables.
+    #[must_use]
+    pub fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    /// The container, for its directory and sizes.
+    #[must_use]
+    pub fn container(&self) -> &Container {
+        &self.container
+    }
+
+    /// CRC-32 of the whole file, which names the trace in results.
+    #[must_use]
+    pub fn file_checksum(&self) -> u32 {
+        self.container.file_checksum()
+    }
+
+    /// What the index says about a tile; zero for one that nothing touched or that is not there.
+    #[must_use]
+    pub fn tile_stats(&self, pass: usize, tile: usize) -> TileStats {
+        self.entry(pass, tile).map_or_else(
+            |_| TileStats::default(),
+            |entry| TileStats {
+                records: entry.records,
+                runs: entry.runs,
+                bytes: entry.bytes,
+            },
+        )
+    }
+
+    /// How a tile is encoded.
+    ///
+    /// # Errors
+    /// When there is no such tile.
+    pub fn tile_encoding(&self, pass: usize, tile: usize) -> Result<Encoding> {
+        Ok(self.entry(pass, tile)?.encoding)
+    }
+
+    /// Decodes a tile into `out`, whose memory is reused. May be called from many threads.
+    ///
+    /// # Errors
+    /// When there is no such tile, or its bytes are damaged; `out` is then empty.
+    pub fn decode_tile(&self, pass: usize, tile: usize, out: &mut Tile) -> Result<()> {
+        out.clear();
+        let entry = self.entry(pass, tile)?;
+        if entry.records == 0 {
+            return Ok(());
+        }
+        let outcome = self.decode_entry(entry, out);
+        if outcome.is_err() {
+            out.clear();
+        }
+        outcome
+    }
+
+    fn decode_entry(&self, entry: &IndexEntry, out: &mut Tile) -> Result<()> {
+        let bytes = entry_bytes(self.container.chunk_unchecked(TILES)?, entry);
+        let crc32 = crc32fast::hash(bytes);
+        if crc32 != entry.crc32 {
+            let expected = format!("a tile with CRC-32 {:08x}", entry.crc32);
+            let found = format!("{crc32:08x}");
+            return Err(self
+                .container
+                .malformed(TILES, entry.offset, expected, found));
+        }
+        let start = self.container.entry(TILES)?.offset_bytes;
+        let at = start.saturating_add(entry.offset);
+        let (file, place) = (self.container.file(), Place::Chunk(TILES));
+        let IndexEntry { runs, records, .. } = *entry;
+        out.runs.reserve(runs as usize);
+        out.records.reserve(records as usize);
+        match entry.encoding {
+            Encoding::Raw => parse_all(file, place, at, bytes, |input| {
+                raw::decode(runs, records, input, out)
+            }),
+        }?;
+        invariant::check(&self.tables.draws, out).map_err(|broken| {
+            let expected = format!("{} of the tile: {}", broken.what, broken.expected);
+            self.container
+                .malformed(TILES, entry.offset, expected, broken.found)
+        })
+    }
+
+    fn entry(&self, pass: usize, tile: usize) -> Result<&IndexEntry> {
+        let out_of_range = |what, index: usize, count: u64| FormatError::OutOfRange {
+            file: self.container.file().to_owned(),
+            what,
+            index: index as u64,
+            count,
+        };
+        let (info, first) = self
+            .tables
+            .passes
+            .get(pass)
+            .zip(self.pass_slots.get(pass))
+            .ok_or_else(|| out_of_range("pass", pass, self.tables.passes.len() as u64))?;
+        let tiles = info.tile_count_u64();
+        Some(tile)
+            .filter(|tile| (*tile as u64) < tiles)
+            .and_then(|tile| self.index.get(first + tile))
+            .ok_or_else(|| out_of_range("tile", tile, tiles))
+    }
+}
+
+/// Bytes of a tile; the index was checked against the chunk when the file was opened.
+fn entry_bytes<'a>(chunk: &'a [u8], entry: &IndexEntry) -> &'a [u8] {
+    usize::try_from(entry.offset)
+        .ok()
+        .and_then(|offset| chunk.get(offset..offset.checked_add(entry.bytes as usize)?))
+        .unwrap_or_default()
+}
+
+/// Tiles must fill their chunk in index order, so none overlap and no byte is unaccounted for.
+fn check_placement(container: &Container, index: &[IndexEntry]) -> Result<()> {
+    let chunk_bytes = container.entry(TILES)?.length_bytes;
+    let mut end = 0u64;
+    for (slot, entry) in index
+        .iter()
+        .enumerate()
+        .filter(|(_, entry)| entry.records > 0)
+    {
+        let at = (slot * INDEX_ENTRY_BYTES) as u64;
+        if entry.offset != end {
+            let found = entry.offset;
+            return Err(container.malformed(TILE_INDEX, at, format!("offset {end}"), found));
+        }
+        end = end.saturating_add(u64::from(entry.bytes));
+        if end > chunk_bytes {
+            let expected = format!("a tile that ends by byte {chunk_bytes} of the tile chunk");
+            return Err(container.malformed(TILE_INDEX, at + 8, expected, end));
+        }
+    }
+    if end == chunk_bytes {
+        return Ok(());
+    }
+    let expected = format!("tiles that fill {chunk_bytes} bytes");
+    Err(container.malformed(TILE_INDEX, 0, expected, format!("{end} bytes of tiles")))
+}

@@ -1,0 +1,480 @@
+//! The tables of a trace as chunks: META (JSON), TEXS, SMPS, DRAW, PASS (binary).
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+use super::{Draw, Pass, PassKind, Sample, Tables, TraceMeta, UvGroup};
+use crate::container::{ChunkTag, Container, ContainerWriter};
+use crate::error::{FormatError, Result};
+use crate::parse::{self, Fault, Parsed, ensure};
+use crate::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
+use crate::view::{Eye, TILE_SIZE_PX};
+use nom::Parser;
+use nom::bytes::complete::take;
+use nom::error::context;
+use nom::multi::count;
+use nom::number::complete::{i8, le_u16, le_u32, u8};
+use std::io::{Seek, Write};
+
+/// JSON of [`TraceMeta`].
+pub const META: ChunkTag = ChunkTag(*b"META");
+/// Texture table.
+pub const TEXTURES: ChunkTag = ChunkTag(*b"TEXS");
+/// Sampler table.
+pub const SAMPLERS: ChunkTag = ChunkTag(*b"SMPS");
+/// Draw table.
+pub const DRAWS: ChunkTag = ChunkTag(*b"DRAW");
+/// Pass table.
+pub const PASSES: ChunkTag = ChunkTag(*b"PASS");
+
+/// Bytes of a texture without its name.
+pub const TEXTURE_BYTES: usize = 22;
+/// Bytes of a sampler.
+pub const SAMPLER_BYTES: usize = 5;
+/// Bytes of a draw without its name and groups.
+pub const DRAW_BYTES: usize = 12;
+/// Bytes of a uv group without its samples.
+pub const GROUP_BYTES: usize = 10;
+/// Bytes of a sample.
+pub const SAMPLE_BYTES: usize = 10;
+/// Bytes of a pass.
+pub const PASS_BYTES: usize = 24;
+
+/// Most groups a draw may have; the next number means "no group".
+pub const MAX_GROUPS: usize = super::NO_GROUP as usize;
+/// Largest width and height of a texture in texels.
+pub const MAX_TEXTURE_SIZE: u32 = 1 << 16;
+/// Most array layers of a texture.
+pub const MAX_LAYERS: u32 = 1 << 16;
+/// Id of "both eyes" in a pass.
+const NO_EYE: u8 = 255;
+
+/// Writes the table chunks.
+pub(super) fn write<W: Write + Seek>(
+    tables: &Tables,
+    container: &mut ContainerWriter<W>,
+) -> Result<()> {
+    check(tables).map_err(|broken| FormatError::Unwritable {
+        what: broken.what,
+        expected: broken.expected,
+        found: broken.found,
+    })?;
+    container.chunk(META, &meta_to_json(&tables.meta)?)?;
+    container.chunk(TEXTURES, &table(&tables.textures, write_texture)?)?;
+    container.chunk(SAMPLERS, &table(&tables.samplers, write_sampler)?)?;
+    container.chunk(DRAWS, &table(&tables.draws, write_draw)?)?;
+    container.chunk(PASSES, &table(&tables.passes, write_pass)?)
+}
+
+/// Reads and checks the table chunks.
+pub(super) fn read(container: &Container) -> Result<Tables> {
+    let json = container.chunk(META)?;
+    let meta = serde_json::from_slice(json).map_err(|error| {
+        let offset = json_offset(json, error.line(), error.column());
+        container.malformed(META, offset, "the JSON of a trace's description", error)
+    })?;
+    let tables = Tables {
+        meta,
+        textures: container.parse_chunk(TEXTURES, |input| {
+            read_table("texture count", TEXTURE_BYTES, read_texture, input)
+        })?,
+        samplers: container.parse_chunk(SAMPLERS, |input| {
+            read_table("sampler count", SAMPLER_BYTES, read_sampler, input)
+        })?,
+        draws: container.parse_chunk(DRAWS, |input| {
+            read_table("draw count", DRAW_BYTES, read_draw, input)
+        })?,
+        passes: container.parse_chunk(PASSES, |input| {
+            read_table("pass count", PASS_BYTES, read_pass, input)
+        })?,
+    };
+    check(&tables).map_err(|broken| {
+        let expected = format!("{}: {}", broken.what, broken.expected);
+        container.malformed(broken.chunk, 0, expected, broken.found)
+    })?;
+    Ok(tables)
+}
+
+fn json_offset(json: &[u8], line: usize, column: usize) -> u64 {
+    let before: usize = json
+        .split_inclusive(|byte| *byte == b'\n')
+        .take(line.saturating_sub(1))
+        .map(<[u8]>::len)
+        .sum();
+    (before + column.saturating_sub(1)) as u64
+}
+
+fn meta_to_json(meta: &TraceMeta) -> Result<Vec<u8>> {
+    let unwritable = |found: String| FormatError::Unwritable {
+        what: "trace description".to_owned(),
+        expected: "finite numbers".to_owned(),
+        found,
+    };
+    let json = serde_json::to_vec(meta).map_err(|error| unwritable(error.to_string()))?;
+    // JSON has no NaN: what does not come back must not be written.
+    match serde_json::from_slice::<TraceMeta>(&json) {
+        Ok(back) if back == *meta => Ok(json),
+        Ok(_) => Err(unwritable("numbers that change in JSON".to_owned())),
+        Err(error) => Err(unwritable(error.to_string())),
+    }
+}
+
+/// A table that breaks a rule of the format.
+struct Broken {
+    chunk: ChunkTag,
+    what: String,
+    expected: String,
+    found: String,
+}
+
+/// Checks what ties the tables together.
+fn check(tables: &Tables) -> std::result::Result<(), Broken> {
+    let broken = |chunk, what: String, expected: String, found: String| Broken {
+        chunk,
+        what,
+        expected,
+        found,
+    };
+    for (index, texture) in tables.textures.iter().enumerate() {
+        let what = || format!("texture {index} ({})", texture.name);
+        let [width, height] = texture.size;
+        if !(1..=MAX_TEXTURE_SIZE).contains(&width) || !(1..=MAX_TEXTURE_SIZE).contains(&height) {
+            let expected = format!("a size of 1 to {MAX_TEXTURE_SIZE} texels");
+            return Err(broken(
+                TEXTURES,
+                what(),
+                expected,
+                format!("{width}x{height}"),
+            ));
+        }
+        let most = width.max(height).ilog2() + 1;
+        if !(1..=most).contains(&texture.levels) {
+            let expected = format!("1 to {most} mip levels");
+            return Err(broken(
+                TEXTURES,
+                what(),
+                expected,
+                texture.levels.to_string(),
+            ));
+        }
+        if !(1..=MAX_LAYERS).contains(&texture.layers) {
+            let expected = format!("1 to {MAX_LAYERS} layers");
+            return Err(broken(
+                TEXTURES,
+                what(),
+                expected,
+                texture.layers.to_string(),
+            ));
+        }
+    }
+    for (index, draw) in tables.draws.iter().enumerate() {
+        let what = || format!("draw {index} ({})", draw.material);
+        if draw.first_primitive.checked_add(draw.primitives).is_none() {
+            let expected = "primitive numbers below 2^32".to_owned();
+            let found = format!("{} + {}", draw.first_primitive, draw.primitives);
+            return Err(broken(DRAWS, what(), expected, found));
+        }
+        if draw.groups.len() > MAX_GROUPS {
+            let expected = format!("at most {MAX_GROUPS} uv groups");
+            return Err(broken(
+                DRAWS,
+                what(),
+                expected,
+                draw.groups.len().to_string(),
+            ));
+        }
+        for (number, group) in draw.groups.iter().enumerate() {
+            let what = || format!("{} group {number}", what());
+            if group.extent.contains(&0) || group.extent.iter().any(|e| *e > MAX_TEXTURE_SIZE) {
+                let expected = format!("an extent of 1 to {MAX_TEXTURE_SIZE} texels");
+                return Err(broken(
+                    DRAWS,
+                    what(),
+                    expected,
+                    format!("{:?}", group.extent),
+                ));
+            }
+            for sample in &group.samples {
+                check_sample(tables, sample)
+                    .map_err(|(expected, found)| broken(DRAWS, what(), expected, found))?;
+            }
+        }
+    }
+    for (index, pass) in tables.passes.iter().enumerate() {
+        let tiles = pass.size_px.map(|size| size.div_ceil(TILE_SIZE_PX));
+        if pass.tiles != tiles || pass.tiles.contains(&0) {
+            let expected = format!(
+                "{tiles:?} tiles of {TILE_SIZE_PX} px for {:?} px",
+                pass.size_px
+            );
+            let found = format!("{:?}", pass.tiles);
+            return Err(broken(PASSES, format!("pass {index}"), expected, found));
+        }
+    }
+    Ok(())
+}
+
+fn check_sample(tables: &Tables, sample: &Sample) -> std::result::Result<(), (String, String)> {
+    let texture = usize::try_from(sample.texture)
+        .ok()
+        .and_then(|index| tables.textures.get(index))
+        .ok_or_else(|| {
+            let expected = format!("a texture below {}", tables.textures.len());
+            (expected, sample.texture.to_string())
+        })?;
+    if usize::from(sample.sampler) >= tables.samplers.len() {
+        let expected = format!("a sampler below {}", tables.samplers.len());
+        return Err((expected, sample.sampler.to_string()));
+    }
+    if u32::from(sample.layer) >= texture.layers {
+        let expected = format!("a layer below {}", texture.layers);
+        return Err((expected, sample.layer.to_string()));
+    }
+    Ok(())
+}
+
+fn length_u32(what: &str, length: usize) -> Result<u32> {
+    u32::try_from(length).map_err(|_| too_long(what, length))
+}
+
+fn length_u16(what: &str, length: usize) -> Result<u16> {
+    u16::try_from(length).map_err(|_| too_long(what, length))
+}
+
+fn too_long(what: &str, length: usize) -> FormatError {
+    FormatError::Unwritable {
+        what: what.to_owned(),
+        expected: "a length that fits its field".to_owned(),
+        found: length.to_string(),
+    }
+}
+
+fn table<T>(
+    items: &[T],
+    mut write_item: impl FnMut(&T, &mut Vec<u8>) -> Result<()>,
+) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    bytes.extend(length_u32("table", items.len())?.to_le_bytes());
+    for item in items {
+        write_item(item, &mut bytes)?;
+    }
+    Ok(bytes)
+}
+
+fn read_table<'a, T>(
+    what: &'static str,
+    item_bytes: usize,
+    item: impl Fn(&'a [u8]) -> Parsed<'a, T>,
+    input: &'a [u8],
+) -> Parsed<'a, Vec<T>> {
+    let (rest, items) = parse::count(what, item_bytes).parse(input)?;
+    count(item, items).parse(rest)
+}
+
+fn write_name(name: &str, bytes: &mut Vec<u8>) -> Result<()> {
+    bytes.extend(length_u16("name", name.len())?.to_le_bytes());
+    bytes.extend(name.as_bytes());
+    Ok(())
+}
+
+fn read_name(input: &[u8]) -> Parsed<'_, String> {
+    let (start, length) = context("a name's length", le_u16).parse(input)?;
+    let (rest, name) = context("a name", take(length)).parse(start)?;
+    match std::str::from_utf8(name) {
+        Ok(name) => Ok((rest, name.to_owned())),
+        Err(error) => Err(nom::Err::Failure(Fault::new(start, "a UTF-8 name", error))),
+    }
+}
+
+/// Reads a one-byte or two-byte id of an enum whose values are `all`.
+fn id<'a, N: Into<u16> + Copy, E: Copy>(
+    what: &'static str,
+    mut number: impl Parser<&'a [u8], Output = N, Error = Fault<'a>>,
+    all: &'static [(u16, E)],
+) -> impl FnMut(&'a [u8]) -> Parsed<'a, E> {
+    move |input| {
+        let (rest, found) = number.parse(input)?;
+        let found: u16 = found.into();
+        match all.iter().find(|(id, _)| *id == found) {
+            Some((_, value)) => Ok((rest, *value)),
+            None => Err(nom::Err::Failure(Fault::new(input, what, found))),
+        }
+    }
+}
+
+macro_rules! ids {
+    ($type:ident: $($value:ident),+) => {
+        &[$(($type::$value as u16, $type::$value)),+]
+    };
+}
+
+const FORMATS: &[(u16, TexelFormat)] = ids!(TexelFormat: Bc1, Bc3, Bc7, Etc2, Etc2Rgba,
+    Astc4x4, Astc5x5, Astc6x6, Astc8x8, Rgba8, R32f);
+const COLOR_SPACES: &[(u16, ColorSpace)] = ids!(ColorSpace: Linear, Srgb);
+const WRAPS: &[(u16, Wrap)] = ids!(Wrap: Repeat, MirroredRepeat, ClampToEdge);
+const FILTERS: &[(u16, Filter)] = ids!(Filter: Nearest, Linear);
+const MIP_FILTERS: &[(u16, MipFilter)] = ids!(MipFilter: None, Nearest, Linear);
+const PASS_KINDS: &[(u16, PassKind)] = ids!(PassKind: Main, Shadow);
+const EYES: &[(u16, Option<Eye>)] = &[
+    (0, Some(Eye::Left)),
+    (1, Some(Eye::Right)),
+    (NO_EYE as u16, None),
+];
+
+fn write_texture(texture: &Texture, bytes: &mut Vec<u8>) -> Result<()> {
+    for number in [
+        texture.size[0],
+        texture.size[1],
+        texture.levels,
+        texture.layers,
+    ] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend((texture.format as u16).to_le_bytes());
+    bytes.extend([texture.color_space as u8, 0]);
+    write_name(&texture.name, bytes)
+}
+
+fn read_texture(input: &[u8]) -> Parsed<'_, Texture> {
+    let (rest, (width, height, levels, layers)) = context(
+        "a texture of 22 bytes and a name",
+        (le_u32, le_u32, le_u32, le_u32),
+    )
+    .parse(input)?;
+    let (rest, format) = id("a texel format", le_u16, FORMATS)(rest)?;
+    let (rest, color_space) = id("a colour space", u8, COLOR_SPACES)(rest)?;
+    let (rest, ()) = zero(rest, 1)?;
+    let (rest, name) = read_name(rest)?;
+    let texture = Texture {
+        name,
+        size: [width, height],
+        levels,
+        layers,
+        format,
+        color_space,
+    };
+    Ok((rest, texture))
+}
+
+fn write_sampler(sampler: &Sampler, bytes: &mut Vec<u8>) -> Result<()> {
+    bytes.extend(sampler.wrap.map(|wrap| wrap as u8));
+    bytes.extend([sampler.mag as u8, sampler.min as u8, sampler.mip as u8]);
+    Ok(())
+}
+
+fn read_sampler(input: &[u8]) -> Parsed<'_, Sampler> {
+    let (rest, wrap_u) = id("a wrap mode", u8, WRAPS)(input)?;
+    let (rest, wrap_v) = id("a wrap mode", u8, WRAPS)(rest)?;
+    let (rest, mag) = id("a filter", u8, FILTERS)(rest)?;
+    let (rest, min) = id("a filter", u8, FILTERS)(rest)?;
+    let (rest, mip) = id("a mip filter", u8, MIP_FILTERS)(rest)?;
+    let wrap = [wrap_u, wrap_v];
+    Ok((
+        rest,
+        Sampler {
+            wrap,
+            mag,
+            min,
+            mip,
+        },
+    ))
+}
+
+fn write_draw(draw: &Draw, bytes: &mut Vec<u8>) -> Result<()> {
+    bytes.extend(draw.first_primitive.to_le_bytes());
+    bytes.extend(draw.primitives.to_le_bytes());
+    bytes.extend(length_u16("draw groups", draw.groups.len())?.to_le_bytes());
+    write_name(&draw.material, bytes)?;
+    for group in &draw.groups {
+        bytes.extend(group.extent.iter().flat_map(|extent| extent.to_le_bytes()));
+        bytes.extend(length_u16("group samples", group.samples.len())?.to_le_bytes());
+        for sample in &group.samples {
+            bytes.extend(sample.texture.to_le_bytes());
+            bytes.extend(sample.sampler.to_le_bytes());
+            bytes.extend(sample.layer.to_le_bytes());
+            bytes.extend(sample.offset.iter().flat_map(|offset| offset.to_le_bytes()));
+        }
+    }
+    Ok(())
+}
+
+fn read_draw(input: &[u8]) -> Parsed<'_, Draw> {
+    let (rest, (first_primitive, primitives, groups)) = context(
+        "a draw of 12 bytes, a name and groups",
+        (le_u32, le_u32, le_u16),
+    )
+    .parse(input)?;
+    let (rest, material) = read_name(rest)?;
+    let (rest, groups) = count(read_group, usize::from(groups)).parse(rest)?;
+    let draw = Draw {
+        material,
+        first_primitive,
+        primitives,
+        groups,
+    };
+    Ok((rest, draw))
+}
+
+fn read_group(input: &[u8]) -> Parsed<'_, UvGroup> {
+    let (rest, (width, height, samples)) = context(
+        "a uv group of 10 bytes and samples",
+        (le_u32, le_u32, le_u16),
+    )
+    .parse(input)?;
+    let (rest, samples) = count(read_sample, usize::from(samples)).parse(rest)?;
+    let extent = [width, height];
+    Ok((rest, UvGroup { extent, samples }))
+}
+
+fn read_sample(input: &[u8]) -> Parsed<'_, Sample> {
+    let (rest, (texture, sampler, layer, x, y)) =
+        context("a sample of 10 bytes", (le_u32, le_u16, le_u16, i8, i8)).parse(input)?;
+    let sample = Sample {
+        texture,
+        sampler,
+        layer,
+        offset: [x, y],
+    };
+    Ok((rest, sample))
+}
+
+fn write_pass(pass: &Pass, bytes: &mut Vec<u8>) -> Result<()> {
+    let eye = match pass.eye {
+        Some(Eye::Left) => 0,
+        Some(Eye::Right) => 1,
+        None => NO_EYE,
+    };
+    bytes.extend(pass.frame.to_le_bytes());
+    bytes.extend([pass.kind as u8, eye, 0, 0]);
+    for number in [pass.size_px, pass.tiles].as_flattened() {
+        bytes.extend(number.to_le_bytes());
+    }
+    Ok(())
+}
+
+fn read_pass(input: &[u8]) -> Parsed<'_, Pass> {
+    let (rest, frame) = context("a pass of 24 bytes", le_u32).parse(input)?;
+    let (rest, kind) = id("a pass kind", u8, PASS_KINDS)(rest)?;
+    let (rest, eye) = id("an eye (0, 1 or 255)", u8, EYES)(rest)?;
+    let (rest, ()) = zero(rest, 2)?;
+    let (rest, (width, height, columns, rows)) = (le_u32, le_u32, le_u32, le_u32).parse(rest)?;
+    let pass = Pass {
+        frame,
+        kind,
+        eye,
+        size_px: [width, height],
+        tiles: [columns, rows],
+    };
+    Ok((rest, pass))
+}
+
+/// Reserved bytes, which must be zero so that a later version can give them a meaning.
+fn zero(input: &[u8], bytes: usize) -> Parsed<'_, ()> {
+    let (rest, reserved) = context("reserved bytes", take(bytes)).parse(input)?;
+    let all_zero = reserved.iter().all(|byte| *byte == 0);
+    ensure(
+        input,
+        all_zero,
+        || "zero in reserved bytes".to_owned(),
+        format_args!("{reserved:02x?}"),
+    )?;
+    Ok((rest, ()))
+}

@@ -1,0 +1,187 @@
+//! Writing a `.textrace`.
+
+use super::index::IndexEntry;
+use super::{Encoding, Pass, Tables, Tile, invariant, raw, tables};
+use crate::container::{AtomicFile, ContainerWriter, Kind};
+use crate::error::{FormatError, Result};
+use std::io::{Cursor, Seek, Write};
+use std::path::Path;
+
+/// A tile's bytes, ready to be appended.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct EncodedTile {
+    pub(super) encoding: Encoding,
+    pub(super) records: u32,
+    pub(super) runs: u32,
+    pub(super) crc32: u32,
+    pub(super) bytes: Vec<u8>,
+}
+
+impl EncodedTile {
+    /// Encoded size.
+    #[must_use]
+    pub fn size_bytes(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+/// Encodes a tile in the default encoding. Pure, so that tiles can be encoded in parallel.
+///
+/// # Errors
+/// When the tile breaks an invariant of the format.
+pub fn encode_tile(tables: &Tables, tile: &Tile) -> Result<EncodedTile> {
+    encode_tile_as(Encoding::default(), tables, tile)
+}
+
+/// Encodes a tile in a chosen encoding.
+///
+/// # Errors
+/// When the tile breaks an invariant of the format.
+pub fn encode_tile_as(encoding: Encoding, tables: &Tables, tile: &Tile) -> Result<EncodedTile> {
+    invariant::check(&tables.draws, tile).map_err(|broken| FormatError::Unwritable {
+        what: format!("tile {}", broken.what),
+        expected: broken.expected,
+        found: broken.found,
+    })?;
+    if tile.records.is_empty() {
+        return Ok(EncodedTile::default());
+    }
+    let bytes = match encoding {
+        Encoding::Raw => raw::encode(tile),
+    };
+    let too_many = |_| FormatError::Unwritable {
+        what: "tile".to_owned(),
+        expected: "less than 2^32 bytes".to_owned(),
+        found: format!("{} records in {} bytes", tile.records.len(), bytes.len()),
+    };
+    u32::try_from(bytes.len()).map_err(too_many)?;
+    Ok(EncodedTile {
+        encoding,
+        records: u32::try_from(tile.records.len()).map_err(too_many)?,
+        runs: u32::try_from(tile.runs.len()).map_err(too_many)?,
+        crc32: crc32fast::hash(&bytes),
+        bytes,
+    })
+}
+
+/// Writes a trace: tables first, then tiles in ascending order of pass and tile.
+#[derive(Debug)]
+pub struct TextraceWriter<W = AtomicFile> {
+    container: ContainerWriter<W>,
+    tables: Tables,
+    index: Vec<IndexEntry>,
+    /// Index slot that the next tile may take at the earliest.
+    next_slot: usize,
+    tile_bytes: u64,
+}
+
+impl TextraceWriter<AtomicFile> {
+    /// Starts a trace that [`Self::finish`] renames to `path`.
+    ///
+    /// # Errors
+    /// When the tables break a rule of the format or the file cannot be written.
+    pub fn create(path: &Path, tables: &Tables) -> Result<Self> {
+        Self::start(ContainerWriter::create(path, Kind::Textrace)?, tables)
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// When writing fails; no file is left then.
+    pub fn finish(self) -> Result<()> {
+        self.seal()?.finish()
+    }
+}
+
+impl TextraceWriter<Cursor<Vec<u8>>> {
+    /// Starts a trace in memory.
+    ///
+    /// # Errors
+    /// When the tables break a rule of the format.
+    pub fn in_memory(tables: &Tables) -> Result<Self> {
+        Self::start(ContainerWriter::in_memory(Kind::Textrace)?, tables)
+    }
+
+    /// Completes the trace.
+    ///
+    /// # Errors
+    /// As [`Self::in_memory`].
+    pub fn into_bytes(self) -> Result<Vec<u8>> {
+        self.seal()?.into_bytes()
+    }
+}
+
+impl<W: Write + Seek> TextraceWriter<W> {
+    fn start(mut container: ContainerWriter<W>, tables: &Tables) -> Result<Self> {
+        tables::write(tables, &mut container)?;
+        container.begin_chunk(super::TILES)?;
+        let slots: u64 = tables.passes.iter().map(Pass::tile_count_u64).sum();
+        let too_many = |_| FormatError::Unwritable {
+            what: "tile index".to_owned(),
+            expected: "a number of tiles that fits in memory".to_owned(),
+            found: slots.to_string(),
+        };
+        Ok(Self {
+            container,
+            tables: tables.clone(),
+            index: vec![IndexEntry::default(); usize::try_from(slots).map_err(too_many)?],
+            next_slot: 0,
+            tile_bytes: 0,
+        })
+    }
+
+    /// Encodes and appends one tile.
+    ///
+    /// # Errors
+    /// When the tile breaks an invariant, is out of order, or cannot be written.
+    pub fn write_tile(&mut self, pass: usize, tile_index: usize, tile: &Tile) -> Result<()> {
+        let encoded = encode_tile(&self.tables, tile)?;
+        self.append(pass, tile_index, encoded)
+    }
+
+    /// Appends an encoded tile. Tiles come in ascending order of pass and tile; tiles that
+    /// nothing touched may be left out.
+    ///
+    /// # Errors
+    /// When there is no such tile, it is out of order, or it cannot be written.
+    pub fn append(&mut self, pass: usize, tile_index: usize, tile: EncodedTile) -> Result<()> {
+        let unwritable = |expected: String| FormatError::Unwritable {
+            what: format!("tile {tile_index} of pass {pass}"),
+            expected,
+            found: "it".to_owned(),
+        };
+        let passes = &self.tables.passes;
+        let tiles = passes.get(pass).map_or(0, Pass::tile_count_u64);
+        if tile_index as u64 >= tiles {
+            return Err(unwritable(format!("one of {tiles} tiles")));
+        }
+        let before: u64 = passes.iter().take(pass).map(Pass::tile_count_u64).sum();
+        let slot = usize::try_from(before).unwrap_or(usize::MAX) + tile_index;
+        if slot < self.next_slot {
+            return Err(unwritable("tiles in ascending order".to_owned()));
+        }
+        self.next_slot = slot + 1;
+        if tile.records == 0 {
+            return Ok(());
+        }
+        self.index[slot] = IndexEntry {
+            offset: self.tile_bytes,
+            bytes: tile.bytes.len() as u32,
+            crc32: tile.crc32,
+            records: tile.records,
+            runs: tile.runs,
+            encoding: tile.encoding,
+        };
+        self.tile_bytes += tile.bytes.len() as u64;
+        self.container.append(&tile.bytes)
+    }
+
+    fn seal(mut self) -> Result<ContainerWriter<W>> {
+        let mut bytes = Vec::with_capacity(self.index.len() * super::INDEX_ENTRY_BYTES);
+        for entry in &self.index {
+            entry.write(&mut bytes);
+        }
+        self.container.chunk(super::TILE_INDEX, &bytes)?;
+        Ok(self.container)
+    }
+}

@@ -1,0 +1,488 @@
+//! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
+
+use crate::size::{format_bytes, serde_bytes};
+use formats::texture::TexelFormat;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// How time passes in a replay.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// The cycle model of the texture unit decides how the cores' accesses interleave.
+    #[default]
+    Timed,
+    /// Without latencies: a footprint is a unit of time, and a miss fills at once.
+    Functional,
+}
+
+/// Tile orders.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum OrderKind {
+    /// Rows from left to right.
+    Scanline,
+    /// Rows, every other one from right to left.
+    ZigZag,
+    /// Z-order curve: the paper's baseline.
+    #[default]
+    Morton,
+    /// Hilbert curve.
+    Hilbert,
+    /// Morton, left and right tile in turn.
+    Z2Lrta,
+    /// Morton, both tiles on one core, their triangles in turn.
+    Z2Sta,
+    /// As `Z2Sta`, the triangle lists merged by primitive number.
+    Z2StaMerge,
+    /// Shuffled tiles: the control.
+    Random,
+}
+
+impl OrderKind {
+    /// Every order, in the order of the tables.
+    pub const ALL: [Self; 8] = [
+        Self::Scanline,
+        Self::ZigZag,
+        Self::Morton,
+        Self::Hilbert,
+        Self::Z2Lrta,
+        Self::Z2Sta,
+        Self::Z2StaMerge,
+        Self::Random,
+    ];
+
+    /// Name as in configurations and tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scanline => "scanline",
+            Self::ZigZag => "zig-zag",
+            Self::Morton => "morton",
+            Self::Hilbert => "hilbert",
+            Self::Z2Lrta => "z2-lrta",
+            Self::Z2Sta => "z2-sta",
+            Self::Z2StaMerge => "z2-sta-merge",
+            Self::Random => "random",
+        }
+    }
+}
+
+/// How work items are given to cores.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Assign {
+    /// The next item goes to the core that becomes idle first.
+    #[default]
+    FirstIdle,
+    /// Round robin (with LRTA and two cores: left tiles on core 0, right tiles on core 1).
+    Static,
+}
+
+/// Replacement policies.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Replacement {
+    /// Least recently used.
+    #[default]
+    Lru,
+    /// First in, first out.
+    Fifo,
+    /// Tree pseudo-LRU.
+    TreePlru,
+    /// Seeded random.
+    Random,
+}
+
+/// Geometry of one cache level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CacheConfig {
+    /// Capacity in bytes.
+    #[serde(with = "serde_bytes")]
+    pub size_bytes: u64,
+    /// Associativity.
+    #[serde(default = "CacheConfig::default_ways")]
+    pub ways: u32,
+    /// Replacement policy.
+    #[serde(default)]
+    pub replacement: Replacement,
+}
+
+impl CacheConfig {
+    const fn default_ways() -> u32 {
+        4
+    }
+
+    /// A four-way LRU cache of this size.
+    #[must_use]
+    pub const fn lru(size_bytes: u64) -> Self {
+        Self {
+            size_bytes,
+            ways: Self::default_ways(),
+            replacement: Replacement::Lru,
+        }
+    }
+
+    /// Number of sets for this line size.
+    ///
+    /// # Errors
+    /// The sets must be a power of two, the ways 1 to 255.
+    pub fn sets(&self, level: &'static str, line_bytes: u32) -> Result<u32, ConfigError> {
+        if self.ways == 0 || self.ways > 255 {
+            return Err(ConfigError::Ways {
+                level,
+                found: self.ways,
+            });
+        }
+        let bytes_per_set = u64::from(self.ways) * u64::from(line_bytes);
+        let sets = self.size_bytes / bytes_per_set;
+        if self.size_bytes % bytes_per_set != 0 || !sets.is_power_of_two() || sets > 1 << 24 {
+            return Err(ConfigError::Sets {
+                level,
+                size: format_bytes(self.size_bytes),
+                ways: self.ways,
+                line_bytes,
+                found: self.size_bytes as f64 / bytes_per_set as f64,
+            });
+        }
+        Ok(sets as u32)
+    }
+}
+
+/// Filter used at replay.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum FilterOverride {
+    /// Each sample's own sampler.
+    #[default]
+    AsRecorded,
+    /// Linear within a level, linear between levels.
+    Trilinear,
+    /// Linear within the nearest level.
+    Bilinear,
+    /// One texel of the nearest level.
+    Nearest,
+}
+
+/// How the level of detail is computed from the derivatives.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum LodFormula {
+    /// `fastlog2(max(|dx|^2, |dy|^2)) / 2`, as llvmpipe.
+    #[default]
+    Llvmpipe,
+    /// `log2(max(max(|dudx|, |dudy|) * width, max(|dvdx|, |dvdy|) * height))`, as softpipe.
+    Softpipe,
+    /// As llvmpipe with the exact logarithm.
+    Exact,
+}
+
+/// What a recorded quad fetches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SamplingConfig {
+    /// Filter.
+    pub filter: FilterOverride,
+    /// Added to the level of detail.
+    pub lod_bias: f32,
+    /// Level-of-detail formula.
+    pub lod: LodFormula,
+    /// Helper lanes (of partly covered quads) fetch, too.
+    pub helper_lanes: bool,
+}
+
+/// Order of the blocks of a level in memory.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum BlockOrder {
+    /// Row by row.
+    #[default]
+    Linear,
+    /// Z-order curve.
+    Morton,
+    /// Small square tiles of blocks, row by row within and between.
+    Tiled,
+}
+
+/// Where texels lie in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LayoutConfig {
+    /// Format of the colour textures; `None` keeps the captured one (shadow maps always do).
+    pub texel_format: Option<TexelFormat>,
+    /// Block order within a level.
+    pub block_order: BlockOrder,
+    /// Alignment of a texture's first byte, a power of two.
+    #[serde(with = "serde_bytes")]
+    pub base_align_bytes: u64,
+}
+
+impl Default for LayoutConfig {
+    fn default() -> Self {
+        Self {
+            texel_format: None,
+            block_order: BlockOrder::Linear,
+            base_align_bytes: 256,
+        }
+    }
+}
+
+/// The texture unit's pipeline ("looping for the next chance"); see `docs/tmu-model.md`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TmuConfig {
+    /// Cycles from an L1 miss that hits the L2 until the line is in the L1.
+    pub l1_penalty_cycles: u32,
+    /// Cycles that an L2 miss takes, in addition.
+    pub l2_penalty_cycles: u32,
+    /// Pipeline length: a thread that missed is back at the first stage after this many cycles.
+    pub loop_cycles: u32,
+    /// Threads (quads) that a core holds at once.
+    pub threads: u32,
+    /// Footprints whose tags are checked in one cycle ahead of filtering: a trip that fails costs
+    /// the thread's footprints over this, rounded up.
+    pub probe_footprints: u32,
+}
+
+impl Default for TmuConfig {
+    fn default() -> Self {
+        Self {
+            l1_penalty_cycles: 20,
+            l2_penalty_cycles: 200,
+            loop_cycles: 36,
+            threads: 32,
+            probe_footprints: 8,
+        }
+    }
+}
+
+/// Everything that decides the result of a replay of a given trace.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RunConfig {
+    /// Timed or functional.
+    pub mode: Mode,
+    /// Tile order.
+    pub order: OrderKind,
+    /// Seed of the random order and of random replacement.
+    pub seed: u64,
+    /// Shader cores, each with its own L1 and texture unit.
+    pub cores: u32,
+    /// Assignment of tiles to cores.
+    pub assign: Assign,
+    /// Line size of both levels in bytes, a power of two.
+    pub line_bytes: u32,
+    /// First level, one a core.
+    pub l1: CacheConfig,
+    /// Second level, shared.
+    pub l2: CacheConfig,
+    /// Filter and level of detail.
+    pub sampling: SamplingConfig,
+    /// Memory layout of the textures.
+    pub layout: LayoutConfig,
+    /// Texture unit.
+    pub tmu: TmuConfig,
+    /// Also count by tile.
+    pub tile_maps: bool,
+}
+
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Timed,
+            order: OrderKind::Morton,
+            seed: 1,
+            cores: 2,
+            assign: Assign::FirstIdle,
+            line_bytes: 16,
+            l1: CacheConfig::lru(8 << 10),
+            l2: CacheConfig::lru(128 << 10),
+            sampling: SamplingConfig::default(),
+            layout: LayoutConfig::default(),
+            tmu: TmuConfig::default(),
+            tile_maps: false,
+        }
+    }
+}
+
+/// A configuration that no machine can have.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ConfigError {
+    /// Sets are not a power of two.
+    #[error(
+        "{level} cache of {size}, {ways} ways, {line_bytes}-byte lines: expected a power-of-two number of sets, found {found}"
+    )]
+    Sets {
+        /// `L1` or `L2`.
+        level: &'static str,
+        /// Size as text.
+        size: String,
+        /// Ways.
+        ways: u32,
+        /// Line size.
+        line_bytes: u32,
+        /// Size over ways and line size.
+        found: f64,
+    },
+    /// Ways out of range.
+    #[error("{level} cache: expected 1 to 255 ways, found {found}")]
+    Ways {
+        /// `L1` or `L2`.
+        level: &'static str,
+        /// Ways.
+        found: u32,
+    },
+    /// A number out of range.
+    #[error("{key}: expected {expected}, found {found}")]
+    Range {
+        /// Key as in the configuration file.
+        key: &'static str,
+        /// What is accepted.
+        expected: &'static str,
+        /// What was given.
+        found: String,
+    },
+}
+
+impl RunConfig {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first value that is out of range.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        let range = |ok: bool, key, expected, found: String| {
+            if ok {
+                Ok(())
+            } else {
+                Err(ConfigError::Range {
+                    key,
+                    expected,
+                    found,
+                })
+            }
+        };
+        range(
+            self.line_bytes.is_power_of_two() && (4..=4096).contains(&self.line_bytes),
+            "line_bytes",
+            "a power of two from 4 to 4096",
+            self.line_bytes.to_string(),
+        )?;
+        range(
+            (1..=64).contains(&self.cores),
+            "cores",
+            "1 to 64",
+            self.cores.to_string(),
+        )?;
+        range(
+            self.layout.base_align_bytes.is_power_of_two()
+                && self.layout.base_align_bytes <= 1 << 24,
+            "layout.base_align_bytes",
+            "a power of two up to 16 MiB",
+            self.layout.base_align_bytes.to_string(),
+        )?;
+        range(
+            self.sampling.lod_bias.is_finite() && self.sampling.lod_bias.abs() <= 16.0,
+            "sampling.lod_bias",
+            "-16 to 16",
+            self.sampling.lod_bias.to_string(),
+        )?;
+        let tmu = &self.tmu;
+        range(
+            (1..=4096).contains(&tmu.threads),
+            "tmu.threads",
+            "1 to 4096",
+            tmu.threads.to_string(),
+        )?;
+        range(
+            (1..=100_000).contains(&tmu.loop_cycles),
+            "tmu.loop_cycles",
+            "1 to 100000",
+            tmu.loop_cycles.to_string(),
+        )?;
+        range(
+            (1..=4096).contains(&tmu.probe_footprints),
+            "tmu.probe_footprints",
+            "1 to 4096",
+            tmu.probe_footprints.to_string(),
+        )?;
+        for (key, cycles) in [
+            ("tmu.l1_penalty_cycles", tmu.l1_penalty_cycles),
+            ("tmu.l2_penalty_cycles", tmu.l2_penalty_cycles),
+        ] {
+            range(cycles <= 100_000, key, "0 to 100000", cycles.to_string())?;
+        }
+        self.l1.sets("L1", self.line_bytes)?;
+        self.l2.sets("L2", self.line_bytes)?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_the_papers_machine_and_valid() {
+        let config = RunConfig::default();
+        config.validate().unwrap();
+        assert_eq!(config.l1.sets("L1", config.line_bytes), Ok(128));
+        assert_eq!(config.l2.sets("L2", config.line_bytes), Ok(2048));
+    }
+
+    #[test]
+    fn sets_that_are_no_power_of_two_are_named() {
+        let config = RunConfig {
+            l1: CacheConfig::lru(6 << 10),
+            ..RunConfig::default()
+        };
+        assert_eq!(
+            config.validate().unwrap_err().to_string(),
+            "L1 cache of 6 KiB, 4 ways, 16-byte lines: expected a power-of-two number of sets, found 96"
+        );
+    }
+
+    #[test]
+    fn toml_takes_sizes_with_units_and_refuses_unknown_keys() {
+        let config: RunConfig =
+            toml::from_str("order = \"z2-sta\"\n[l1]\nsize_bytes = \"16KiB\"\n").unwrap();
+        assert_eq!(config.l1, CacheConfig::lru(16 << 10));
+        assert_eq!(config.order, OrderKind::Z2Sta);
+        let error = toml::from_str::<RunConfig>("l3 = 1")
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("unknown field `l3`"), "{error}");
+    }
+
+    #[test]
+    fn a_printed_configuration_reads_back_the_same() {
+        let config = RunConfig {
+            order: OrderKind::Z2StaMerge,
+            seed: 9,
+            ..RunConfig::default()
+        };
+        let text = toml::to_string(&config).unwrap();
+        assert_eq!(toml::from_str::<RunConfig>(&text).unwrap(), config);
+    }
+
+    #[test]
+    fn an_orders_name_is_its_serialised_form() {
+        for order in OrderKind::ALL {
+            assert_eq!(serde_json::to_value(order).unwrap(), order.name());
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Grouped bars with optional reference marks (a paper's values) over them.
+
+use super::{
+    Anchor, PlotError, Scale, SeriesStyle, draw, fill, heading, horizontal_grid, stroke, text, wrap,
+};
+use crate::report::theme;
+
+/// One group of bars: a scene, a cache configuration.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BarGroup {
+    /// Name under the bars.
+    pub label: String,
+    /// One value a series; `None` leaves the place empty.
+    pub values: Vec<Option<f64>>,
+    /// One reference mark a series, in the values' unit.
+    pub marks: Vec<Option<f64>>,
+}
+
+/// A grouped bar chart. Values start at zero.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BarChart {
+    /// Heading.
+    pub title: String,
+    /// What the bars show, with its unit: `external traffic, MB per frame`.
+    pub value_label: String,
+    /// What the groups are, with the unit where they have one.
+    pub group_label: String,
+    /// Series in drawing order.
+    pub series: Vec<SeriesStyle>,
+    /// Groups from left to right.
+    pub groups: Vec<BarGroup>,
+    /// What the marks are; `None` when there are none.
+    pub mark_name: Option<String>,
+    /// Draws a line at this value (1.0 for ratios).
+    pub reference: Option<f64>,
+    /// Decimals of the values written over the bars; `None` writes none.
+    pub decimals: Option<usize>,
+}
+
+const LEFT_PX: f64 = 58.0;
+const TOP_PX: f64 = 72.0;
+const PLOT_HEIGHT_PX: f64 = 210.0;
+const RIGHT_PX: f64 = 14.0;
+
+impl BarChart {
+    /// The chart as SVG.
+    ///
+    /// # Errors
+    /// A value that is not finite or negative, or a group whose values do not match the series.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        let fail = |problem: String| PlotError {
+            title: self.title.clone(),
+            problem,
+        };
+        for group in &self.groups {
+            if group.values.len() != self.series.len() {
+                return Err(fail(format!(
+                    "group `{}` has {} values for {} series",
+                    group.label,
+                    group.values.len(),
+                    self.series.len()
+                )));
+            }
+            if let Some(bad) = group
+                .values
+                .iter()
+                .chain(&group.marks)
+                .flatten()
+                .find(|v| !(v.is_finite() && **v >= 0.0))
+            {
+                return Err(fail(format!("group `{}` holds {bad}", group.label)));
+            }
+        }
+
+        let per_group = self.series.len().max(1) as f64;
+        let bar_px = self.bar_width_px();
+        let gap_px = (bar_px * 0.8).max(14.0);
+        let group_px = bar_px * per_group + gap_px;
+        let plot_width = (group_px * self.groups.len() as f64).max(320.0);
+        let group_px = plot_width / self.groups.len().max(1) as f64;
+        let label_lines = self
+            .groups
+            .iter()
+            .map(|g| wrap(&g.label, group_px - 6.0, theme::LABEL_PX).len())
+            .max()
+            .unwrap_or(1);
+        let legend_width: f64 = self.legend_width_px() + LEFT_PX + RIGHT_PX;
+        let heading_width = theme::text_width_px(&self.title, theme::TITLE_PX)
+            .max(theme::text_width_px(&self.value_label, theme::LABEL_PX))
+            + 16.0;
+        let width = (LEFT_PX + plot_width + RIGHT_PX)
+            .max(legend_width)
+            .max(heading_width);
+        let bottom = TOP_PX + PLOT_HEIGHT_PX;
+        let axis_title = if self.group_label.is_empty() {
+            0.0
+        } else {
+            18.0
+        };
+        let height = bottom + 10.0 + 15.0 * label_lines as f64 + axis_title;
+
+        let top_value = self
+            .groups
+            .iter()
+            .flat_map(|g| g.values.iter().chain(&g.marks).flatten().copied())
+            .chain(self.reference)
+            .fold(0.0, f64::max);
+        let top_value = if top_value > 0.0 { top_value } else { 1.0 };
+        let step = theme::nice_step(top_value * 1.02, 5);
+        let high = (top_value * 1.02 / step).ceil() * step;
+        let scale = Scale::linear(0.0, high, bottom, TOP_PX);
+        let at: Vec<(f64, String)> = theme::ticks(0.0, high, step)
+            .into_iter()
+            .map(|v| (v, theme::tick_label(v, step)))
+            .collect();
+
+        draw(
+            &self.title,
+            (width.ceil() as u32, height.ceil() as u32),
+            |area| {
+                heading(area, &self.title, &self.value_label)?;
+                self.legend(area)?;
+                horizontal_grid(
+                    area,
+                    &scale,
+                    &at,
+                    (LEFT_PX, LEFT_PX + plot_width),
+                    Some(0.0),
+                )?;
+                for (g, group) in self.groups.iter().enumerate() {
+                    let centre = LEFT_PX + group_px * (g as f64 + 0.5);
+                    let first = centre - bar_px * per_group / 2.0;
+                    for (s, (value, style)) in group.values.iter().zip(&self.series).enumerate() {
+                        let x = first + bar_px * s as f64;
+                        let Some(value) = *value else { continue };
+                        fill(
+                            area,
+                            (x + 1.0, scale.at(value)),
+                            (x + bar_px - 1.0, bottom),
+                            style.color,
+                        )?;
+                        let mark = group.marks.get(s).copied().flatten();
+                        if let Some(mark) = mark {
+                            let y = scale.at(mark);
+                            stroke(
+                                area,
+                                &[(x - 1.0, y), (x + bar_px, y)],
+                                theme::INK,
+                                theme::LINE_PX,
+                            )?;
+                        }
+                        if let Some(decimals) = self.decimals {
+                            let label = format!("{value:.decimals$}");
+                            let mut y = scale.at(value) - 8.0;
+                            // A mark just above the bar would strike the number through.
+                            if let Some(mark_y) = mark.map(|m| scale.at(m))
+                                && (mark_y - y).abs() < 8.0
+                            {
+                                y = mark_y.min(scale.at(value)) - 8.0;
+                            }
+                            text(
+                                area,
+                                (x + bar_px / 2.0, y),
+                                &label,
+                                theme::TICK_PX,
+                                theme::INK,
+                                Anchor::Middle,
+                            )?;
+                        }
+                    }
+                    for (i, line) in wrap(&group.label, group_px - 6.0, theme::LABEL_PX)
+                        .iter()
+                        .enumerate()
+                    {
+                        let y = bottom + 14.0 + 15.0 * i as f64;
+                        text(
+                            area,
+                            (centre, y),
+                            line,
+                            theme::LABEL_PX,
+                            theme::INK,
+                            Anchor::Middle,
+                        )?;
+                    }
+                }
+                if let Some(reference) = self.reference {
+                    let y = scale.at(reference);
+                    stroke(
+                        area,
+                        &[(LEFT_PX, y), (LEFT_PX + plot_width, y)],
+                        theme::AXIS,
+                        1,
+                    )?;
+                }
+                if !self.group_label.is_empty() {
+                    let at = (LEFT_PX + plot_width / 2.0, height - 9.0);
+                    text(
+                        area,
+                        at,
+                        &self.group_label,
+                        theme::LABEL_PX,
+                        theme::MUTED,
+                        Anchor::Middle,
+                    )?;
+                }
+                Ok(())
+            },
+        )
+    }
+
+    /// Wide enough that the numbers over neighbouring bars do not touch.
+    fn bar_width_px(&self) -> f64 {
+        let Some(decimals) = self.decimals else {
+            return 22.0;
+        };
+        let widest = self
+            .groups
+            .iter()
+            .flat_map(|g| g.values.iter().flatten())
+            .map(|v| theme::text_width_px(&format!("{v:.decimals$}"), theme::TICK_PX))
+            .fold(0.0, f64::max);
+        (widest + 5.0).max(22.0)
+    }
+
+    fn legend_entries(&self) -> impl Iterator<Item = (&str, Option<plotters::style::RGBColor>)> {
+        self.series
+            .iter()
+            .map(|s| (s.name.as_str(), Some(s.color)))
+            .chain(self.mark_name.as_deref().map(|name| (name, None)))
+    }
+
+    fn legend_width_px(&self) -> f64 {
+        self.legend_entries()
+            .map(|(name, _)| 34.0 + theme::text_width_px(name, theme::LABEL_PX))
+            .sum()
+    }
+
+    /// Names in a row under the heading: bars have no end to write a name at.
+    fn legend(&self, area: &super::Area) -> Result<(), String> {
+        let mut x = LEFT_PX;
+        let y = 53.0;
+        for (name, color) in self.legend_entries() {
+            match color {
+                Some(color) => fill(area, (x, y - 5.0), (x + 12.0, y + 5.0), color)?,
+                None => stroke(area, &[(x, y), (x + 12.0, y)], theme::INK, theme::LINE_PX)?,
+            }
+            text(
+                area,
+                (x + 17.0, y),
+                name,
+                theme::LABEL_PX,
+                theme::INK,
+                Anchor::Start,
+            )?;
+            x += 34.0 + theme::text_width_px(name, theme::LABEL_PX);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart() -> BarChart {
+        BarChart {
+            title: "Crytek".into(),
+            value_label: "external traffic, MB per frame".into(),
+            group_label: "L1/L2, KiB".into(),
+            series: vec![SeriesStyle::nth("Morton", 0), SeriesStyle::nth("Z2 STA", 2)],
+            groups: vec![BarGroup {
+                label: "8/128".into(),
+                values: vec![Some(12.5), Some(8.25)],
+                marks: vec![None, Some(9.0)],
+            }],
+            mark_name: Some("paper".into()),
+            reference: None,
+            decimals: Some(1),
+        }
+    }
+
+    #[test]
+    fn the_same_numbers_give_the_same_bytes() {
+        assert_eq!(chart().svg().unwrap(), chart().svg().unwrap());
+    }
+
+    #[test]
+    fn the_value_label_with_its_unit_is_drawn() {
+        let svg = chart().svg().unwrap();
+        assert!(svg.contains("external traffic, MB per frame"));
+        assert!(svg.contains("L1/L2, KiB"));
+    }
+
+    #[test]
+    fn a_value_that_is_not_a_number_is_refused() {
+        let mut bad = chart();
+        bad.groups[0].values[0] = Some(f64::NAN);
+        assert_eq!(
+            bad.svg().unwrap_err().to_string(),
+            "plot `Crytek`: group `8/128` holds NaN"
+        );
+    }
+
+    #[test]
+    fn bars_are_as_wide_as_their_numbers() {
+        let mut wide = chart();
+        wide.groups[0].values[0] = Some(123_456.7);
+        assert!(wide.bar_width_px() > theme::text_width_px("123456.7", theme::TICK_PX));
+    }
+}

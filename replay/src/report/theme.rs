@@ -1,0 +1,223 @@
+//! The one look of every plot: colours, type, strokes, and where labels may stand.
+//!
+//! Colours are Okabe and Ito's ("Color Universal Design", 2008), which stay apart under the common
+//! kinds of colour blindness. Inks and grid are sentinel colours that the page's style sheet maps
+//! to a dark scheme (see `html/style.css`), so one SVG serves both.
+
+use plotters::style::RGBColor;
+
+/// A sequence of series colours; index 7 is the neutral one.
+pub const SERIES: [RGBColor; 8] = [
+    RGBColor(0xE6, 0x9F, 0x00), // orange
+    RGBColor(0x56, 0xB4, 0xE9), // sky blue
+    RGBColor(0x00, 0x72, 0xB2), // blue
+    RGBColor(0x00, 0x9E, 0x73), // bluish green
+    RGBColor(0xD5, 0x5E, 0x00), // vermilion
+    RGBColor(0xCC, 0x79, 0xA7), // reddish purple
+    RGBColor(0xC9, 0xB8, 0x1A), // yellow, darkened to be seen on white
+    RGBColor(0x80, 0x86, 0x8E), // grey
+];
+
+/// Text.
+pub const INK: RGBColor = RGBColor(0x1F, 0x23, 0x28);
+/// Secondary text: tick labels, notes.
+pub const MUTED: RGBColor = RGBColor(0x5B, 0x63, 0x6C);
+/// Horizontal grid lines.
+pub const GRID: RGBColor = RGBColor(0xDD, 0xE1, 0xE6);
+/// The zero line and frames.
+pub const AXIS: RGBColor = RGBColor(0x9A, 0xA2, 0xAB);
+
+/// System font stack; nothing is fetched or embedded.
+pub const FONT: &str = "system-ui, sans-serif";
+/// Plot titles, px.
+pub const TITLE_PX: u32 = 15;
+/// Axis and series labels, px.
+pub const LABEL_PX: u32 = 12;
+/// Tick labels and value labels, px.
+pub const TICK_PX: u32 = 11;
+/// Series strokes, px.
+pub const LINE_PX: u32 = 2;
+
+/// Colour of a tile order, the same in every plot.
+#[must_use]
+pub fn order_color(order: &str) -> RGBColor {
+    match order {
+        "morton" => SERIES[0],
+        "z2-lrta" => SERIES[1],
+        "z2-sta" => SERIES[2],
+        "z2-sta-merge" => SERIES[3],
+        "scanline" => SERIES[4],
+        "zig-zag" => SERIES[5],
+        "hilbert" => SERIES[6],
+        _ => SERIES[7],
+    }
+}
+
+/// Width in pixels that `text` takes at `size_px`, a little on the safe side.
+///
+/// The viewer's font is not known here; these advance widths bound the common system faces.
+#[must_use]
+pub fn text_width_px(text: &str, size_px: u32) -> f64 {
+    let em: f64 = text
+        .chars()
+        .map(|c| match c {
+            'i' | 'j' | 'l' | '\'' | '|' | '.' | ',' | ':' | ';' | '!' => 0.30,
+            'f' | 't' | 'r' | ' ' | '(' | ')' | '[' | ']' | '/' | '-' | 'I' => 0.38,
+            'm' | 'w' | 'M' | 'W' | '%' | '@' => 0.90,
+            'A'..='Z' => 0.70,
+            _ => 0.58,
+        })
+        .sum();
+    em * f64::from(size_px)
+}
+
+/// Moves label positions apart to at least `gap`, each as near to its wish as the others allow
+/// (least squares), inside `low..=high`. The answer is in the order of `wishes`.
+///
+/// Labels that cannot all fit keep the gap and run past `high`.
+#[must_use]
+pub fn spread(wishes: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
+    let mut by_position: Vec<usize> = (0..wishes.len()).collect();
+    by_position.sort_by(|&a, &b| wishes[a].total_cmp(&wishes[b]).then(a.cmp(&b)));
+
+    // With the gaps taken out, "at least gap apart" is "not descending": pool adjacent violators.
+    let mut pools: Vec<(f64, usize)> = Vec::new();
+    for (rank, &index) in by_position.iter().enumerate() {
+        let mut pool = (wishes[index] - rank as f64 * gap, 1);
+        while let Some(&(mean, count)) = pools.last() {
+            if mean <= pool.0 {
+                break;
+            }
+            pools.pop();
+            let total = count + pool.1;
+            pool = (
+                (mean * count as f64 + pool.0 * pool.1 as f64) / total as f64,
+                total,
+            );
+        }
+        pools.push(pool);
+    }
+
+    let room = (high - gap * wishes.len().saturating_sub(1) as f64).max(low);
+    let mut placed = vec![0.0; wishes.len()];
+    let mut rank = 0;
+    for (mean, count) in pools {
+        for _ in 0..count {
+            placed[by_position[rank]] = mean.clamp(low, room) + rank as f64 * gap;
+            rank += 1;
+        }
+    }
+    placed
+}
+
+/// The round step (1, 2, 2.5 or 5 times a power of ten) that cuts `span` into about `parts`.
+#[must_use]
+pub fn nice_step(span: f64, parts: u32) -> f64 {
+    if !(span.is_finite() && span > 0.0) {
+        return 1.0;
+    }
+    let raw = span / f64::from(parts.max(1));
+    let decade = 10f64.powf(raw.log10().floor());
+    [1.0, 2.0, 2.5, 5.0, 10.0]
+        .into_iter()
+        .map(|m| m * decade)
+        .find(|&step| step >= raw * 0.999)
+        .unwrap_or(10.0 * decade)
+}
+
+/// Multiples of `step` from `low` to `high`.
+#[must_use]
+pub fn ticks(low: f64, high: f64, step: f64) -> Vec<f64> {
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    (first..=last.max(first).min(first + 200))
+        .map(|i| i as f64 * step)
+        .collect()
+}
+
+/// Formats a number for a tick of the given step: just enough decimals, thousands apart.
+#[must_use]
+pub fn tick_label(value: f64, step: f64) -> String {
+    let mut decimals = 0;
+    let mut scaled = step.abs();
+    while decimals < 6 && (scaled - scaled.round()).abs() > 1e-6 * scaled.max(1.0) {
+        scaled *= 10.0;
+        decimals += 1;
+    }
+    group_thousands(&format!(
+        "{:.decimals$}",
+        if value == 0.0 { 0.0 } else { value }
+    ))
+}
+
+/// Puts a thin space between groups of three digits before the point.
+#[must_use]
+pub fn group_thousands(number: &str) -> String {
+    let (sign, rest) = match number.strip_prefix('-') {
+        Some(rest) => ("-", rest),
+        None => ("", number),
+    };
+    let (whole, fraction) = rest
+        .split_once('.')
+        .map_or((rest, None), |(w, f)| (w, Some(f)));
+    let mut out = String::from(sign);
+    for (i, digit) in whole.chars().enumerate() {
+        if i > 0 && (whole.len() - i) % 3 == 0 && whole.len() > 4 {
+            out.push('\u{2009}');
+        }
+        out.push(digit);
+    }
+    if let Some(fraction) = fraction {
+        out.push('.');
+        out.push_str(fraction);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spread_keeps_the_gap_and_stays_inside() {
+        let placed = spread(&[10.0, 11.0, 12.0, 90.0, 99.0], 14.0, 0.0, 100.0);
+        let mut sorted = placed.clone();
+        sorted.sort_by(f64::total_cmp);
+        assert!(
+            sorted.windows(2).all(|w| w[1] - w[0] >= 14.0 - 1e-9),
+            "{sorted:?}"
+        );
+        assert!(sorted[0] >= 0.0 && sorted[4] <= 100.0, "{sorted:?}");
+    }
+
+    #[test]
+    fn spread_leaves_labels_alone_that_do_not_collide() {
+        assert_eq!(
+            spread(&[80.0, 10.0, 40.0], 14.0, 0.0, 100.0),
+            [80.0, 10.0, 40.0]
+        );
+    }
+
+    #[test]
+    fn spread_centres_a_cluster_on_its_wishes() {
+        assert_eq!(spread(&[50.0, 50.0], 10.0, 0.0, 100.0), [45.0, 55.0]);
+    }
+
+    #[test]
+    fn ticks_are_round_and_cover_the_range() {
+        let step = nice_step(12.3, 5);
+        assert_eq!(step, 2.5);
+        assert_eq!(ticks(0.0, 12.3, step), [0.0, 2.5, 5.0, 7.5, 10.0]);
+        assert_eq!(tick_label(7.5, step), "7.5");
+        assert_eq!(tick_label(0.2, 0.05), "0.20");
+    }
+
+    #[test]
+    fn thousands_are_set_apart_only_in_long_numbers() {
+        assert_eq!(group_thousands("1234"), "1234");
+        assert_eq!(
+            group_thousands("-1234567.25"),
+            "-1\u{2009}234\u{2009}567.25"
+        );
+    }
+}

@@ -1,0 +1,104 @@
+//! Bad input: exit code 2, one clear message, no panic, nothing left under the final name.
+
+use parallax_tests::{program, root};
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn refuse(command: &mut Command, expected: &[&str]) -> Output {
+    let output = command.output().expect("the program starts");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{command:?}:\n{message}");
+    assert!(!message.contains("panicked"), "{message}");
+    for part in expected {
+        assert!(message.contains(part), "{command:?}: no {part:?} in:\n{message}");
+    }
+    output
+}
+
+fn damaged(folder: &Path, change: impl FnOnce(&mut Vec<u8>)) -> std::path::PathBuf {
+    let mut bytes = fs::read(root().join("traces/atrium-shadows.textrace")).expect("golden trace");
+    change(&mut bytes);
+    let path = folder.join("damaged.textrace");
+    fs::write(&path, bytes).expect("temporary file");
+    path
+}
+
+#[test]
+fn a_missing_trace_is_named() {
+    refuse(program("replay").args(["run", "no-such.textrace"]), &["no-such.textrace"]);
+}
+
+#[test]
+fn a_cut_trace_is_refused_by_every_reader() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for keep in [0, 7, 63, 1000] {
+        let path = damaged(folder.path(), |bytes| bytes.truncate(keep));
+        for subcommand in ["run", "info", "dump", "paper"] {
+            refuse(program("replay").arg(subcommand).arg(&path), &["damaged.textrace"]);
+        }
+    }
+}
+
+#[test]
+fn a_flipped_bit_in_the_quads_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = damaged(folder.path(), |bytes| {
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 0x10;
+    });
+    refuse(program("replay").arg("run").arg(&path), &["damaged.textrace"]);
+}
+
+#[test]
+fn a_text_file_is_no_trace() {
+    refuse(program("replay").arg("run").arg(root().join("Cargo.toml")), &["Cargo.toml"]);
+}
+
+#[test]
+fn a_cache_whose_sets_are_no_power_of_two_is_refused() {
+    let trace = root().join("traces/atrium-shadows.textrace");
+    refuse(program("replay").arg("run").arg(&trace).args(["--l1", "9KiB"]), &["power of two"]);
+}
+
+#[test]
+fn an_unknown_order_is_refused_with_the_known_ones() {
+    let trace = root().join("traces/atrium-shadows.textrace");
+    refuse(program("replay").arg("run").arg(&trace).args(["--order", "zz"]), &["zz", "z2-sta"]);
+}
+
+#[test]
+fn an_unknown_key_in_a_sweep_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let experiment = folder.path().join("experiment.toml");
+    fs::write(&experiment, "no_such_key = 1\n").expect("temporary file");
+    refuse(program("replay").arg("sweep").arg(&experiment), &["experiment.toml", "no_such_key"]);
+}
+
+#[test]
+fn a_missing_scene_leaves_no_trace_behind() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out.textrace");
+    refuse(program("tracegen").args(["raster", "no-such.gltf", "-o"]).arg(&out), &["no-such.gltf"]);
+    assert_eq!(fs::read_dir(folder.path()).expect("folder").count(), 0, "something was left behind");
+}
+
+#[test]
+fn a_scene_with_a_missing_texture_names_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = folder.path().join("scene.gltf");
+    fs::write(&scene, include_str!("data/missing-texture.gltf")).expect("temporary file");
+    let out = folder.path().join("out.textrace");
+    refuse(program("tracegen").arg("raster").arg(&scene).arg("-o").arg(&out), &["no-such.png"]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_scene_with_a_nan_position_names_the_place() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = folder.path().join("scene.gltf");
+    fs::write(&scene, include_str!("data/nan-position.gltf")).expect("temporary file");
+    let out = folder.path().join("out.textrace");
+    refuse(program("tracegen").arg("raster").arg(&scene).arg("-o").arg(&out), &["scene.gltf", "NaN"]);
+    assert!(!out.exists());
+}

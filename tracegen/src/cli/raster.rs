@@ -1,0 +1,289 @@
+//! `tracegen raster`.
+
+use super::scene_args::{SceneArgs, SceneSetup};
+use crate::raster::backend::{CaptureBackend, DeviceTexture};
+use crate::raster::capture::{CaptureJob, Pictures};
+use crate::raster::draws::DrawList;
+use crate::raster::lavapipe::Lavapipe;
+use crate::raster::lighting::Lighting;
+use crate::raster::tiles::CaptureCounts;
+use crate::raster::{picture, textures};
+use crate::scene::LoadOptions;
+use anyhow::{Context, ensure};
+use clap::Args;
+use formats::textrace::{Tables, TextraceWriter, TraceMeta};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Cascades that `--shadows` adds (Z2 paper section 4.1).
+const CASCADES: u32 = 4;
+
+/// Arguments of `tracegen raster`.
+#[derive(Args, Debug)]
+pub struct RasterArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Trace to write.
+    #[arg(short, long, value_name = "FILE.textrace")]
+    output: PathBuf,
+    /// Picture of both eyes side by side.
+    #[arg(long, value_name = "FILE.png")]
+    image: Option<PathBuf>,
+    /// Light the scene through 4 shadow cascades of 2048x2048.
+    #[arg(long)]
+    shadows: bool,
+    /// Skip the render without capture that times and pictures are compared with.
+    #[arg(long)]
+    no_plain: bool,
+    /// Memory for raw records; a frame that needs more is captured in parts. The driver's limit is
+    /// 128MiB.
+    #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
+    record_budget: u64,
+    /// Threads of the driver and of the post-processing (the trace is the same) [default: all].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// Runs `tracegen raster`.
+///
+/// # Errors
+/// Unreadable input, no driver, or a file that cannot be written.
+pub fn run(args: RasterArgs) -> anyhow::Result<()> {
+    if let Some(threads) = args.threads {
+        limit_threads(threads)?;
+    }
+    let started = Instant::now();
+    let setup = args.scene.setup(None, &LoadOptions::ALL)?;
+    let cascades = if args.shadows { CASCADES } else { 0 };
+    let draws = DrawList::new(&setup.scene, cascades)?;
+    let uploads = textures::for_device(&setup.scene);
+    let size_px = setup.hmd.eye_size_px;
+    let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
+    let tables = tables(&setup, &args.scene.scene, &draws, &uploads, &backend);
+    drop(uploads);
+    let bounds = setup.scene.bounds().unwrap_or_default();
+    let mut job = CaptureJob {
+        draws: &draws,
+        lighting: Lighting::new(&setup.scene),
+        bounds,
+        shadow_range_m: shadow_range_m(&setup, bounds),
+        size_px,
+        parts: 1,
+    };
+    job.warm_up(&mut backend, &setup.frames[0])?;
+    eprintln!("{}: ready in {:.2} s", args.scene.scene, started.elapsed().as_secs_f64());
+
+    let mut writer = TextraceWriter::create(&args.output, &tables)
+        .with_context(|| format!("cannot write {}", args.output.display()))?;
+    let mut summary = Summary::default();
+    let mut first_pictures: Option<Pictures> = None;
+    for (frame, views) in setup.frames.iter().enumerate() {
+        let plain = if args.no_plain {
+            None
+        } else {
+            let (pictures, time) = job.plain_frame(&mut backend, views)?;
+            summary.plain += time;
+            Some(pictures)
+        };
+        let start = Instant::now();
+        let (pictures, counts) = job.capture_frame(&mut backend, views, 2 * frame, &tables, &mut writer)?;
+        summary.captured += start.elapsed();
+        summary.counts += counts;
+        if let Some(plain) = plain {
+            summary.identical = Some(summary.identical.unwrap_or(true) && plain == pictures);
+        }
+        first_pictures.get_or_insert(pictures);
+    }
+    let start = Instant::now();
+    writer
+        .finish()
+        .with_context(|| format!("cannot write {}", args.output.display()))?;
+    summary.captured += start.elapsed();
+    summary.print(setup.frames.len(), size_px, std::fs::metadata(&args.output)?.len());
+    if let (Some(path), Some(pictures)) = (&args.image, &first_pictures) {
+        picture::write_side_by_side(path, pictures, size_px).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    ensure!(
+        summary.identical != Some(false),
+        "the captured picture differs from the plain one: the capture disturbed the rendering"
+    );
+    Ok(())
+}
+
+/// Near and far end of the cascades: from the near plane to where the scene ends.
+fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
+    let farthest = (setup.camera.eye - lo).abs().max((setup.camera.eye - hi).abs()).length();
+    let near = setup.camera.near.max(0.05);
+    [near, farthest.min(setup.camera.far).max(2.0 * near)]
+}
+
+fn tables(
+    setup: &SceneSetup,
+    spec: &str,
+    draws: &DrawList,
+    uploads: &[DeviceTexture],
+    backend: &dyn CaptureBackend,
+) -> Tables {
+    let textures = draws.textures(&setup.scene, uploads);
+    let (samplers, draw_table) = draws.tables(&setup.scene, &textures);
+    Tables {
+        meta: TraceMeta {
+            tool: concat!("tracegen ", env!("CARGO_PKG_VERSION")).into(),
+            command_line: lasting_arguments(std::env::args().skip(1)),
+            scene: spec.into(),
+            scene_triangles: setup.scene.triangle_count(),
+            camera: setup.camera.name.clone(),
+            backend: backend.name().into(),
+            driver: backend.driver().into(),
+            seed: 0,
+            hmd: setup.hmd.clone(),
+            frames: setup.frames.clone(),
+        },
+        textures,
+        samplers,
+        draws: draw_table,
+        passes: CaptureJob::passes(setup.hmd.eye_size_px, setup.frames.len() as u32),
+    }
+}
+
+/// The arguments that decide what a trace holds: output paths and how it was made are left out,
+/// so that the same capture gives the same bytes.
+fn lasting_arguments(arguments: impl Iterator<Item = String>) -> Vec<String> {
+    const WITH_VALUE: [&str; 5] = ["-o", "--output", "--image", "--threads", "--record-budget"];
+    let mut kept = Vec::new();
+    let mut skip_value = false;
+    for argument in arguments {
+        if std::mem::take(&mut skip_value) {
+            continue;
+        }
+        let name = argument.split('=').next().unwrap_or_default();
+        if WITH_VALUE.contains(&argument.as_str()) {
+            skip_value = true;
+        } else if !WITH_VALUE.contains(&name)
+            && !(argument.starts_with("-o") && !argument.starts_with("--"))
+            && argument != "--no-plain"
+        {
+            kept.push(argument);
+        }
+    }
+    kept
+}
+
+#[derive(Default)]
+struct Summary {
+    plain: Duration,
+    captured: Duration,
+    counts: CaptureCounts,
+    identical: Option<bool>,
+}
+
+impl Summary {
+    fn print(&self, frames: usize, size_px: [u32; 2], file_bytes: u64) {
+        let CaptureCounts {
+            quads,
+            fragments,
+            records,
+            masked_lanes_killed,
+            not_finite,
+            tile_bytes,
+        } = self.counts;
+        let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
+        let pixels = 2.0 * frames as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
+        eprintln!(
+            "{frames} frame(s), 2 x {}x{}: {quads} quads, {fragments} fragments ({:.2} a pixel), {records} records",
+            size_px[0],
+            size_px[1],
+            fragments as f64 / pixels
+        );
+        if masked_lanes_killed > 0 {
+            eprintln!("{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw");
+        }
+        if not_finite > 0 {
+            super::warn(&format!("{not_finite} records with texture coordinates that are not finite were left out"));
+        }
+        eprintln!(
+            "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record (44 raw)",
+            per(tile_bytes, quads),
+            per(tile_bytes, records)
+        );
+        let captured = self.captured.as_secs_f64();
+        let includes = "shadow maps, both eyes, reading the pictures back";
+        if let Some(identical) = self.identical {
+            let plain = self.plain.as_secs_f64();
+            eprintln!("plain render   {plain:.3} s ({includes})");
+            eprintln!(
+                "with capture   {captured:.3} s (the same, and draining, sorting, encoding and writing the trace): {:.2} x plain",
+                captured / plain
+            );
+            eprintln!("pictures with and without capture: {}", if identical { "identical" } else { "DIFFERENT" });
+        } else {
+            eprintln!("with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace)");
+        }
+        if let Some(bytes) = peak_rss_bytes() {
+            eprintln!("peak memory    {:.0} MiB", bytes as f64 / f64::from(1 << 20));
+        }
+    }
+}
+
+/// Largest resident set so far, where the system tells (Linux).
+fn peak_rss_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// Limits llvmpipe's rasteriser threads and rayon's.
+fn limit_threads(threads: u16) -> anyhow::Result<()> {
+    // SAFETY: the command has started no thread yet, so nothing reads the environment meanwhile.
+    unsafe { std::env::set_var("LP_NUM_THREADS", threads.to_string()) };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.into())
+        .build_global()
+        .context("cannot limit the threads")
+}
+
+/// Bytes with an optional binary suffix: `64MiB`, `512KiB`, `1GiB`, `4096`.
+fn parse_bytes(text: &str) -> Result<u64, String> {
+    let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    let (number, suffix) = text.split_at(digits);
+    let shift = match suffix {
+        "" | "B" => Some(0),
+        "KiB" => Some(10),
+        "MiB" => Some(20),
+        "GiB" => Some(30),
+        _ => None,
+    };
+    shift
+        .and_then(|shift| number.parse::<u64>().ok()?.checked_mul(1 << shift))
+        .filter(|bytes| *bytes >= 4096)
+        .ok_or_else(|| format!("expected at least 4KiB as in 64MiB or 1048576, found '{text}'"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(line: &str) -> Vec<String> {
+        lasting_arguments(line.split(' ').map(str::to_owned))
+    }
+
+    #[test]
+    fn output_paths_and_thread_counts_do_not_reach_the_trace() {
+        let expected = ["raster", "s.gltf", "--shadows", "--camera", "x"];
+        assert_eq!(kept("raster s.gltf -o a --shadows --image=b.png --camera x"), expected);
+        assert_eq!(
+            kept("raster s.gltf --output=a --shadows --threads 2 --no-plain --camera x --record-budget 4MiB -ob"),
+            expected
+        );
+    }
+
+    #[test]
+    fn sizes_take_binary_suffixes() {
+        assert_eq!(parse_bytes("64MiB"), Ok(64 << 20));
+        assert_eq!(parse_bytes("65536"), Ok(65536));
+        for bad in ["", "MiB", "1", "64MB", "-4MiB", "99999999999999999999GiB"] {
+            assert!(parse_bytes(bad).is_err(), "{bad}");
+        }
+    }
+}

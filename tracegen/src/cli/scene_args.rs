@@ -1,0 +1,300 @@
+//! Flags that say what is looked at, from where and through which display.
+
+use crate::scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd, load_with};
+use clap::Args;
+use formats::view::{FovTangents, FrameViews, Hmd};
+use glam::Vec3;
+
+/// Most frames of a camera path.
+const MAX_FRAMES: u32 = 10_000;
+
+/// Scene, camera and display of a capture.
+#[derive(Args, Clone, Debug)]
+pub struct SceneArgs {
+    /// A built-in scene (see `tracegen scenes`) or a .gltf, .glb or .obj file.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// Camera flags.
+    #[command(flatten)]
+    pub camera: CameraArgs,
+    /// Display flags.
+    #[command(flatten)]
+    pub hmd: HmdArgs,
+}
+
+/// Everything that a capture needs to know about its scene and views.
+#[derive(Debug)]
+pub struct SceneSetup {
+    /// The scene.
+    pub scene: Scene,
+    /// The head's pose in frame 0.
+    pub camera: Camera,
+    /// The display.
+    pub hmd: Hmd,
+    /// The eyes' matrices by frame.
+    pub frames: Vec<FrameViews>,
+}
+
+impl SceneArgs {
+    /// Loads the scene (its warnings go to stderr) and works out the views.
+    ///
+    /// `default_size_px` is the eye size where neither `--size` nor `--hmd` is given.
+    ///
+    /// # Errors
+    /// Wrong flags, checked first, or an unreadable scene.
+    pub fn setup(
+        &self,
+        default_size_px: Option<[u32; 2]>,
+        options: &LoadOptions,
+    ) -> anyhow::Result<SceneSetup> {
+        // Flags that need no scene are checked before minutes go into loading one.
+        self.hmd.resolve(default_size_px, None)?;
+        self.camera.validate_alone()?;
+        let scene = load_scene(&self.scene, options)?;
+        let camera = self.camera.resolve(&scene)?;
+        let vfov_deg = match self.camera.vfov {
+            Some(VerticalFov::File) => Some(camera.vfov_deg),
+            Some(VerticalFov::Degrees(degrees)) => Some(degrees),
+            None => None,
+        };
+        let hmd = self.hmd.resolve(default_size_px, vfov_deg)?;
+        let frames = cameras::frame_views(&camera, &hmd, self.camera.frames)?;
+        Ok(SceneSetup {
+            scene,
+            camera,
+            hmd,
+            frames,
+        })
+    }
+}
+
+/// Loads a scene and prints its warnings on stderr.
+///
+/// # Errors
+/// An unreadable scene.
+pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
+    let Loaded { scene, warnings } = load_with(spec, options)?;
+    for warning in &warnings {
+        super::warn(&format!("{spec}: {warning}"));
+    }
+    Ok(scene)
+}
+
+/// Where the head is.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Camera")]
+pub struct CameraArgs {
+    /// Camera of the scene by name, with or without its `cam_`; the first one if left out.
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Position between the eyes in metres (with --target, instead of --camera).
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vec3, allow_hyphen_values = true,
+          requires = "target", conflicts_with = "camera")]
+    pub eye: Option<Vec3>,
+    /// Point looked at.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vec3, allow_hyphen_values = true,
+          requires = "eye")]
+    pub target: Option<Vec3>,
+    /// Up direction.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vec3, allow_hyphen_values = true,
+          default_value = "0,1,0", requires = "eye")]
+    pub up: Vec3,
+    /// Vertical field of view instead of the display's: degrees, or `file` for the camera's own.
+    #[arg(long, value_name = "DEG|file", value_parser = parse_vfov,
+          conflicts_with_all = ["hfov", "fov_tangents"])]
+    pub vfov: Option<VerticalFov>,
+    /// Frames along a slow walk: 0.4 m/s ahead with a sideways sway of 5 cm, at 72 frames a second.
+    #[arg(long, value_name = "N", default_value_t = 1,
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
+    pub frames: u32,
+}
+
+/// `--vfov`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VerticalFov {
+    /// The camera's own.
+    File,
+    /// Degrees.
+    Degrees(f32),
+}
+
+impl CameraArgs {
+    /// The head's pose in `scene`.
+    ///
+    /// # Errors
+    /// An unknown camera, or one that looks nowhere.
+    pub fn resolve(&self, scene: &Scene) -> Result<Camera, cameras::CameraError> {
+        let from_scene = cameras::find(scene, self.camera.as_deref())?;
+        let camera = match (self.eye, self.target) {
+            (Some(eye), Some(target)) => self.from_flags(eye, target, from_scene),
+            _ => from_scene.clone(),
+        };
+        cameras::validate(&camera)?;
+        Ok(camera)
+    }
+
+    /// Checks the pose that flags give, as far as that is possible without a scene.
+    fn validate_alone(&self) -> Result<(), cameras::CameraError> {
+        let (Some(eye), Some(target)) = (self.eye, self.target) else {
+            return Ok(());
+        };
+        let planes = cameras::default_camera(&Scene::default());
+        cameras::validate(&self.from_flags(eye, target, &planes))
+    }
+
+    /// Near and far planes come from the scene's own camera: they fit its scale.
+    fn from_flags(&self, eye: Vec3, target: Vec3, planes: &Camera) -> Camera {
+        Camera {
+            name: "custom".into(),
+            eye,
+            target,
+            up: self.up,
+            ..planes.clone()
+        }
+    }
+}
+
+/// The display.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Display")]
+pub struct HmdArgs {
+    /// Preset: symmetric-100, dk2, vive or quest2.
+    #[arg(long, value_name = "NAME", default_value = hmd::PRESETS[0])]
+    pub hmd: String,
+    /// Pixels per eye [default: the preset's].
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<[u32; 2]>,
+    /// Horizontal field of view of symmetric eyes with square pixels.
+    #[arg(long, value_name = "DEG", conflicts_with = "fov_tangents")]
+    pub hfov: Option<f32>,
+    /// Tangents of the half-angles (left,right,up,down) of the left eye, and after a semicolon of
+    /// the right eye; without it the right eye mirrors the left.
+    #[arg(long, value_name = "L,R,U,D[;L,R,U,D]", value_parser = parse_tangents,
+          allow_hyphen_values = true)]
+    pub fov_tangents: Option<[FovTangents; 2]>,
+    /// Distance between the eyes in millimetres [default: the preset's 64].
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    pub ipd: Option<f32>,
+    /// Outward turn of each eye in degrees.
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    pub cant: Option<f32>,
+}
+
+impl HmdArgs {
+    /// The display that the flags describe; `custom` where any of them changes the preset.
+    ///
+    /// `default_size_px` is a command's own eye size for the default preset; `vfov_deg` makes the
+    /// eyes symmetric with that vertical field of view.
+    ///
+    /// # Errors
+    /// An unknown preset or a figure out of range.
+    pub fn resolve(
+        &self,
+        default_size_px: Option<[u32; 2]>,
+        vfov_deg: Option<f32>,
+    ) -> Result<Hmd, hmd::HmdError> {
+        let mut result = hmd::preset(&self.hmd)?;
+        let is_default = self.hmd == hmd::PRESETS[0];
+        let size = self.size.or(default_size_px.filter(|_| is_default));
+        if let Some(size) = size {
+            result.eye_size_px = size;
+            if is_default {
+                // The default is defined by its angle, so another aspect keeps square pixels.
+                result.fov = [hmd::symmetric(100.0, size); 2];
+            }
+        }
+        let size = result.eye_size_px;
+        if let Some(degrees) = self.hfov {
+            check_angle("horizontal field of view", degrees)?;
+            result.fov = [hmd::symmetric(degrees, size); 2];
+        }
+        if let Some(degrees) = vfov_deg {
+            check_angle("vertical field of view", degrees)?;
+            let turned = hmd::symmetric(degrees, [size[1], size[0]]);
+            let fov = FovTangents {
+                left: turned.up,
+                right: turned.down,
+                up: turned.left,
+                down: turned.right,
+            };
+            result.fov = [fov; 2];
+        }
+        if let Some(fov) = self.fov_tangents {
+            result.fov = fov;
+        }
+        if let Some(ipd_mm) = self.ipd {
+            result.ipd_m = ipd_mm / 1000.0;
+        }
+        if let Some(cant_deg) = self.cant {
+            result.cant_deg = cant_deg;
+        }
+        if result != hmd::preset(&self.hmd)? {
+            result.name = "custom".into();
+            result.source = format!("flags on preset {}", self.hmd);
+        }
+        hmd::validate(&result)?;
+        Ok(result)
+    }
+}
+
+fn check_angle(what: &'static str, degrees: f32) -> Result<(), hmd::HmdError> {
+    if degrees > 0.0 && degrees < 180.0 {
+        return Ok(());
+    }
+    Err(hmd::HmdError::Invalid {
+        what,
+        expected: "more than 0 and less than 180 degrees".into(),
+        found: format!("{degrees} degrees"),
+    })
+}
+
+/// Exactly `N` finite numbers separated by commas.
+fn parse_numbers<const N: usize>(text: &str) -> Result<[f32; N], String> {
+    let numbers = text
+        .split(',')
+        .map(|part| match part.trim().parse::<f32>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => Err(format!("expected a finite number, found '{}'", part.trim())),
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    <[f32; N]>::try_from(numbers).map_err(|found| {
+        format!(
+            "expected {N} numbers separated by commas, found {}",
+            found.len()
+        )
+    })
+}
+
+fn parse_vec3(text: &str) -> Result<Vec3, String> {
+    parse_numbers::<3>(text).map(Vec3::from)
+}
+
+fn parse_vfov(text: &str) -> Result<VerticalFov, String> {
+    if text == "file" {
+        return Ok(VerticalFov::File);
+    }
+    parse_numbers::<1>(text).map(|[degrees]| VerticalFov::Degrees(degrees))
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let max = hmd::MAX_EYE_SIZE_PX;
+    text.split_once(['x', 'X'])
+        .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))
+        .filter(|size: &[u32; 2]| size.iter().all(|e| (1..=max).contains(e)))
+        .ok_or_else(|| format!("expected WIDTHxHEIGHT, each from 1 to {max}, found '{text}'"))
+}
+
+fn parse_tangents(text: &str) -> Result<[FovTangents; 2], String> {
+    let eye = |part: &str| {
+        parse_numbers::<4>(part).map(|[left, right, up, down]| FovTangents {
+            left,
+            right,
+            up,
+            down,
+        })
+    };
+    match text.split_once(';') {
+        Some((left, right)) => Ok([eye(left)?, eye(right)?]),
+        None => eye(text).map(|left| [left, hmd::mirrored(&left)]),
+    }
+}

@@ -1,0 +1,195 @@
+//! `tracegen scenes`: built-in scenes, or what a file holds.
+
+use super::scene_args::load_scene;
+use crate::scene::{LoadOptions, Scene, procedural};
+use clap::Args;
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// Arguments of `tracegen scenes`.
+#[derive(Args, Debug)]
+pub struct ScenesArgs {
+    /// A scene file or built-in scene to describe; without it the built-in scenes are listed.
+    #[arg(value_name = "SCENE")]
+    scene: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// JSON of the list of built-in scenes.
+#[derive(Serialize)]
+struct BuiltinList {
+    schema: &'static str,
+    scenes: Vec<Builtin>,
+}
+
+#[derive(Serialize)]
+struct Builtin {
+    name: &'static str,
+    description: &'static str,
+    triangles: u64,
+}
+
+/// JSON of one scene.
+#[derive(Serialize)]
+struct Description {
+    schema: &'static str,
+    name: String,
+    triangles: u64,
+    unique_triangles: u64,
+    meshes: usize,
+    instances: usize,
+    materials: usize,
+    images: Vec<ImageEntry>,
+    lights: usize,
+    bounds_m: Option<[[f32; 3]; 2]>,
+    cameras: Vec<CameraEntry>,
+}
+
+#[derive(Serialize)]
+struct ImageEntry {
+    name: String,
+    size: [u32; 2],
+    color_space: formats::texture::ColorSpace,
+}
+
+#[derive(Serialize)]
+struct CameraEntry {
+    name: String,
+    eye: [f32; 3],
+    target: [f32; 3],
+    up: [f32; 3],
+    vfov_deg: f32,
+    near_m: f32,
+    far_m: f32,
+}
+
+/// Runs `tracegen scenes`.
+///
+/// # Errors
+/// An unreadable scene, or a closed output.
+pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
+    let text = match args.scene {
+        None => list(args.json)?,
+        Some(spec) => {
+            let description = describe(&load_scene(&spec, &LoadOptions::NO_IMAGES)?);
+            if args.json {
+                json(&description)?
+            } else {
+                table(&description)
+            }
+        }
+    };
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes())?;
+    out.flush()?;
+    Ok(())
+}
+
+fn json(value: &impl Serialize) -> serde_json::Result<String> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
+}
+
+fn list(as_json: bool) -> anyhow::Result<String> {
+    let scenes: Vec<Builtin> = procedural::names()
+        .iter()
+        .filter_map(|&(name, description)| {
+            let triangles = procedural::build(name)?.triangle_count();
+            Some(Builtin {
+                name,
+                description,
+                triangles,
+            })
+        })
+        .collect();
+    if as_json {
+        let schema = "tracegen.scenes/1";
+        return Ok(json(&BuiltinList { schema, scenes })?);
+    }
+    let width = scenes.iter().map(|s| s.name.len()).max().unwrap_or(0);
+    Ok(scenes
+        .iter()
+        .map(|s| {
+            format!(
+                "{:width$}  {:>9} triangles  {}\n",
+                s.name, s.triangles, s.description
+            )
+        })
+        .collect())
+}
+
+fn describe(scene: &Scene) -> Description {
+    Description {
+        schema: "tracegen.scene/1",
+        name: scene.name.clone(),
+        triangles: scene.triangle_count(),
+        unique_triangles: scene.meshes.iter().map(|m| m.triangles() as u64).sum(),
+        meshes: scene.meshes.len(),
+        instances: scene.instances.len(),
+        materials: scene.materials.len(),
+        images: scene
+            .images
+            .iter()
+            .map(|i| ImageEntry {
+                name: i.name.clone(),
+                size: i.size,
+                color_space: i.color_space,
+            })
+            .collect(),
+        lights: scene.lights.len(),
+        bounds_m: scene
+            .bounds()
+            .map(|(low, high)| [low.to_array(), high.to_array()]),
+        cameras: scene
+            .cameras
+            .iter()
+            .map(|c| CameraEntry {
+                name: c.name.clone(),
+                eye: c.eye.to_array(),
+                target: c.target.to_array(),
+                up: c.up.to_array(),
+                vfov_deg: c.vfov_deg,
+                near_m: c.near,
+                far_m: c.far,
+            })
+            .collect(),
+    }
+}
+
+fn table(d: &Description) -> String {
+    let texels: u64 = (d.images.iter())
+        .map(|i| u64::from(i.size[0]) * u64::from(i.size[1]))
+        .sum();
+    let point = |p: [f32; 3]| format!("({:.2}, {:.2}, {:.2})", p[0], p[1], p[2]);
+    let mut text = format!(
+        "scene      {}\ntriangles  {} ({} unique) in {} meshes, {} instances\n\
+         materials  {}\nimages     {} ({:.1} Mtexel)\nlights     {}\n",
+        d.name,
+        d.triangles,
+        d.unique_triangles,
+        d.meshes,
+        d.instances,
+        d.materials,
+        d.images.len(),
+        texels as f64 / 1e6,
+        d.lights,
+    );
+    if let Some([low, high]) = d.bounds_m {
+        text += &format!("bounds     {} to {} m\n", point(low), point(high));
+    }
+    text += "cameras\n";
+    let width = d.cameras.iter().map(|c| c.name.len()).max().unwrap_or(0);
+    for c in &d.cameras {
+        text += &format!(
+            "  {:width$}  eye {}  target {}  vfov {:.1}  near {} far {}\n",
+            c.name,
+            point(c.eye),
+            point(c.target),
+            c.vfov_deg,
+            c.near_m,
+            c.far_m,
+        );
+    }
+    text
+}

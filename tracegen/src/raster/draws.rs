@@ -1,0 +1,217 @@
+//! The draws of a scene in submission order, and their entries in the trace's tables.
+
+use super::backend::RasterError;
+use super::groups::MaterialGroups;
+use crate::scene::{AlphaMode, Scene};
+use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
+use formats::textrace::{Draw, Sample, UvGroup};
+use glam::{Affine3A, Vec3};
+
+/// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
+pub const SHADOW_SIZE: u32 = 2048;
+
+/// Texel offsets of the four bilinear taps of the shadow lookup. Two texels apart, their 2x2
+/// footprints tile a 4x4 neighbourhood without overlap.
+pub const SHADOW_TAPS: [[i8; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
+
+/// One draw call: one instance of one mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct DrawCall {
+    /// Index into the scene's meshes.
+    pub mesh: usize,
+    /// Index into the scene's materials.
+    pub material: usize,
+    /// Object to world.
+    pub transform: Affine3A,
+    /// The transform mirrors: front faces wind the other way round.
+    pub mirrored: bool,
+    /// Number of its first primitive.
+    pub first_primitive: u32,
+    /// World-space bounds of the instance.
+    pub bounds: [Vec3; 2],
+}
+
+/// Every draw of a scene, the same for all views and frames.
+#[derive(Clone, Debug)]
+pub struct DrawList {
+    /// Draws in submission order.
+    pub calls: Vec<DrawCall>,
+    /// Texture groups by material.
+    pub groups: Vec<MaterialGroups>,
+    /// Shadow cascades that lit draws sample, 0 to 4.
+    pub cascades: u32,
+}
+
+impl DrawList {
+    /// Orders the scene's instances: opaque and masked ones in the scene's order, then blended
+    /// ones in the scene's order. Instances without triangles are left out.
+    ///
+    /// # Errors
+    /// More primitives than 32 bits number, or an index out of range.
+    pub fn new(scene: &Scene, cascades: u32) -> Result<Self, RasterError> {
+        let mut calls = Vec::with_capacity(scene.instances.len());
+        let mut next_primitive = 0_u32;
+        for blended in [false, true] {
+            for instance in &scene.instances {
+                let mesh = scene.meshes.get(instance.mesh).ok_or_else(|| {
+                    RasterError::Scene(format!("instance of mesh {} of {}", instance.mesh, scene.meshes.len()))
+                })?;
+                let material = scene.materials.get(mesh.material).ok_or_else(|| {
+                    RasterError::Scene(format!(
+                        "mesh {} uses material {} of {}",
+                        mesh.name,
+                        mesh.material,
+                        scene.materials.len()
+                    ))
+                })?;
+                if (material.alpha == AlphaMode::Blend) != blended || mesh.triangles() == 0 {
+                    continue;
+                }
+                if let Some(index) = mesh.indices.iter().find(|&&i| i as usize >= mesh.positions.len()) {
+                    return Err(RasterError::Scene(format!(
+                        "mesh {}: index {index} beyond its {} vertices",
+                        mesh.name,
+                        mesh.positions.len()
+                    )));
+                }
+                calls.push(DrawCall {
+                    mesh: instance.mesh,
+                    material: mesh.material,
+                    transform: instance.transform,
+                    mirrored: instance.mirrored(),
+                    first_primitive: next_primitive,
+                    bounds: bounds(&mesh.positions, &instance.transform),
+                });
+                next_primitive = u32::try_from(mesh.triangles())
+                    .ok()
+                    .and_then(|n| next_primitive.checked_add(n))
+                    .ok_or_else(|| RasterError::TooLarge {
+                        what: "primitives".into(),
+                        found: scene.triangle_count(),
+                        limit: u64::from(u32::MAX),
+                    })?;
+            }
+        }
+        Ok(Self {
+            calls,
+            groups: scene.materials.iter().map(MaterialGroups::new).collect(),
+            cascades,
+        })
+    }
+
+    /// Texture table of the trace: the scene's images in their order, then the shadow maps.
+    /// `levels` and `sizes` are those of the uploaded textures.
+    #[must_use]
+    pub fn textures(&self, scene: &Scene, uploaded: &[super::backend::DeviceTexture]) -> Vec<Texture> {
+        let mut textures: Vec<Texture> = scene
+            .images
+            .iter()
+            .zip(uploaded)
+            .map(|(image, device)| Texture {
+                name: image.name.clone(),
+                size: device.size,
+                levels: device.levels.len() as u32,
+                layers: 1,
+                format: device.format,
+                color_space: image.color_space,
+            })
+            .collect();
+        if self.cascades > 0 {
+            textures.push(Texture {
+                name: "shadow cascades".into(),
+                size: [SHADOW_SIZE; 2],
+                levels: 1,
+                layers: self.cascades,
+                format: TexelFormat::R32f,
+                color_space: ColorSpace::Linear,
+            });
+        }
+        textures
+    }
+
+    /// Sampler and draw tables of the trace; `textures` is [`DrawList::textures`]' result.
+    #[must_use]
+    pub fn tables(&self, scene: &Scene, textures: &[Texture]) -> (Vec<Sampler>, Vec<Draw>) {
+        let mut samplers = Vec::new();
+        let material_groups: Vec<Vec<UvGroup>> = scene
+            .materials
+            .iter()
+            .zip(&self.groups)
+            .map(|(material, groups)| {
+                let slots = material.textures();
+                let mut result: Vec<UvGroup> = groups
+                    .groups
+                    .iter()
+                    .map(|group| {
+                        let samples = group
+                            .iter()
+                            .filter_map(|&slot| slots[slot])
+                            .map(|t| Sample {
+                                texture: t.image as u32,
+                                sampler: intern(&mut samplers, t.sampler),
+                                layer: 0,
+                                offset: [0, 0],
+                            })
+                            .collect();
+                        uv_group(samples, textures)
+                    })
+                    .collect();
+                for layer in 0..self.cascades {
+                    let sampler = intern(&mut samplers, Sampler::SHADOW);
+                    let samples = SHADOW_TAPS
+                        .iter()
+                        .map(|&offset| Sample {
+                            texture: scene.images.len() as u32,
+                            sampler,
+                            layer: layer as u16,
+                            offset,
+                        })
+                        .collect();
+                    result.push(uv_group(samples, textures));
+                }
+                result
+            })
+            .collect();
+        let draws = self
+            .calls
+            .iter()
+            .map(|call| Draw {
+                material: scene.materials[call.material].name.clone(),
+                first_primitive: call.first_primitive,
+                primitives: scene.meshes[call.mesh].triangles() as u32,
+                groups: material_groups[call.material].clone(),
+            })
+            .collect();
+        (samplers, draws)
+    }
+}
+
+fn uv_group(samples: Vec<Sample>, textures: &[Texture]) -> UvGroup {
+    let extent = |axis: usize| {
+        samples
+            .iter()
+            .map(|s| textures[s.texture as usize].size[axis])
+            .max()
+            .unwrap_or(1)
+    };
+    UvGroup {
+        extent: [extent(0), extent(1)],
+        samples,
+    }
+}
+
+fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
+    let index = samplers.iter().position(|s| *s == sampler).unwrap_or_else(|| {
+        samplers.push(sampler);
+        samplers.len() - 1
+    });
+    index as u16
+}
+
+fn bounds(positions: &[Vec3], transform: &Affine3A) -> [Vec3; 2] {
+    let empty = [Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY)];
+    positions.iter().fold(empty, |[lo, hi], p| {
+        let p = transform.transform_point3(*p);
+        [lo.min(p), hi.max(p)]
+    })
+}

@@ -1,0 +1,181 @@
+//! Head-mounted displays: presets, and the frusta that flags ask for.
+
+use formats::view::{FovTangents, Hmd};
+
+/// Default distance between the eyes, metres.
+pub const DEFAULT_IPD_M: f32 = 0.064;
+
+/// Largest eye image edge in pixels.
+pub const MAX_EYE_SIZE_PX: u32 = 8192;
+
+/// A display that cannot be rendered for.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum HmdError {
+    /// No preset of that name.
+    #[error("unknown display '{name}': expected one of {known}")]
+    Unknown {
+        /// As asked.
+        name: String,
+        /// Preset names.
+        known: String,
+    },
+    /// A figure out of range.
+    #[error("{what}: expected {expected}, found {found}")]
+    Invalid {
+        /// Which figure.
+        what: &'static str,
+        /// The range.
+        expected: String,
+        /// The figure.
+        found: String,
+    },
+}
+
+const UNVERIFIED: &str = "unverified";
+
+/// Preset names, the default first.
+pub const PRESETS: [&str; 4] = ["symmetric-100", "dk2", "vive", "quest2"];
+
+/// A preset by name.
+///
+/// # Errors
+/// [`HmdError::Unknown`] lists the names.
+pub fn preset(name: &str) -> Result<Hmd, HmdError> {
+    let tangents = |left, right, up, down| FovTangents {
+        left,
+        right,
+        up,
+        down,
+    };
+    let degrees = |left: f32, right: f32, up: f32, down: f32| {
+        let [left, right, up, down] = [left, right, up, down].map(|a| a.to_radians().tan());
+        tangents(left, right, up, down)
+    };
+    let (eye_size_px, left_eye, source) = match name {
+        "symmetric-100" => (
+            [960, 1080],
+            symmetric(100.0, [960, 1080]),
+            "Z2 paper, section 5: 2 x 960x1080 and a 100 degree field of view; on-axis eyes with square pixels are this tool's reading".to_owned(),
+        ),
+        "dk2" => (
+            [960, 1080],
+            tangents(1.06, 1.09, 1.33, 1.33),
+            format!("{UNVERIFIED}: Oculus Rift DK2 panel; tangents as the Oculus library's defaults are quoted"),
+        ),
+        "vive" => (
+            [1080, 1200],
+            tangents(1.397, 1.246, 1.473, 1.466),
+            format!("{UNVERIFIED}: HTC Vive panel; OpenVR raw projection of one headset as quoted"),
+        ),
+        "quest2" => (
+            [1832, 1920],
+            degrees(52.0, 42.0, 44.0, 49.0),
+            format!("{UNVERIFIED}: Meta Quest 2 panel; approximate OpenXR half-angles"),
+        ),
+        _ => {
+            return Err(HmdError::Unknown {
+                name: name.to_owned(),
+                known: PRESETS.join(", "),
+            });
+        }
+    };
+    Ok(Hmd {
+        name: name.to_owned(),
+        source,
+        eye_size_px,
+        fov: [left_eye, mirrored(&left_eye)],
+        ipd_m: DEFAULT_IPD_M,
+        cant_deg: 0.0,
+    })
+}
+
+/// The other eye's frustum of a display that is its own mirror image.
+#[must_use]
+pub fn mirrored(fov: &FovTangents) -> FovTangents {
+    FovTangents {
+        left: fov.right,
+        right: fov.left,
+        ..*fov
+    }
+}
+
+/// An on-axis frustum with square pixels: the vertical tangents follow from the aspect.
+#[must_use]
+pub fn symmetric(hfov_deg: f32, size_px: [u32; 2]) -> FovTangents {
+    // In f64 so that the tangents do not depend on the order of roundings.
+    let horizontal = (f64::from(hfov_deg) / 2.0).to_radians().tan();
+    let vertical = horizontal * f64::from(size_px[1]) / f64::from(size_px[0]);
+    FovTangents {
+        left: horizontal as f32,
+        right: horizontal as f32,
+        up: vertical as f32,
+        down: vertical as f32,
+    }
+}
+
+/// Checks every figure of a display.
+///
+/// # Errors
+/// [`HmdError::Invalid`] names the first figure out of range.
+pub fn validate(hmd: &Hmd) -> Result<(), HmdError> {
+    let check = |ok: bool, what, expected: &str, found: String| {
+        if ok {
+            return Ok(());
+        }
+        let expected = expected.to_owned();
+        Err(HmdError::Invalid {
+            what,
+            expected,
+            found,
+        })
+    };
+    let [width, height] = hmd.eye_size_px;
+    check(
+        (1..=MAX_EYE_SIZE_PX).contains(&width) && (1..=MAX_EYE_SIZE_PX).contains(&height),
+        "pixels per eye",
+        &format!("1x1 to {MAX_EYE_SIZE_PX}x{MAX_EYE_SIZE_PX}"),
+        format!("{width}x{height}"),
+    )?;
+    for fov in &hmd.fov {
+        let FovTangents {
+            left,
+            right,
+            up,
+            down,
+        } = *fov;
+        let shown = format!("{left},{right},{up},{down}");
+        let all = [left, right, up, down];
+        check(
+            all.iter().all(|t| t.is_finite() && t.abs() <= 100.0),
+            "field-of-view tangents",
+            "left,right,up,down, each from -100 to 100",
+            shown.clone(),
+        )?;
+        check(
+            left + right > 1e-4 && up + down > 1e-4,
+            "field-of-view tangents",
+            "left + right > 0 and up + down > 0",
+            shown,
+        )?;
+    }
+    check(
+        (0.0..=1.0).contains(&hmd.ipd_m),
+        "distance between the eyes",
+        "0 to 1000 mm",
+        format!("{} mm", hmd.ipd_m * 1000.0),
+    )?;
+    check(
+        (-45.0..=45.0).contains(&hmd.cant_deg),
+        "cant",
+        "-45 to 45 degrees",
+        format!("{} degrees", hmd.cant_deg),
+    )
+}
+
+/// Pixels between the images of a point straight ahead at depth `z_m` in parallel on-axis eyes:
+/// `W / (2 tan(h/2)) * IPD / z`.
+#[must_use]
+pub fn disparity_px(hmd: &Hmd, z_m: f32) -> f32 {
+    let fov = &hmd.fov[0];
+    hmd.eye_size_px[0] as f32 / (fov.left + fov.right) * hmd.ipd_m / z_m
+}
