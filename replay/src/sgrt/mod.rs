@@ -9,6 +9,7 @@
 //! joules, [`gbuffer`] counts what the tile buffers and DRAM move. [`evaluate`] puts them together.
 
 pub mod accuracy;
+pub mod analyse;
 pub mod cache;
 pub mod compose;
 pub mod config;
@@ -20,6 +21,7 @@ pub mod paper;
 pub mod picture;
 pub mod reject;
 pub mod reproject;
+pub mod result;
 pub mod srp;
 pub mod tni;
 pub mod work;
