@@ -347,6 +347,14 @@ pub enum ConfigError {
         /// Ways.
         found: u32,
     },
+    /// Ways that no binary tree has.
+    #[error("{level} cache with tree-plru: expected 1, 2, 4 ... 64 ways, found {found}")]
+    TreeWays {
+        /// `L1` or `L2`.
+        level: &'static str,
+        /// Ways.
+        found: u32,
+    },
     /// A number out of range.
     #[error("{key}: expected {expected}, found {found}")]
     Range {

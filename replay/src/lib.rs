@@ -7,6 +7,7 @@ pub mod config;
 pub mod engine;
 pub mod image;
 pub mod order;
+pub mod paper;
 pub mod report;
 pub mod result;
 pub mod sgrt;

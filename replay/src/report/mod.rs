@@ -1,5 +1,8 @@
 //! Tables, plots, JSON, CSV and the HTML report.
 
+pub mod csv;
+pub mod files;
 pub mod html;
 pub mod plots;
 pub mod theme;
+pub mod z2;

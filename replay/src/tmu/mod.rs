@@ -1,1 +1,8 @@
-//! The texture mapping unit: looping for the next chance.
+//! The texture mapping unit: "looping for the next chance" (RayCore, TOG 2014), as the Z2 paper's
+//! simulator uses it. `docs/tmu-model.md` states the model and its parameters in one page.
+
+mod closed_form;
+mod pipeline;
+
+pub use closed_form::closed_form;
+pub use pipeline::{Pipeline, PipelineStats, Turn};

@@ -1,7 +1,12 @@
 //! Charts as SVG text by plotters: a pure function of the numbers, byte for byte.
 
 pub mod bars;
+pub mod contours;
+pub mod data_uri;
+pub mod hbars;
+pub mod heatmap;
 pub mod lines;
+pub mod paths;
 
 use super::theme;
 use plotters::backend::SVGBackend;

@@ -1,0 +1,43 @@
+//! First in, first out: a hit changes nothing, the oldest line goes.
+
+use super::{Cache, EMPTY};
+
+/// A FIFO cache.
+pub struct Fifo {
+    tags: Vec<u32>,
+    /// The way to be replaced next, by set.
+    oldest: Vec<u8>,
+    ways: usize,
+    set_mask: u32,
+}
+
+impl Fifo {
+    /// An empty cache; `sets` is a power of two, `ways` at most 255.
+    #[must_use]
+    pub fn new(sets: u32, ways: u32) -> Self {
+        Self {
+            tags: vec![EMPTY; sets as usize * ways as usize],
+            oldest: vec![0; sets as usize],
+            ways: ways as usize,
+            set_mask: sets - 1,
+        }
+    }
+}
+
+impl Cache for Fifo {
+    fn lookup(&mut self, line: u32) -> bool {
+        let first = (line & self.set_mask) as usize * self.ways;
+        self.tags[first..first + self.ways].contains(&line)
+    }
+
+    fn fill(&mut self, line: u32) {
+        let set = (line & self.set_mask) as usize;
+        let oldest = &mut self.oldest[set];
+        self.tags[set * self.ways + usize::from(*oldest)] = line;
+        *oldest = if usize::from(*oldest) + 1 == self.ways {
+            0
+        } else {
+            *oldest + 1
+        };
+    }
+}

@@ -1,0 +1,241 @@
+use super::*;
+use proptest::prelude::*;
+use std::collections::HashSet;
+
+/// Brute-force twin: sets as lists of lines, first the next victim.
+struct Twin {
+    sets: Vec<Vec<u32>>,
+    ways: usize,
+    move_on_hit: bool,
+}
+
+impl Twin {
+    fn new(sets: usize, ways: usize, move_on_hit: bool) -> Self {
+        Self {
+            sets: vec![Vec::new(); sets],
+            ways,
+            move_on_hit,
+        }
+    }
+
+    fn access(&mut self, line: u32) -> bool {
+        let index = line as usize % self.sets.len();
+        let set = &mut self.sets[index];
+        let found = set.iter().position(|&l| l == line);
+        match found {
+            Some(at) if self.move_on_hit => {
+                set.remove(at);
+                set.push(line);
+            }
+            Some(_) => {}
+            None => {
+                if set.len() == self.ways {
+                    set.remove(0);
+                }
+                set.push(line);
+            }
+        }
+        found.is_some()
+    }
+}
+
+fn config(lines: u64, ways: u32, replacement: Replacement) -> CacheConfig {
+    CacheConfig {
+        size_bytes: lines * 16,
+        ways,
+        replacement,
+    }
+}
+
+fn cache(lines: u64, ways: u32, replacement: Replacement) -> Box<dyn Cache + Send> {
+    build(&config(lines, ways, replacement), "L1", 16, 5).unwrap()
+}
+
+fn misses(cache: &mut dyn Cache, trace: &[u32]) -> usize {
+    trace.iter().filter(|&&line| !cache.access(line)).count()
+}
+
+/// A trace with the locality of textures: mostly near the last line, sometimes far.
+fn trace() -> impl Strategy<Value = Vec<u32>> {
+    prop::collection::vec(prop_oneof![4 => 0_u32..40, 1 => 0_u32..400], 1..600)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn lru_equals_its_brute_force_twin_at_every_associativity(trace in trace()) {
+        for ways in [1, 2, 3, 4, 8, 16] {
+            let mut twin = Twin::new(4, ways as usize, true);
+            let mut cache = cache(4 * u64::from(ways), ways, Replacement::Lru);
+            for &line in &trace {
+                prop_assert_eq!(cache.access(line), twin.access(line));
+            }
+        }
+    }
+
+    #[test]
+    fn fifo_equals_its_brute_force_twin(trace in trace()) {
+        for ways in [1, 3, 4] {
+            let mut twin = Twin::new(8, ways as usize, false);
+            let mut cache = cache(8 * u64::from(ways), ways, Replacement::Fifo);
+            for &line in &trace {
+                prop_assert_eq!(cache.access(line), twin.access(line));
+            }
+        }
+    }
+
+    #[test]
+    fn lookup_then_fill_equals_access(trace in trace()) {
+        let (mut whole, mut steps) = (cache(32, 4, Replacement::Lru), cache(32, 4, Replacement::Lru));
+        for &line in &trace {
+            let hit = steps.lookup(line);
+            if !hit {
+                steps.fill(line);
+            }
+            prop_assert_eq!(whole.access(line), hit);
+        }
+    }
+
+    #[test]
+    fn lru_misses_equal_stack_distances_of_a_fully_associative_cache(trace in trace()) {
+        for lines in [1, 2, 8, 64] {
+            let mut stack: Vec<u32> = Vec::new();
+            let mut expected = 0;
+            for &line in &trace {
+                let depth = stack.iter().rev().position(|&l| l == line);
+                expected += usize::from(depth.is_none_or(|d| d >= lines));
+                stack.retain(|&l| l != line);
+                stack.push(line);
+            }
+            let mut cache = cache(lines as u64, lines as u32, Replacement::Lru);
+            prop_assert_eq!(misses(&mut *cache, &trace), expected);
+        }
+    }
+
+    #[test]
+    fn a_larger_lru_cache_with_the_same_sets_holds_whatever_the_smaller_holds(trace in trace()) {
+        let (mut small, mut large) = (cache(16, 2, Replacement::Lru), cache(32, 4, Replacement::Lru));
+        for &line in &trace {
+            let hit = small.access(line);
+            prop_assert!(large.access(line) || !hit);
+        }
+    }
+
+    #[test]
+    fn no_policy_beats_beladys(trace in trace()) {
+        for policy in [Replacement::Lru, Replacement::Fifo, Replacement::TreePlru, Replacement::Random] {
+            let mut cache = cache(16, 16, policy);
+            prop_assert!(misses(&mut *cache, &trace) >= belady_misses(&trace, 16));
+        }
+    }
+
+    #[test]
+    fn repeating_a_safe_sequence_changes_nothing(trace in trace(), first in 0_u32..40) {
+        for policy in [Replacement::Lru, Replacement::Fifo, Replacement::TreePlru, Replacement::Random] {
+            let (mut once, mut twice) = (cache(16, 4, policy), cache(16, 4, policy));
+            for &line in &trace {
+                let safe: Vec<u32> =
+                    (0..once.repeat_safe_lines()).map(|i| line + i * (first % 5)).collect();
+                for &l in &safe {
+                    prop_assert_eq!(once.access(l), twice.access(l));
+                }
+                prop_assert!(safe.iter().all(|&l| twice.access(l)));
+            }
+        }
+    }
+}
+
+/// Misses of the optimal policy: the victim is the line wanted again last.
+fn belady_misses(trace: &[u32], lines: usize) -> usize {
+    let mut held: HashSet<u32> = HashSet::new();
+    let mut misses = 0;
+    for (now, &line) in trace.iter().enumerate() {
+        if held.contains(&line) {
+            continue;
+        }
+        misses += 1;
+        if held.len() == lines {
+            let next = |l: u32| {
+                trace[now..]
+                    .iter()
+                    .position(|&t| t == l)
+                    .unwrap_or(usize::MAX)
+            };
+            let victim = held.iter().copied().max_by_key(|&l| (next(l), l)).unwrap();
+            held.remove(&victim);
+        }
+        held.insert(line);
+    }
+    misses
+}
+
+#[test]
+fn streaming_misses_every_line_once() {
+    let trace: Vec<u32> = (0..1000).flat_map(|line| [line; 3]).collect();
+    for policy in [
+        Replacement::Lru,
+        Replacement::Fifo,
+        Replacement::TreePlru,
+        Replacement::Random,
+    ] {
+        assert_eq!(
+            misses(&mut *cache(64, 4, policy), &trace),
+            1000,
+            "{policy:?}"
+        );
+    }
+}
+
+#[test]
+fn a_cycle_one_line_longer_than_an_lru_cache_always_misses() {
+    let trace: Vec<u32> = (0..10).flat_map(|_| 0..9).collect();
+    assert_eq!(
+        misses(&mut *cache(8, 8, Replacement::Lru), &trace),
+        trace.len()
+    );
+    assert_eq!(misses(&mut *cache(16, 16, Replacement::Lru), &trace), 9);
+}
+
+#[test]
+fn tree_plru_spares_the_line_used_last() {
+    let mut cache = cache(4, 4, Replacement::TreePlru);
+    for line in [0, 1, 2, 3] {
+        cache.access(line);
+    }
+    cache.access(1);
+    cache.access(9);
+    assert!(cache.lookup(1) && cache.lookup(9));
+}
+
+#[test]
+fn tree_plru_with_two_ways_is_lru() {
+    let trace: Vec<u32> = (0..500_u32)
+        .map(|i| i.wrapping_mul(2_654_435_761) >> 27)
+        .collect();
+    assert_eq!(
+        misses(&mut *cache(16, 2, Replacement::TreePlru), &trace),
+        misses(&mut *cache(16, 2, Replacement::Lru), &trace)
+    );
+}
+
+#[test]
+fn random_replacement_follows_its_seed() {
+    let trace: Vec<u32> = (0..2000_u32)
+        .map(|i| i.wrapping_mul(2_654_435_761) >> 25)
+        .collect();
+    let run = |seed| {
+        let mut cache = build(&config(32, 4, Replacement::Random), "L1", 16, seed).unwrap();
+        misses(&mut *cache, &trace)
+    };
+    assert_eq!(run(1), run(1));
+    assert!((1..20).any(|seed| run(seed) != run(0)));
+}
+
+#[test]
+fn a_tree_needs_a_power_of_two_of_ways() {
+    let error = build(&config(12, 3, Replacement::TreePlru), "L2", 16, 0)
+        .err()
+        .unwrap();
+    assert!(error.to_string().contains("L2"), "{error}");
+}

@@ -1,0 +1,104 @@
+//! The footprints of one quad at one level of one sample, as cache lines.
+
+/// Footprints of up to four lanes at one level.
+///
+/// Lines are relative to the texture, so that all textures of a material with the same size share
+/// one computation.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Bundle {
+    /// Mip level.
+    pub level: u8,
+    /// Footprints (lanes).
+    pub count: u8,
+    /// Bit `i`: footprint `i` has the same lines as the one before.
+    repeats: u8,
+    /// Distinct lines of each footprint, 1 to 4.
+    lens: [u8; 4],
+    lines: [[u32; 4]; 4],
+}
+
+impl Bundle {
+    /// Empties the bundle for a level.
+    #[inline(always)]
+    pub fn begin(&mut self, level: u8) {
+        self.level = level;
+        self.count = 0;
+        self.repeats = 0;
+    }
+
+    /// Distinct lines of a footprint, in the order in which its texels ask for them.
+    #[inline(always)]
+    #[must_use]
+    pub fn lines_of(&self, index: usize) -> &[u32] {
+        let len = usize::from(self.lens[index & 3]).min(4);
+        &self.lines[index & 3][..len]
+    }
+
+    /// True if the footprint has the same lines as the one before.
+    #[inline(always)]
+    #[must_use]
+    pub fn repeats(&self, index: usize) -> bool {
+        self.repeats >> index & 1 != 0
+    }
+
+    /// Adds the footprint of the lines of its four texels (top left, top right, bottom left,
+    /// bottom right).
+    #[inline(always)]
+    pub fn push(&mut self, texels: [u32; 4]) {
+        let [a, b, c, d] = texels;
+        let index = usize::from(self.count & 3);
+        // Unused entries repeat the first line, so that whole arrays can be compared.
+        let mut lines = [a; 4];
+        let mut len = 1;
+        if b != a {
+            lines[1] = b;
+            len = 2;
+        }
+        if c != a && c != b {
+            lines[len] = c;
+            len += 1;
+        }
+        if d != a && d != b && d != c {
+            lines[len & 3] = d;
+            len += 1;
+        }
+        if index > 0 && self.lines[index - 1] == lines {
+            self.repeats |= 1 << index;
+        }
+        self.lines[index] = lines;
+        self.lens[index] = len as u8;
+        self.count += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bundle(footprints: &[[u32; 4]]) -> Bundle {
+        let mut bundle = Bundle::default();
+        bundle.begin(0);
+        footprints.iter().for_each(|&texels| bundle.push(texels));
+        bundle
+    }
+
+    #[test]
+    fn lines_of_a_footprint_are_distinct_and_in_texel_order() {
+        for (texels, lines) in [
+            ([5, 5, 5, 5], &[5][..]),
+            ([5, 6, 5, 6], &[5, 6]),
+            ([5, 5, 2, 2], &[5, 2]),
+            ([5, 6, 7, 5], &[5, 6, 7]),
+            ([5, 6, 6, 7], &[5, 6, 7]),
+            ([9, 3, 7, 1], &[9, 3, 7, 1]),
+        ] {
+            assert_eq!(bundle(&[texels]).lines_of(0), lines);
+        }
+    }
+
+    #[test]
+    fn only_equal_neighbours_are_repeats() {
+        let bundle = bundle(&[[1, 2, 1, 2], [1, 2, 1, 2], [2, 1, 2, 1], [1, 2, 1, 2]]);
+        assert_eq!([0, 1, 2, 3].map(|i| bundle.repeats(i)), [false, true, false, false]);
+    }
+}

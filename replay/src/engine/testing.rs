@@ -1,0 +1,95 @@
+//! Small traces for the tests of the engine.
+
+use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
+use formats::textrace::{
+    Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta, UvGroup,
+};
+use formats::view::{Eye, FovTangents, Hmd};
+
+/// Tables with one draw that samples all textures (of these sizes, BC1, all levels) trilinearly,
+/// and a stereo pair of one-tile passes.
+pub fn tables(sizes: &[[u32; 2]]) -> Tables {
+    let fov = FovTangents { left: 1.0, right: 1.0, up: 1.0, down: 1.0 };
+    let pass = |eye| Pass {
+        frame: 0,
+        kind: PassKind::Main,
+        eye: Some(eye),
+        size_px: [16, 16],
+        tiles: [1, 1],
+    };
+    Tables {
+        meta: TraceMeta {
+            tool: "test".into(),
+            command_line: Vec::new(),
+            scene: "test".into(),
+            scene_triangles: 1,
+            camera: "default".into(),
+            backend: "memory".into(),
+            driver: "none".into(),
+            seed: 0,
+            hmd: Hmd {
+                name: "custom".into(),
+                source: "unverified".into(),
+                eye_size_px: [16, 16],
+                fov: [fov; 2],
+                ipd_m: 0.064,
+                cant_deg: 0.0,
+            },
+            frames: Vec::new(),
+        },
+        textures: sizes
+            .iter()
+            .enumerate()
+            .map(|(i, &size)| Texture {
+                name: format!("texture {i}"),
+                size,
+                levels: size[0].max(size[1]).ilog2() + 1,
+                layers: 1,
+                format: TexelFormat::Bc1,
+                color_space: ColorSpace::Srgb,
+            })
+            .collect(),
+        samplers: vec![Sampler::TRILINEAR_REPEAT],
+        draws: vec![Draw {
+            material: "all".into(),
+            first_primitive: 0,
+            primitives: 1 << 20,
+            groups: vec![UvGroup {
+                extent: [0, 1].map(|axis| sizes.iter().map(|s| s[axis]).max().unwrap_or(1)),
+                samples: (0..sizes.len() as u32)
+                    .map(|texture| Sample { texture, sampler: 0, layer: 0, offset: [0; 2] })
+                    .collect(),
+            }],
+        }],
+        passes: vec![pass(Eye::Left), pass(Eye::Right)],
+    }
+}
+
+/// A fully covered quad at texel (0, 0), one texel a pixel.
+pub fn record(x: u8, y: u8) -> QuadRecord {
+    QuadRecord {
+        x,
+        y,
+        mask: 15,
+        group: 0,
+        uv: [SUBTEXELS / 2; 2],
+        dx: [SUBTEXELS, 0],
+        dy: [0, SUBTEXELS],
+        cross: [0; 2],
+    }
+}
+
+/// A tile of primitives, each with so many quads side by side.
+pub fn tile(primitives: &[(u32, u32)]) -> Tile {
+    let mut tile = Tile::default();
+    for &(primitive, quads) in primitives {
+        tile.runs.push(PrimitiveRun {
+            primitive,
+            draw: 0,
+            first: tile.records.len() as u32,
+            count: quads,
+        });
+        tile.records.extend((0..quads).map(|i| record((i % 8) as u8, (i / 8) as u8)));
+    }
+    tile
+}

@@ -1,0 +1,24 @@
+//! Z2 STA with the two triangle lists merged by primitive number: the same triangle is rendered
+//! for both eyes back to back, even where one eye sees triangles that the other does not.
+
+use super::{Interleave, Morton, TileOrder, View, WorkItem, covering, paired};
+
+/// Z2 STA, lists merged.
+pub struct Z2StaMerge;
+
+impl TileOrder for Z2StaMerge {
+    fn curve(&self, tiles: [u32; 2]) -> Vec<[u32; 2]> {
+        Morton.curve(tiles)
+    }
+
+    fn stereo(&self, left: View, right: View) -> Vec<WorkItem> {
+        paired(
+            left,
+            right,
+            &self.curve(covering(left, right)),
+            |l, r, items| {
+                items.push(WorkItem::Pair(l, r, Interleave::Merge));
+            },
+        )
+    }
+}

@@ -1,0 +1,479 @@
+//! The experiment's plots, made of the rows and details of the report.
+
+use super::model::{Detail, PaperReport, Row, TraceInfo};
+use super::tables::{busiest, caches_title, l1_miss_pct, l2_miss_pct, order_title};
+use crate::config::OrderKind;
+use crate::order::{View, WorkItem, by_kind};
+use crate::paper::{closed_form_utilization, z2_table};
+use crate::report::plots::bars::{BarChart, BarGroup};
+use crate::report::plots::contours::{ContourChart, PointSeries};
+use crate::report::plots::hbars::HBarChart;
+use crate::report::plots::heatmap::{HeatMap, Panel};
+use crate::report::plots::lines::{Axis, LineChart, LineSeries, Mark};
+use crate::report::plots::paths::{PathPlot, Stop};
+use crate::report::plots::{PlotError, SeriesStyle};
+use crate::report::theme;
+use crate::result::{Part, TileMap};
+
+fn style(order: OrderKind) -> SeriesStyle {
+    SeriesStyle {
+        name: order_title(order).to_owned(),
+        color: theme::order_color(order.name()),
+    }
+}
+
+/// Bars over cache configurations, one series an order.
+fn by_caches(
+    report: &PaperReport,
+    scene: &str,
+    title: &str,
+    value_label: &str,
+    mark_name: &str,
+    value: impl Fn(&Row) -> Option<f64>,
+    mark: impl Fn(&Row) -> Option<f64>,
+) -> BarChart {
+    let orders = report.orders();
+    let groups: Vec<BarGroup> = report
+        .caches_kib()
+        .into_iter()
+        .map(|caches| {
+            let rows: Vec<Option<&Row>> = orders
+                .iter()
+                .map(|o| report.row(scene, caches, *o))
+                .collect();
+            BarGroup {
+                label: caches_title(caches),
+                values: rows.iter().map(|r| r.and_then(&value)).collect(),
+                marks: rows.iter().map(|r| r.and_then(&mark)).collect(),
+            }
+        })
+        .collect();
+    let marked = groups.iter().any(|g| g.marks.iter().any(Option::is_some));
+    BarChart {
+        title: format!("{scene}: {title}"),
+        value_label: value_label.to_owned(),
+        group_label: "L1/L2 size, KiB".to_owned(),
+        series: orders.into_iter().map(style).collect(),
+        groups,
+        mark_name: marked.then(|| mark_name.to_owned()),
+        reference: None,
+        decimals: Some(1),
+    }
+}
+
+/// Fig. 5: external traffic. The paper gives no absolute numbers in its text, so its marks are its
+/// ratios to Morton, applied to our Morton.
+#[must_use]
+pub fn bandwidth(report: &PaperReport, scene: &str) -> BarChart {
+    let mark = |row: &Row| {
+        let saved = row.paper?.reduction_pct?;
+        let morton = report.row(scene, (row.l1_kib, row.l2_kib), OrderKind::Morton)?;
+        (row.order != OrderKind::Morton)
+            .then_some(morton.external_mb_per_frame * (1.0 - saved / 100.0))
+    };
+    let label = "external texture traffic, MB per frame";
+    by_caches(
+        report,
+        scene,
+        "bandwidth",
+        label,
+        "paper's ratio to Morton",
+        |r| Some(r.external_mb_per_frame),
+        mark,
+    )
+}
+
+/// L1 and L2 miss rates and TMU utilisation with the paper's values as marks.
+#[must_use]
+pub fn rates(report: &PaperReport, scene: &str) -> Vec<BarChart> {
+    let mut charts = vec![
+        by_caches(
+            report,
+            scene,
+            "L1 miss rate",
+            "footprints with a missing line, %",
+            "paper",
+            |r| Some(r.figures.l1_miss_pct),
+            |r| Some(r.paper?.l1_miss_pct),
+        ),
+        by_caches(
+            report,
+            scene,
+            "L2 miss rate",
+            "L2 look-ups that miss, %",
+            "paper",
+            |r| Some(r.figures.l2_miss_pct),
+            |r| Some(r.paper?.l2_miss_pct),
+        ),
+    ];
+    if report.rows.iter().any(|r| r.figures.tmu_util_pct.is_some()) {
+        charts.push(by_caches(
+            report,
+            scene,
+            "TMU utilisation",
+            "useful issue cycles, %",
+            "paper",
+            |r| r.figures.tmu_util_pct,
+            |r| r.paper?.tmu_util_pct,
+        ));
+    }
+    charts
+}
+
+/// Miss rates of every row on the paper's utilisation surface.
+///
+/// # Errors
+/// See [`ContourChart::svg`].
+pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
+    let mut series = vec![PointSeries {
+        style: SeriesStyle {
+            name: "paper".to_owned(),
+            color: theme::MUTED,
+        },
+        points: z2_table()
+            .iter()
+            .map(|r| (r.l1_miss_pct, r.l2_miss_pct))
+            .collect(),
+        hollow: true,
+    }];
+    series.extend(report.orders().into_iter().map(|order| {
+        PointSeries {
+            style: style(order),
+            points: report
+                .rows
+                .iter()
+                .filter(|r| r.order == order)
+                .map(|r| (r.figures.l1_miss_pct.max(0.5), r.figures.l2_miss_pct))
+                .collect(),
+            hollow: false,
+        }
+    }));
+    let largest = series
+        .iter()
+        .flat_map(|s| s.points.iter().map(|p| p.0))
+        .fold(32.0, f64::max);
+    ContourChart {
+        title: "Miss rates on the surface of TMU utilisation".to_owned(),
+        x_label: "L1 miss rate, % (logarithmic)".to_owned(),
+        y_label: "L2 miss rate, %; lines: utilisation that the paper's table implies".to_owned(),
+        x_range: (0.5, largest.log2().ceil().exp2()),
+        surface: &|m1, m2| 100.0 * closed_form_utilization(m1 / 100.0, m2 / 100.0),
+        levels: ((11..=19).map(|i| f64::from(i) * 5.0).collect(), " %"),
+        series,
+    }
+    .svg()
+}
+
+/// Simulated utilisation against the closed form; `None` when no row was timed.
+#[must_use]
+pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
+    let mut series: Vec<LineSeries> = report
+        .orders()
+        .into_iter()
+        .map(|order| LineSeries {
+            style: style(order),
+            points: report
+                .rows
+                .iter()
+                .filter(|r| r.order == order)
+                .filter_map(|r| Some((r.closed_form_util_pct, r.figures.tmu_util_pct?)))
+                .collect(),
+            mark: Mark::Dots,
+        })
+        .filter(|s| !s.points.is_empty())
+        .collect();
+    let ends = series
+        .iter()
+        .flat_map(|s| s.points.iter().flat_map(|p| [p.0, p.1]))
+        .fold(None, |range: Option<(f64, f64)>, v| {
+            Some(range.map_or((v, v), |(l, h)| (l.min(v), h.max(v))))
+        })?;
+    let ends = (
+        (ends.0 / 5.0).floor() * 5.0,
+        ((ends.1 / 5.0).ceil() * 5.0).min(100.0),
+    );
+    for (offset, name) in [
+        (1.5, "+1.5 points"),
+        (0.0, "equal"),
+        (-1.5, "\u{2212}1.5 points"),
+    ] {
+        let line = LineSeries {
+            style: SeriesStyle {
+                name: name.to_owned(),
+                color: theme::AXIS,
+            },
+            points: vec![(ends.0, ends.0 + offset), (ends.1, ends.1 + offset)],
+            mark: Mark::ThinLine,
+        };
+        series.insert(0, line);
+    }
+    Some(LineChart {
+        title: "Simulated TMU utilisation against the closed form".to_owned(),
+        x: Axis {
+            range: Some(ends),
+            ..Axis::linear("closed form of our miss rates, %")
+        },
+        y: Axis {
+            range: Some((ends.0 - 2.0, ends.1 + 2.0)),
+            ..Axis::linear("simulated, %")
+        },
+        series,
+    })
+}
+
+/// Miss rates and traffic by mip level, one series an order.
+#[must_use]
+pub fn by_level(details: &[&Detail]) -> Vec<BarChart> {
+    let Some(first) = details.first() else {
+        return Vec::new();
+    };
+    let chart =
+        |title: &str, value_label: &str, decimals, value: &dyn Fn(&Part) -> Option<f64>| BarChart {
+            title: format!("{}: {title}", first.scene),
+            value_label: value_label.to_owned(),
+            group_label: "mip level, 0 is the finest".to_owned(),
+            series: details.iter().map(|d| style(d.order)).collect(),
+            groups: (0..first.by_level.len())
+                .map(|level| BarGroup {
+                    label: first.by_level[level]
+                        .name
+                        .trim_start_matches("level ")
+                        .to_owned(),
+                    values: details
+                        .iter()
+                        .map(|d| d.by_level.get(level).and_then(value))
+                        .collect(),
+                    marks: Vec::new(),
+                })
+                .collect(),
+            mark_name: None,
+            reference: None,
+            decimals,
+        };
+    vec![
+        chart(
+            "L1 miss rate by mip level",
+            "footprints with a missing line, %",
+            None,
+            &l1_miss_pct,
+        ),
+        chart(
+            "external traffic by mip level",
+            "thousand lines",
+            None,
+            &|p| Some(p.l2.line_misses as f64 / 1e3),
+        ),
+    ]
+}
+
+/// The textures with the most external traffic.
+#[must_use]
+pub fn by_texture(details: &[&Detail], most: usize) -> Vec<HBarChart> {
+    let Some(first) = details.first() else {
+        return Vec::new();
+    };
+    let chart = |title: &str, value_label: &str, value: &dyn Fn(&Part) -> Option<f64>| HBarChart {
+        title: format!("{}: {title}", first.scene),
+        value_label: value_label.to_owned(),
+        series: details.iter().map(|d| style(d.order)).collect(),
+        rows: busiest(&first.by_texture, most)
+            .into_iter()
+            .map(|i| {
+                let values = details
+                    .iter()
+                    .map(|d| d.by_texture.get(i).and_then(value))
+                    .collect();
+                (first.by_texture[i].name.clone(), values)
+            })
+            .collect(),
+    };
+    vec![
+        chart(
+            "L1 miss rate by texture",
+            "footprints with a missing line, %",
+            &l1_miss_pct,
+        ),
+        chart(
+            "L2 miss rate by texture",
+            "L2 look-ups that miss, %",
+            &l2_miss_pct,
+        ),
+        chart("external traffic by texture", "thousand lines", &|p| {
+            Some(p.l2.line_misses as f64 / 1e3)
+        }),
+    ]
+}
+
+/// What a tile map can show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TileMeasure {
+    /// Covered lanes over pixels.
+    Overdraw,
+    /// Footprints.
+    Footprints,
+    /// Footprints with a missing line.
+    L1Misses,
+    /// Lines from memory.
+    L2Misses,
+}
+
+impl TileMeasure {
+    /// Every measure, and whether it depends on the order.
+    pub const ALL: [(Self, bool); 4] = [
+        (Self::Overdraw, false),
+        (Self::Footprints, false),
+        (Self::L1Misses, true),
+        (Self::L2Misses, true),
+    ];
+
+    fn titles(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Overdraw => ("overdraw", "shaded fragments per pixel"),
+            Self::Footprints => ("texture accesses", "bilinear footprints per tile"),
+            Self::L1Misses => ("L1 misses", "missing footprints per tile"),
+            Self::L2Misses => ("external traffic", "lines from memory per tile"),
+        }
+    }
+
+    fn values(self, map: &TileMap) -> Vec<f64> {
+        match self {
+            Self::Overdraw => map.overdraw.iter().map(|v| f64::from(*v)).collect(),
+            Self::Footprints => map.footprints.iter().map(|v| f64::from(*v)).collect(),
+            Self::L1Misses => map.l1_misses.iter().map(|v| f64::from(*v)).collect(),
+            Self::L2Misses => map.l2_misses.iter().map(|v| f64::from(*v)).collect(),
+        }
+    }
+}
+
+/// Both eyes' tiles of one run; `None` when the run has no maps of the two eyes.
+#[must_use]
+pub fn heat_map(info: &TraceInfo, detail: &Detail, measure: TileMeasure) -> Option<HeatMap> {
+    let (title, value_label) = measure.titles();
+    let panels: Vec<Panel> = info
+        .eye_passes
+        .iter()
+        .zip(["left eye", "right eye"])
+        .filter_map(|(pass, name)| {
+            let map = detail.tile_maps.iter().find(|m| m.pass == *pass)?;
+            Some(Panel {
+                name: name.to_owned(),
+                tiles: map.tiles,
+                values: measure.values(map),
+            })
+        })
+        .collect();
+    let of_order = TileMeasure::ALL
+        .iter()
+        .any(|(m, depends)| *m == measure && *depends);
+    let order = if of_order {
+        format!(", {}", order_title(detail.order))
+    } else {
+        String::new()
+    };
+    (!panels.is_empty()).then(|| HeatMap {
+        title: format!("{}: {title}{order}", info.label),
+        value_label: value_label.to_owned(),
+        panels,
+        high: None,
+    })
+}
+
+/// An order's path over both eyes' grids of `tiles`.
+#[must_use]
+pub fn path(order: OrderKind, seed: u64, tiles: [u32; 2]) -> PathPlot {
+    let view = |pass| View { pass, tiles };
+    let items = by_kind(order, seed).stereo(view(0), view(1));
+    let mut stops = Vec::with_capacity(2 * tiles[0] as usize * tiles[1] as usize);
+    for item in &items {
+        for (i, tile) in item.tiles().enumerate() {
+            stops.push(Stop {
+                eye: tile.pass,
+                x: tile.tile % tiles[0].max(1),
+                y: tile.tile / tiles[0].max(1),
+                paired: i > 0,
+            });
+        }
+    }
+    let pairs = items.iter().any(|i| matches!(i, WorkItem::Pair(..)));
+    let alternates = stops.windows(2).take(1).any(|w| w[0].eye != w[1].eye);
+    let note = match (pairs, alternates) {
+        (true, _) => "a pair of tiles is one step on one core",
+        (false, true) => "left and right tile in turn",
+        (false, false) => "the whole left view, then the right",
+    };
+    PathPlot {
+        title: order_title(order).to_owned(),
+        note: note.to_owned(),
+        tiles,
+        stops,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::report;
+    use super::*;
+
+    #[test]
+    fn a_twins_marks_are_the_papers_ratios_on_our_morton() {
+        let report = report();
+        let chart = bandwidth(&report, "crytek-sponza");
+        let group = &chart.groups[3];
+        assert_eq!(group.label, "16/256");
+        // Our rows are the paper's, so bars and marks coincide.
+        let (bar, mark) = (group.values[2].unwrap(), group.marks[2].unwrap());
+        assert!((bar - mark).abs() < 0.01, "{bar} {mark}");
+        assert_eq!(group.marks[0], None);
+    }
+
+    #[test]
+    fn every_chart_has_a_unit_on_its_values() {
+        let report = report();
+        let mut charts = rates(&report, "crytek-sponza");
+        charts.push(bandwidth(&report, "crytek-sponza"));
+        charts.extend(by_level(&[&report.details[0]]));
+        for chart in charts {
+            assert!(
+                ["%", "MB per frame", "thousand lines"]
+                    .iter()
+                    .any(|u| chart.value_label.ends_with(u)),
+                "{}",
+                chart.value_label
+            );
+        }
+    }
+
+    #[test]
+    fn end_labels_of_the_closed_form_chart_do_not_overlap() {
+        let mut at: Vec<f64> = closed_form(&report())
+            .unwrap()
+            .label_positions()
+            .iter()
+            .map(|l| l.y_px)
+            .collect();
+        at.sort_by(f64::total_cmp);
+        assert!(at.windows(2).all(|w| w[1] - w[0] >= 14.9), "{at:?}");
+    }
+
+    #[test]
+    fn a_path_visits_every_tile_of_both_eyes_once() {
+        for order in OrderKind::ALL {
+            let path = path(order, 1, [8, 4]);
+            let mut seen: Vec<(u32, u32, u32)> =
+                path.stops.iter().map(|s| (s.eye, s.x, s.y)).collect();
+            seen.sort_unstable();
+            seen.dedup();
+            assert_eq!(seen.len(), 64, "{order:?}");
+            path.svg().unwrap();
+        }
+    }
+
+    #[test]
+    fn heat_maps_show_both_eyes() {
+        let report = report();
+        let map = heat_map(&report.traces[0], &report.details[0], TileMeasure::L2Misses).unwrap();
+        assert_eq!(map.panels.len(), 2);
+        assert_eq!(map.title, "crytek-sponza: external traffic, Morton");
+        assert!(map.svg().unwrap().len() < 60_000);
+    }
+}
