@@ -75,6 +75,31 @@ impl Picture {
         }
         out
     }
+
+    /// The picture shrunk by a whole factor, each pixel the mean of those it covers, until neither
+    /// edge is longer than `longest_px`.
+    #[must_use]
+    pub fn shrunk_to(&self, longest_px: u32) -> Self {
+        let longest = self.size_px[0].max(self.size_px[1]);
+        let factor = longest.div_ceil(longest_px.max(1)).max(1);
+        let size_px = self.size_px.map(|s| s.div_ceil(factor));
+        let mut out = Self::filled(size_px, [0; 3]);
+        for (i, pixel) in out.pixels.iter_mut().enumerate() {
+            let (x, y) = (i as u32 % size_px[0] * factor, i as u32 / size_px[0] * factor);
+            let (mut sum, mut count) = ([0u32; 3], 0u32);
+            for row in y..(y + factor).min(self.size_px[1]) {
+                for column in x..(x + factor).min(self.size_px[0]) {
+                    let at = row as usize * self.width() + column as usize;
+                    for (total, channel) in sum.iter_mut().zip(self.pixels[at]) {
+                        *total += u32::from(channel);
+                    }
+                    count += 1;
+                }
+            }
+            *pixel = sum.map(|c| ((c + count / 2) / count.max(1)) as u8);
+        }
+        out
+    }
 }
 
 /// Pixels per degree at the centre of an eye's image: `(W/2) / tan(h/2) * pi/180`, with the mean
@@ -130,6 +155,16 @@ mod tests {
         assert_eq!(quantile(&values, 0.99), 99.0);
         assert_eq!(quantile(&values, 1.0), 100.0);
         assert_eq!(quantile(&[], 0.5), 0.0);
+    }
+
+    #[test]
+    fn shrinking_keeps_the_mean_of_each_block() {
+        let mut p = Picture::filled([5, 4], [0; 3]);
+        p.pixels[0] = [100, 0, 0];
+        let small = p.shrunk_to(3);
+        assert_eq!(small.size_px, [3, 2]);
+        assert_eq!(small.pixels[0], [25, 0, 0]);
+        assert_eq!(p.shrunk_to(5), p);
     }
 
     #[test]

@@ -4,5 +4,6 @@ pub mod csv;
 pub mod files;
 pub mod html;
 pub mod plots;
+pub mod sgrt;
 pub mod theme;
 pub mod z2;
