@@ -1,9 +1,11 @@
 //! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
 
 use crate::size::{format_bytes, serde_bytes};
-use formats::texture::TexelFormat;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+pub use formats::footprint::{FilterOverride, LodFormula, SamplingOptions as SamplingConfig};
+pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
 
 /// How time passes in a replay.
 #[derive(
@@ -158,90 +160,6 @@ impl CacheConfig {
     }
 }
 
-/// Filter used at replay.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum FilterOverride {
-    /// Each sample's own sampler.
-    #[default]
-    AsRecorded,
-    /// Linear within a level, linear between levels.
-    Trilinear,
-    /// Linear within the nearest level.
-    Bilinear,
-    /// One texel of the nearest level.
-    Nearest,
-}
-
-/// How the level of detail is computed from the derivatives.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum LodFormula {
-    /// `fastlog2(max(|dx|^2, |dy|^2)) / 2`, as llvmpipe.
-    #[default]
-    Llvmpipe,
-    /// `log2(max(max(|dudx|, |dudy|) * width, max(|dvdx|, |dvdy|) * height))`, as softpipe.
-    Softpipe,
-    /// As llvmpipe with the exact logarithm.
-    Exact,
-}
-
-/// What a recorded quad fetches.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SamplingConfig {
-    /// Filter.
-    pub filter: FilterOverride,
-    /// Added to the level of detail.
-    pub lod_bias: f32,
-    /// Level-of-detail formula.
-    pub lod: LodFormula,
-    /// Helper lanes (of partly covered quads) fetch, too.
-    pub helper_lanes: bool,
-}
-
-/// Order of the blocks of a level in memory.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum BlockOrder {
-    /// Row by row.
-    #[default]
-    Linear,
-    /// Z-order curve.
-    Morton,
-    /// Small square tiles of blocks, row by row within and between.
-    Tiled,
-}
-
-/// Where texels lie in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LayoutConfig {
-    /// Format of the colour textures; `None` keeps the captured one (shadow maps always do).
-    pub texel_format: Option<TexelFormat>,
-    /// Block order within a level.
-    pub block_order: BlockOrder,
-    /// Alignment of a texture's first byte, a power of two.
-    #[serde(with = "serde_bytes")]
-    pub base_align_bytes: u64,
-}
-
-impl Default for LayoutConfig {
-    fn default() -> Self {
-        Self {
-            texel_format: None,
-            block_order: BlockOrder::Linear,
-            base_align_bytes: 256,
-        }
-    }
-}
-
 /// The texture unit's pipeline ("looping for the next chance"); see `docs/tmu-model.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -385,9 +303,9 @@ impl RunConfig {
             }
         };
         range(
-            self.line_bytes.is_power_of_two() && (4..=4096).contains(&self.line_bytes),
+            self.line_bytes.is_power_of_two() && (16..=4096).contains(&self.line_bytes),
             "line_bytes",
-            "a power of two from 4 to 4096",
+            "a power of two from 16 (the largest block) to 4096",
             self.line_bytes.to_string(),
         )?;
         range(

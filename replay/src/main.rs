@@ -1,3 +1,5 @@
 //! `replay`: trace to answer.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    replay::cli::main()
+}

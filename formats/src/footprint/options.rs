@@ -52,7 +52,7 @@ pub enum LodFormula {
 
 /// Everything about sampling that is not in the trace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default)]
 pub struct SamplingOptions {
     /// Filter.
     pub filter: FilterOverride,

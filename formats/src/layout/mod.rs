@@ -41,7 +41,7 @@ pub const PAGE_ALIGNMENT_BYTES: u64 = 64 << 10;
 
 /// Everything that decides a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default)]
 pub struct LayoutConfig {
     /// Format of the colour textures; `None` keeps the captured one. Shadow maps (R32F) always
     /// keep theirs.

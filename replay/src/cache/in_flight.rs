@@ -92,6 +92,9 @@ mod tests {
         in_flight.request(1, 220);
         in_flight.request(2, 20);
         in_flight.arrive(300, &mut cache);
-        assert!(cache.lookup(1), "the later arrival replaced the earlier one");
+        assert!(
+            cache.lookup(1),
+            "the later arrival replaced the earlier one"
+        );
     }
 }

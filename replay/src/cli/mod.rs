@@ -1,1 +1,93 @@
 //! The command line, one file a subcommand.
+
+mod config_args;
+mod run;
+
+pub use config_args::ConfigArgs;
+
+use crate::result::TraceId;
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+use formats::textrace::Textrace;
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Exit code of wrong use or unreadable input; clap's own, too.
+const USAGE: u8 = 2;
+
+/// Replays Parallax traces through cache, texture-unit and ray-tracing-unit models.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Replay one trace in one tile order through one cache configuration.
+    Run(Box<run::Args>),
+}
+
+/// Parses the command line and runs it. Errors go to stderr.
+#[must_use]
+pub fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Run(args) => run::run(&args),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            anstream::eprintln!("error: {error:#}");
+            ExitCode::from(USAGE)
+        }
+    }
+}
+
+/// True where the reader of our output has gone: `replay ... | head` is no failure.
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let io = error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<io::Error>());
+    io.into_iter()
+        .any(|cause| cause.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// Writes a result to stdout, with a line feed at its end.
+///
+/// # Errors
+/// Those of writing.
+pub fn print(text: &str) -> Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}", text.trim_end_matches('\n'))?;
+    Ok(out.flush()?)
+}
+
+/// Opens a texture trace and names it as results do.
+///
+/// # Errors
+/// The file cannot be read or is damaged.
+pub fn open_textrace(path: &Path) -> Result<(Textrace, TraceId)> {
+    let trace = Textrace::open(path)?;
+    let id = TraceId {
+        scene: trace.tables().meta.scene.clone(),
+        checksum: format!("{:08x}", trace.file_checksum()),
+    };
+    Ok((trace, id))
+}
+
+/// Limits rayon to `threads`, if given. Results never depend on it.
+///
+/// # Errors
+/// The threads cannot be started.
+pub fn set_threads(threads: Option<usize>) -> Result<()> {
+    let Some(threads) = threads else {
+        return Ok(());
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .context("--threads")
+}

@@ -19,7 +19,10 @@ impl Quad<'_> {
     /// Covered lanes, whatever they sample.
     #[must_use]
     pub fn lanes(&self) -> u32 {
-        self.records.iter().fold(0, |all, r| all | r.mask & 15).count_ones()
+        self.records
+            .iter()
+            .fold(0, |all, r| all | r.mask & 15)
+            .count_ones()
     }
 }
 
@@ -68,11 +71,14 @@ impl Feed {
                 }
             }
             WorkItem::Pair(_, _, Interleave::Merge) => {
-                self.runs.extend((0..2).flat_map(|slot| (0..count(slot)).map(move |run| (slot as u8, run))));
+                self.runs.extend(
+                    (0..2).flat_map(|slot| (0..count(slot)).map(move |run| (slot as u8, run))),
+                );
                 // Stable: a primitive's left run stays before its right one.
                 let tiles = &self.tiles;
-                self.runs
-                    .sort_by_key(|&(slot, run)| tiles[usize::from(slot)].runs[run as usize].primitive);
+                self.runs.sort_by_key(|&(slot, run)| {
+                    tiles[usize::from(slot)].runs[run as usize].primitive
+                });
             }
         }
         Ok(())
@@ -149,12 +155,18 @@ mod tests {
 
     #[test]
     fn alternating_lists_take_a_triangle_of_each_in_turn() {
-        assert_eq!(order(WorkItem::Pair(LEFT, RIGHT, Interleave::Alternate)), [0, 0, 1, 0, 1, 0]);
+        assert_eq!(
+            order(WorkItem::Pair(LEFT, RIGHT, Interleave::Alternate)),
+            [0, 0, 1, 0, 1, 0]
+        );
     }
 
     #[test]
     fn merged_lists_put_the_same_triangle_side_by_side() {
-        assert_eq!(order(WorkItem::Pair(LEFT, RIGHT, Interleave::Merge)), [0, 0, 0, 1, 1, 0]);
+        assert_eq!(
+            order(WorkItem::Pair(LEFT, RIGHT, Interleave::Merge)),
+            [0, 0, 0, 1, 1, 0]
+        );
     }
 
     #[test]
@@ -175,7 +187,9 @@ mod tests {
     fn a_run_outside_the_records_is_refused() {
         let mut trace = trace();
         trace.tiles[0][0].runs[2].count = 7;
-        let error = Feed::default().load(&trace, &WorkItem::Tile(LEFT)).unwrap_err();
+        let error = Feed::default()
+            .load(&trace, &WorkItem::Tile(LEFT))
+            .unwrap_err();
         assert!(error.to_string().contains("records 3 + 7"), "{error}");
     }
 }

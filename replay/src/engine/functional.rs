@@ -32,9 +32,21 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Functional<'a, S, A, B> {
     pub fn new(source: &'a S, footprints: &'a Footprints, l1: Vec<A>, l2: B, tally: Tally) -> Self {
         let cores = l1
             .into_iter()
-            .map(|l1| Core { l1, feed: Feed::default(), busy: false, clock: 0 })
+            .map(|l1| Core {
+                l1,
+                feed: Feed::default(),
+                busy: false,
+                clock: 0,
+            })
             .collect();
-        Self { source, footprints, cores, l2, scratch: footprints.scratch(), tally }
+        Self {
+            source,
+            footprints,
+            cores,
+            l2,
+            scratch: footprints.scratch(),
+            tally,
+        }
     }
 
     /// Runs all phases.
@@ -143,14 +155,23 @@ struct Ports<'a, A, B> {
 }
 
 #[inline]
-fn run_quad<A: Cache, B: Cache>(footprints: &Footprints, quad: &Quad<'_>, scratch: &mut Scratch, ports: &mut Ports<'_, A, B>) {
-    footprints.for_quad(quad.draw, quad.records, scratch, |sample, bundle| ports.bundle(sample, bundle));
+fn run_quad<A: Cache, B: Cache>(
+    footprints: &Footprints,
+    quad: &Quad<'_>,
+    scratch: &mut Scratch,
+    ports: &mut Ports<'_, A, B>,
+) {
+    footprints.for_quad(quad.draw, quad.records, scratch, |sample, bundle| {
+        ports.bundle(sample, bundle)
+    });
 }
 
 impl<A: Cache, B: Cache> Ports<'_, A, B> {
     #[inline(always)]
     fn bundle(&mut self, sample: SampleRef, bundle: &Bundle) {
-        let cell_index = self.tally.cell_index(self.place, sample.texture, bundle.level);
+        let cell_index = self
+            .tally
+            .cell_index(self.place, sample.texture, bundle.level);
         let safe_lines = self.l1.repeat_safe_lines();
         let count = usize::from(bundle.count);
         let (mut lookups, mut hash, mut lane_hash) = (0, 0_u64, 0_u64);

@@ -21,8 +21,8 @@ use crate::result::RunResult;
 use footprint::Footprints;
 use functional::Functional;
 use tally::Tally;
-use timed::Timed;
 use thiserror::Error;
+use timed::Timed;
 
 /// Why a replay cannot run.
 #[derive(Debug, Error)]
@@ -30,7 +30,10 @@ pub enum ReplayError {
     /// The configuration is impossible.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The trace cannot be read.
+    /// The trace file is damaged.
+    #[error(transparent)]
+    Format(#[from] formats::FormatError),
+    /// A tile cannot be replayed.
     #[error("pass {pass} tile {tile}: {message}")]
     Trace {
         /// Pass index.
@@ -61,13 +64,28 @@ pub fn replay<S: TileSource + ?Sized>(
             Ok(Lru::new(cache.sets(level, config.line_bytes)?, WaysOf::<4>))
         };
         let l1 = (0..config.cores).map(|_| lru(&config.l1, "L1"));
-        return run(trace, config, l1.collect::<Result<_, ConfigError>>()?, lru(&config.l2, "L2")?);
+        return run(
+            trace,
+            config,
+            l1.collect::<Result<_, ConfigError>>()?,
+            lru(&config.l2, "L2")?,
+        );
     }
     let build = |cache: &CacheConfig, level, seed| {
-        cache::build(cache, level, config.line_bytes, config.seed.wrapping_add(seed))
+        cache::build(
+            cache,
+            level,
+            config.line_bytes,
+            config.seed.wrapping_add(seed),
+        )
     };
     let l1 = (0..config.cores).map(|core| build(&config.l1, "L1", u64::from(core) + 1));
-    run(trace, config, l1.collect::<Result<_, _>>()?, build(&config.l2, "L2", 0)?)
+    run(
+        trace,
+        config,
+        l1.collect::<Result<_, _>>()?,
+        build(&config.l2, "L2", 0)?,
+    )
 }
 
 fn run<S: TileSource + ?Sized, A: Cache, B: Cache>(

@@ -1,7 +1,7 @@
 //! Where tiles come from: a file, or memory (tests, benchmarks, generated traces).
 
 use super::ReplayError;
-use formats::textrace::{Tables, Tile};
+use formats::textrace::{Tables, Textrace, Tile};
 
 /// A trace that can be read tile by tile.
 pub trait TileSource: Sync {
@@ -42,5 +42,15 @@ impl TileSource for MemoryTrace {
         tile.runs.clone_from(&stored.runs);
         tile.records.clone_from(&stored.records);
         Ok(())
+    }
+}
+
+impl TileSource for Textrace {
+    fn tables(&self) -> &Tables {
+        self.tables()
+    }
+
+    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), ReplayError> {
+        Ok(self.decode_tile(pass as usize, index as usize, tile)?)
     }
 }

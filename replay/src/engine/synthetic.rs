@@ -2,10 +2,11 @@
 //! seen by two parallel eyes. It has the access pattern of a scene, not its picture.
 
 use super::MemoryTrace;
-use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::textrace::{
-    Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta, UvGroup,
+    Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta,
+    UvGroup,
 };
+use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::view::{Eye, FovTangents, Hmd, TILE_SIZE_PX};
 
 /// What to generate.
@@ -27,7 +28,14 @@ pub struct Synthetic {
 
 impl Default for Synthetic {
     fn default() -> Self {
-        Self { size_px: [960, 1080], patch_px: 120, layers: 1, textures: 3, materials: 24, seed: 1 }
+        Self {
+            size_px: [960, 1080],
+            patch_px: 120,
+            layers: 1,
+            textures: 3,
+            materials: 24,
+            seed: 1,
+        }
     }
 }
 
@@ -55,7 +63,10 @@ impl Synthetic {
                 .map(|at| tile(&patches, at, eye as i32))
                 .collect()
         });
-        MemoryTrace { tables, tiles: tiles.into() }
+        MemoryTrace {
+            tables,
+            tiles: tiles.into(),
+        }
     }
 
     fn patches(&self) -> Vec<Patch> {
@@ -96,9 +107,20 @@ impl Synthetic {
 
     fn tables(&self, primitives: u32) -> Tables {
         let size = |texture: u32| 1024 >> (texture % 3 / 2);
-        let fov = FovTangents { left: 1.19, right: 1.19, up: 1.34, down: 1.34 };
+        let fov = FovTangents {
+            left: 1.19,
+            right: 1.19,
+            up: 1.34,
+            down: 1.34,
+        };
         let tiles = self.size_px.map(|px| px.div_ceil(TILE_SIZE_PX));
-        let pass = |eye| Pass { frame: 0, kind: PassKind::Main, eye: Some(eye), size_px: self.size_px, tiles };
+        let pass = |eye| Pass {
+            frame: 0,
+            kind: PassKind::Main,
+            eye: Some(eye),
+            size_px: self.size_px,
+            tiles,
+        };
         Tables {
             meta: TraceMeta {
                 tool: "replay".into(),
@@ -164,7 +186,11 @@ fn tile(patches: &[Patch], [column, row]: [u32; 2], eye: i32) -> Tile {
         let [left, top, right, bottom] = patch.bounds;
         // The right eye sees everything further left.
         let [left, right] = [left, right].map(|x| x - eye * patch.disparity_px);
-        if right <= corner[0] || left >= corner[0] + 16 || bottom <= corner[1] || top >= corner[1] + 16 {
+        if right <= corner[0]
+            || left >= corner[0] + 16
+            || bottom <= corner[1]
+            || top >= corner[1] + 16
+        {
             continue;
         }
         let first = tile.records.len();

@@ -99,7 +99,11 @@ impl Tally {
         self.quads += 1;
         self.lanes += u64::from(lanes);
         let pass = at.pass as usize;
-        let tile = if self.tile_maps { self.first_tile[pass] + at.tile as usize } else { 0 };
+        let tile = if self.tile_maps {
+            self.first_tile[pass] + at.tile as usize
+        } else {
+            0
+        };
         self.tiles[tile].lanes = self.tiles[tile].lanes.wrapping_add(lanes);
         Place {
             view: usize::from(self.views[pass]) * self.textures * LEVELS,
@@ -136,7 +140,10 @@ impl Tally {
     #[must_use]
     pub fn finish(self, tables: &Tables, line_bytes: u32) -> RunResult {
         let part = |name: String, pick: &dyn Fn(usize, usize, usize) -> bool| {
-            let mut part = Part { name, ..Part::default() };
+            let mut part = Part {
+                name,
+                ..Part::default()
+            };
             for (index, cell) in self.cells.iter().enumerate() {
                 let (level, texture) = (index % LEVELS, index / LEVELS % self.textures);
                 if pick(index / (LEVELS * self.textures), texture, level) {
@@ -155,18 +162,32 @@ impl Tally {
         let mut by_texture: Vec<Part> = tables
             .textures
             .iter()
-            .map(|texture| Part { name: texture.name.clone(), ..Part::default() })
+            .map(|texture| Part {
+                name: texture.name.clone(),
+                ..Part::default()
+            })
             .collect();
         for (index, cell) in self.cells.iter().enumerate() {
             let part = &mut by_texture[index / LEVELS % self.textures];
             part.l1.add(&cell.l1);
             part.l2.add(&cell.l2);
         }
-        let levels = tables.textures.iter().map(|t| t.levels as usize).max().unwrap_or(0);
+        let levels = tables
+            .textures
+            .iter()
+            .map(|t| t.levels as usize)
+            .max()
+            .unwrap_or(0);
         let by_level = (0..levels.min(LEVELS))
             .map(|level| part(format!("level {level}"), &|_, _, l| l == level))
             .collect();
-        let rate = |part: u64, whole: u64| if whole == 0 { 0.0 } else { part as f64 / whole as f64 };
+        let rate = |part: u64, whole: u64| {
+            if whole == 0 {
+                0.0
+            } else {
+                part as f64 / whole as f64
+            }
+        };
         RunResult {
             quads: self.quads,
             lanes: self.lanes,
@@ -182,7 +203,11 @@ impl Tally {
                 counters: all.l2,
             },
             external_bytes: all.l2.line_misses * u64::from(line_bytes),
-            unique_lines: self.seen.iter().map(|word| u64::from(word.count_ones())).sum(),
+            unique_lines: self
+                .seen
+                .iter()
+                .map(|word| u64::from(word.count_ones()))
+                .sum(),
             access_hash: format!("{:016x}", self.hash),
             tmu: None,
             cycles: None,
@@ -204,14 +229,20 @@ impl Tally {
             let pixels = |tile: usize| {
                 let at = [tile as u32 % pass.tiles[0], tile as u32 / pass.tiles[0]];
                 let side = |axis: usize| {
-                    pass.size_px[axis].saturating_sub(at[axis] * TILE_SIZE_PX).min(TILE_SIZE_PX)
+                    pass.size_px[axis]
+                        .saturating_sub(at[axis] * TILE_SIZE_PX)
+                        .min(TILE_SIZE_PX)
                 };
                 (side(0) * side(1)).max(1) as f32
             };
             TileMap {
                 pass: index as u32,
                 tiles: pass.tiles,
-                overdraw: tiles.iter().enumerate().map(|(i, t)| t.lanes as f32 / pixels(i)).collect(),
+                overdraw: tiles
+                    .iter()
+                    .enumerate()
+                    .map(|(i, t)| t.lanes as f32 / pixels(i))
+                    .collect(),
                 footprints: tiles.iter().map(|t| t.footprints).collect(),
                 l1_misses: tiles.iter().map(|t| t.l1_misses).collect(),
                 l2_misses: tiles.iter().map(|t| t.l2_misses).collect(),

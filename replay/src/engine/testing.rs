@@ -1,15 +1,21 @@
 //! Small traces for the tests of the engine.
 
-use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::textrace::{
-    Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta, UvGroup,
+    Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta,
+    UvGroup,
 };
+use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::view::{Eye, FovTangents, Hmd};
 
 /// Tables with one draw that samples all textures (of these sizes, BC1, all levels) trilinearly,
 /// and a stereo pair of one-tile passes.
 pub fn tables(sizes: &[[u32; 2]]) -> Tables {
-    let fov = FovTangents { left: 1.0, right: 1.0, up: 1.0, down: 1.0 };
+    let fov = FovTangents {
+        left: 1.0,
+        right: 1.0,
+        up: 1.0,
+        down: 1.0,
+    };
     let pass = |eye| Pass {
         frame: 0,
         kind: PassKind::Main,
@@ -57,7 +63,12 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
             groups: vec![UvGroup {
                 extent: [0, 1].map(|axis| sizes.iter().map(|s| s[axis]).max().unwrap_or(1)),
                 samples: (0..sizes.len() as u32)
-                    .map(|texture| Sample { texture, sampler: 0, layer: 0, offset: [0; 2] })
+                    .map(|texture| Sample {
+                        texture,
+                        sampler: 0,
+                        layer: 0,
+                        offset: [0; 2],
+                    })
                     .collect(),
             }],
         }],
@@ -89,7 +100,8 @@ pub fn tile(primitives: &[(u32, u32)]) -> Tile {
             first: tile.records.len() as u32,
             count: quads,
         });
-        tile.records.extend((0..quads).map(|i| record((i % 8) as u8, (i / 8) as u8)));
+        tile.records
+            .extend((0..quads).map(|i| record((i % 8) as u8, (i / 8) as u8)));
     }
     tile
 }

@@ -1,1 +1,342 @@
+use super::synthetic::Synthetic;
 use super::*;
+use crate::config::{Assign, OrderKind};
+use crate::order::WorkItem;
+use crate::result::LevelCounters;
+use formats::footprint::record_footprints;
+use formats::layout::Layout;
+use std::collections::{HashMap, HashSet};
+
+fn small() -> MemoryTrace {
+    Synthetic {
+        size_px: [72, 56],
+        patch_px: 24,
+        layers: 2,
+        materials: 3,
+        ..Synthetic::default()
+    }
+    .generate()
+}
+
+fn functional(order: OrderKind) -> RunConfig {
+    RunConfig {
+        mode: Mode::Functional,
+        order,
+        l1: CacheConfig::lru(1 << 10),
+        l2: CacheConfig::lru(8 << 10),
+        ..RunConfig::default()
+    }
+}
+
+/// LRU sets as plain lists, most recent last.
+struct TwinCache(Vec<Vec<u64>>);
+
+impl TwinCache {
+    fn new(config: &CacheConfig) -> Self {
+        Self(vec![Vec::new(); config.sets("", 16).unwrap() as usize])
+    }
+
+    fn access(&mut self, line: u64) -> bool {
+        let index = (line % self.0.len() as u64) as usize;
+        let set = &mut self.0[index];
+        let hit = set.contains(&line);
+        set.retain(|&l| l != line);
+        set.push(line);
+        if set.len() > 4 {
+            set.remove(0);
+        }
+        hit
+    }
+}
+
+/// A straightforward single-core replay: no tables, no shortcuts.
+fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounters, usize) {
+    let (mut c1, mut c2) = (LevelCounters::default(), LevelCounters::default());
+    let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
+    let mut seen = HashSet::new();
+    let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
+    let order = order::by_kind(config.order, config.seed);
+    for item in order::plan(&*order, &trace.tables.passes).iter().flatten() {
+        let WorkItem::Tile(at) = item else {
+            panic!("single-view orders only")
+        };
+        let tile = &trace.tiles[at.pass as usize][at.tile as usize];
+        for run in &tile.runs {
+            for record in &tile.records[run.first as usize..][..run.count as usize] {
+                record_footprints(
+                    &trace.tables,
+                    run.draw,
+                    record,
+                    &config.sampling,
+                    |sample, f| {
+                        let mut lines: Vec<u64> = Vec::new();
+                        for texel in f.texels() {
+                            let at = layout.address(
+                                sample.texture,
+                                f.layer.into(),
+                                f.level.into(),
+                                texel,
+                            );
+                            let line = at.unwrap() / 16;
+                            if !lines.contains(&line) {
+                                lines.push(line);
+                            }
+                        }
+                        seen.extend(lines.iter().copied());
+                        c1.footprints += 1;
+                        c1.line_lookups += lines.len() as u64;
+                        let missing: Vec<u64> =
+                            lines.into_iter().filter(|&l| !l1.access(l)).collect();
+                        let misses = missing.iter().filter(|&&l| !l2.access(l)).count() as u64;
+                        c1.footprint_misses += u64::from(!missing.is_empty());
+                        c1.line_misses += missing.len() as u64;
+                        c2.footprints += u64::from(!missing.is_empty());
+                        c2.line_lookups += missing.len() as u64;
+                        c2.line_misses += misses;
+                        c2.footprint_misses += u64::from(misses > 0);
+                    },
+                );
+            }
+        }
+    }
+    (c1, c2, seen.len())
+}
+
+#[test]
+fn one_core_equals_a_brute_force_replay() {
+    let trace = small();
+    for order in [OrderKind::Scanline, OrderKind::Hilbert, OrderKind::Random] {
+        let config = RunConfig {
+            cores: 1,
+            ..functional(order)
+        };
+        let result = replay(&trace, &config).unwrap();
+        let (l1, l2, unique) = twin(&trace, &config);
+        assert_eq!(result.l1.counters, l1);
+        assert_eq!(result.l2.counters, l2);
+        assert_eq!(result.unique_lines, unique as u64);
+        assert!(
+            l2.line_misses > unique as u64,
+            "the caches are too large to test anything"
+        );
+    }
+}
+
+#[test]
+fn compiled_and_general_caches_agree() {
+    let trace = small();
+    let config = functional(OrderKind::Z2Sta);
+    let common = replay(&trace, &config).unwrap();
+    let general = RunConfig {
+        l1: CacheConfig {
+            ways: 4,
+            ..config.l1
+        },
+        ..config
+    };
+    let l1 = (0..2)
+        .map(|_| cache::build(&general.l1, "L1", 16, 0).unwrap())
+        .collect();
+    let l2 = cache::build(&general.l2, "L2", 16, 0).unwrap();
+    assert_eq!(run(&trace, &general, l1, l2).unwrap(), common);
+}
+
+#[test]
+fn every_order_and_mode_replays_the_same_accesses() {
+    let trace = small();
+    let conserved = |mode, assign, order| {
+        let config = RunConfig {
+            mode,
+            assign,
+            ..functional(order)
+        };
+        let r = replay(&trace, &config).unwrap();
+        (
+            r.access_hash,
+            r.unique_lines,
+            r.footprints,
+            r.l1.counters.line_lookups,
+            r.quads,
+            r.lanes,
+        )
+    };
+    let expected = conserved(Mode::Functional, Assign::Static, OrderKind::Scanline);
+    for order in OrderKind::ALL {
+        for mode in [Mode::Functional, Mode::Timed] {
+            for assign in [Assign::Static, Assign::FirstIdle] {
+                assert_eq!(
+                    conserved(mode, assign, order),
+                    expected,
+                    "{} {mode:?}",
+                    order.name()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_access_hash_sees_a_single_changed_access() {
+    let mut trace = small();
+    let config = functional(OrderKind::Morton);
+    let before = replay(&trace, &config).unwrap().access_hash;
+    let tile = trace.tiles[0]
+        .iter_mut()
+        .find(|t| !t.records.is_empty())
+        .unwrap();
+    tile.records[0].uv[0] += 64 * formats::textrace::SUBTEXELS;
+    assert_ne!(replay(&trace, &config).unwrap().access_hash, before);
+}
+
+#[test]
+fn without_penalties_timed_equals_functional_on_one_core() {
+    let trace = small();
+    for order in [OrderKind::Morton, OrderKind::Z2Sta, OrderKind::Z2StaMerge] {
+        let functional = RunConfig {
+            cores: 1,
+            ..functional(order)
+        };
+        let mut timed = RunConfig {
+            mode: Mode::Timed,
+            ..functional
+        };
+        (timed.tmu.l1_penalty_cycles, timed.tmu.l2_penalty_cycles) = (0, 0);
+        let expected = replay(&trace, &functional).unwrap();
+        let mut found = replay(&trace, &timed).unwrap();
+        assert_eq!(found.tmu.take().unwrap().utilization, 1.0);
+        assert_eq!(found.cycles.take(), Some(expected.footprints));
+        assert_eq!(found, expected);
+    }
+}
+
+#[test]
+fn an_infinite_cache_misses_each_line_once() {
+    let trace = small();
+    for mode in [Mode::Functional, Mode::Timed] {
+        let config = RunConfig {
+            mode,
+            l1: CacheConfig::lru(1 << 10),
+            l2: CacheConfig::lru(64 << 20),
+            ..RunConfig::default()
+        };
+        let result = replay(&trace, &config).unwrap();
+        assert_eq!(result.l2.misses, result.unique_lines);
+    }
+}
+
+#[test]
+fn parts_add_up_to_the_whole() {
+    let trace = small();
+    for mode in [Mode::Functional, Mode::Timed] {
+        let config = RunConfig {
+            mode,
+            tile_maps: true,
+            ..functional(OrderKind::Z2Lrta)
+        };
+        let r = replay(&trace, &config).unwrap();
+        for parts in [&r.by_view, &r.by_texture, &r.by_level] {
+            let mut sum = (LevelCounters::default(), LevelCounters::default());
+            for part in parts {
+                sum.0.add(&part.l1);
+                sum.1.add(&part.l2);
+            }
+            assert_eq!(sum, (r.l1.counters, r.l2.counters));
+        }
+        let total = |pick: &dyn Fn(&crate::result::TileMap) -> &Vec<u32>| -> u64 {
+            r.tile_maps
+                .iter()
+                .flat_map(|m| pick(m).iter().map(|&n| u64::from(n)))
+                .sum()
+        };
+        assert_eq!(total(&|m| &m.footprints), r.footprints);
+        assert_eq!(total(&|m| &m.l1_misses), r.l1.counters.footprint_misses);
+        assert_eq!(total(&|m| &m.l2_misses), r.l2.misses);
+    }
+}
+
+#[test]
+fn tile_overdraw_counts_pixels_inside_the_image_only() {
+    let trace = Synthetic {
+        size_px: [40, 40],
+        patch_px: 40,
+        ..Synthetic::default()
+    }
+    .generate();
+    let config = RunConfig {
+        tile_maps: true,
+        ..functional(OrderKind::Morton)
+    };
+    let result = replay(&trace, &config).unwrap();
+    let left = &result.tile_maps[0];
+    assert_eq!(left.tiles, [3, 3]);
+    // One layer of patches covers the left eye's image, and the cut tiles beyond it.
+    assert!(
+        left.overdraw[..2].iter().all(|&o| o == 1.0),
+        "{:?}",
+        left.overdraw
+    );
+}
+
+#[test]
+fn misses_in_flight_are_merged_and_counted_apart() {
+    // Two quads at the same place: the second wants the lines that the first has on the way.
+    let trace = MemoryTrace {
+        tables: testing::tables(&[[64, 64]]),
+        tiles: vec![
+            vec![testing::tile(&[(0, 1), (1, 1)])],
+            vec![formats::textrace::Tile::default()],
+        ],
+    };
+    let result = replay(&trace, &RunConfig::default()).unwrap();
+    assert_eq!(result.l1.misses, result.unique_lines);
+    assert!(result.l1.counters.secondary_misses >= result.unique_lines);
+    assert_eq!(result.l2.counters.line_lookups, result.unique_lines);
+}
+
+#[test]
+fn static_lrta_gives_each_core_its_own_view() {
+    // With one view a core, each L1 behaves as if it were alone.
+    let trace = small();
+    let config = RunConfig {
+        assign: Assign::Static,
+        ..functional(OrderKind::Z2Lrta)
+    };
+    let both = replay(&trace, &config).unwrap();
+    let alone: HashMap<&str, LevelCounters> = ["left", "right"]
+        .into_iter()
+        .enumerate()
+        .map(|(eye, name)| {
+            let mut one = trace.clone();
+            one.tiles[1 - eye]
+                .iter_mut()
+                .for_each(formats::textrace::Tile::clear);
+            let config = RunConfig {
+                cores: 1,
+                ..functional(OrderKind::Morton)
+            };
+            (name, replay(&one, &config).unwrap().l1.counters)
+        })
+        .collect();
+    for part in &both.by_view {
+        assert_eq!(part.l1, alone[part.name.as_str()], "{}", part.name);
+    }
+}
+
+#[test]
+fn a_trace_without_textures_has_no_footprints() {
+    let mut trace = small();
+    trace.tables.textures.clear();
+    trace.tables.draws.iter_mut().for_each(|d| d.groups.clear());
+    for mode in [Mode::Functional, Mode::Timed] {
+        let result = replay(
+            &trace,
+            &RunConfig {
+                mode,
+                ..RunConfig::default()
+            },
+        )
+        .unwrap();
+        assert_eq!((result.footprints, result.l1.miss_rate), (0, 0.0));
+        assert!(result.quads > 0);
+    }
+}

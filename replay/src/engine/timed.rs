@@ -67,8 +67,19 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
                 busy: false,
             })
             .collect();
-        let shared = Shared { l2, in_flight: InFlight::default() };
-        Self { source, footprints, config, cores, shared, scratch: footprints.scratch(), tally }
+        let shared = Shared {
+            l2,
+            in_flight: InFlight::default(),
+        };
+        Self {
+            source,
+            footprints,
+            config,
+            cores,
+            shared,
+            scratch: footprints.scratch(),
+            tally,
+        }
     }
 
     /// Runs all phases; a phase starts when the last core is done with the one before.
@@ -83,7 +94,12 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
                 core.busy = true;
             }
             self.run_phase(phase)?;
-            cycles = self.cores.iter().map(|core| core.pipeline.clock()).max().unwrap_or(0);
+            cycles = self
+                .cores
+                .iter()
+                .map(|core| core.pipeline.clock())
+                .max()
+                .unwrap_or(0);
         }
         let mut sum = PipelineStats::default();
         for core in &self.cores {
@@ -96,12 +112,20 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
         }
         let active = sum.useful + sum.wasted + sum.idle;
         let tmu = TmuResult {
-            utilization: if active == 0 { 0.0 } else { sum.useful as f64 / active as f64 },
+            utilization: if active == 0 {
+                0.0
+            } else {
+                sum.useful as f64 / active as f64
+            },
             wasted_issues: sum.wasted,
             threads: sum.threads,
             loops: sum.loops,
         };
-        Ok(TimedOutcome { tally: self.tally, tmu, cycles })
+        Ok(TimedOutcome {
+            tally: self.tally,
+            tmu,
+            cycles,
+        })
     }
 
     /// Always advances the core whose clock is furthest behind, so that what the cores share sees
@@ -129,7 +153,8 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
     #[inline]
     fn behind(&self) -> Option<usize> {
         let busy = self.cores.iter().enumerate().filter(|(_, core)| core.busy);
-        busy.min_by_key(|(_, core)| core.pipeline.clock()).map(|(index, _)| index)
+        busy.min_by_key(|(_, core)| core.pipeline.clock())
+            .map(|(index, _)| index)
     }
 
     /// Starts the core's next quad; false if its item has none left.
@@ -153,10 +178,14 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
             ready: now,
             footprints: 0,
         };
-        self.footprints
-            .for_quad(quad.draw, quad.records, &mut self.scratch, |sample, bundle| {
+        self.footprints.for_quad(
+            quad.draw,
+            quad.records,
+            &mut self.scratch,
+            |sample, bundle| {
                 probe.bundle(sample, bundle);
-            });
+            },
+        );
         let (footprints, ready) = (probe.footprints, probe.ready);
         if footprints > 0 {
             core.pipeline.start(footprints, ready);
@@ -180,7 +209,12 @@ impl<'a> Work<'a> {
             Assign::FirstIdle => vec![0],
             Assign::Static => (0..cores).collect(),
         };
-        Self { items, assign, next, cores }
+        Self {
+            items,
+            assign,
+            next,
+            cores,
+        }
     }
 
     fn next(&mut self, core: usize) -> Option<&'a WorkItem> {
@@ -219,7 +253,9 @@ struct Misses {
 impl<A: Cache, B: Cache> Probe<'_, A, B> {
     #[inline(always)]
     fn bundle(&mut self, sample: SampleRef, bundle: &Bundle) {
-        let cell_index = self.tally.cell_index(self.place, sample.texture, bundle.level);
+        let cell_index = self
+            .tally
+            .cell_index(self.place, sample.texture, bundle.level);
         let safe_lines = self.l1.repeat_safe_lines();
         let count = usize::from(bundle.count);
         let (mut lookups, mut hash, mut lane_hash) = (0, 0_u64, 0_u64);
@@ -274,7 +310,13 @@ impl<A: Cache, B: Cache> Probe<'_, A, B> {
         } else {
             misses.l2 += 1;
             let arrival = self.now + u64::from(self.config.tmu.l2_penalty_cycles);
-            enter(&mut shared.l2, &mut shared.in_flight, line, self.now, arrival);
+            enter(
+                &mut shared.l2,
+                &mut shared.in_flight,
+                line,
+                self.now,
+                arrival,
+            );
             arrival
         };
         let in_l1 = in_l2 + u64::from(self.config.tmu.l1_penalty_cycles);

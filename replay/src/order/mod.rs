@@ -134,7 +134,10 @@ pub fn plan(order: &dyn TileOrder, passes: &[Pass]) -> Vec<Phase> {
     let mut phases = Vec::new();
     for frame in frames {
         let views = |eye: Option<Eye>| {
-            let of_frame = passes.iter().enumerate().filter(move |(_, p)| p.frame == frame);
+            let of_frame = passes
+                .iter()
+                .enumerate()
+                .filter(move |(_, p)| p.frame == frame);
             of_frame.filter(move |(_, p)| eye == p.eye.filter(|_| p.kind == PassKind::Main))
         };
         let view = |(index, pass): (usize, &Pass)| View {

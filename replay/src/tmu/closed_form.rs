@@ -28,7 +28,10 @@ mod tests {
             (35.48, 34.99, 62.68),
         ] {
             let found = 100.0 * closed_form(l1 / 100.0, l2 / 100.0);
-            assert!((found - utilization).abs() < 0.7, "{l1} {l2}: {found} not {utilization}");
+            assert!(
+                (found - utilization).abs() < 0.7,
+                "{l1} {l2}: {found} not {utilization}"
+            );
         }
     }
 

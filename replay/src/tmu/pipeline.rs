@@ -143,3 +143,86 @@ impl Pipeline {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONFIG: TmuConfig = TmuConfig {
+        l1_penalty_cycles: 20,
+        l2_penalty_cycles: 200,
+        loop_cycles: 36,
+        threads: 4,
+        probe_footprints: 8,
+    };
+
+    /// Runs threads of (footprints, latency) one after another.
+    fn run(config: TmuConfig, threads: &[(u32, u64)]) -> (u64, PipelineStats) {
+        let mut pipeline = Pipeline::new(config);
+        let mut threads = threads.iter();
+        loop {
+            match pipeline.turn() {
+                Turn::Looped => {}
+                Turn::Done => return (pipeline.clock(), pipeline.stats()),
+                Turn::Free => match threads.next() {
+                    Some(&(footprints, latency)) => {
+                        pipeline.start(footprints, pipeline.clock() + latency);
+                    }
+                    None => pipeline.drain(),
+                },
+            }
+        }
+    }
+
+    #[test]
+    fn threads_that_hit_take_a_cycle_a_footprint() {
+        let (cycles, stats) = run(CONFIG, &[(16, 0), (24, 0)]);
+        assert_eq!(
+            (cycles, stats.useful, stats.wasted, stats.idle),
+            (40, 40, 0, 0)
+        );
+    }
+
+    #[test]
+    fn an_l1_miss_costs_one_loop() {
+        let (cycles, stats) = run(CONFIG, &[(16, 20)]);
+        assert_eq!((stats.loops, stats.wasted), (1, 2));
+        assert_eq!(cycles, 36 + 16);
+    }
+
+    #[test]
+    fn an_l2_miss_loops_until_memory_has_answered() {
+        let (cycles, stats) = run(CONFIG, &[(16, 220)]);
+        // Back at cycles 36, 72 ... 252, the first after 220; two slots for each failed trip.
+        assert_eq!((stats.loops, stats.wasted), (7, 14));
+        assert_eq!(cycles, 252 + 16);
+    }
+
+    #[test]
+    fn other_threads_hide_the_latency() {
+        let (cycles, stats) = run(CONFIG, &[(16, 20), (64, 0)]);
+        assert_eq!(cycles, 2 + 64 + 16);
+        assert_eq!(stats.idle, 0);
+    }
+
+    #[test]
+    fn a_core_holds_no_more_threads_than_configured() {
+        let config = TmuConfig {
+            threads: 1,
+            ..CONFIG
+        };
+        let (cycles, stats) = run(config, &[(8, 20), (8, 0)]);
+        assert_eq!(cycles, 36 + 8 + 8);
+        assert_eq!(stats.idle, 35);
+    }
+
+    #[test]
+    fn every_cycle_is_useful_wasted_or_idle() {
+        let threads: Vec<(u32, u64)> = (0..500)
+            .map(|i| (1 + i * 7 % 40, u64::from(i % 3) * 110))
+            .collect();
+        let (cycles, stats) = run(CONFIG, &threads);
+        assert_eq!(cycles, stats.useful + stats.wasted + stats.idle);
+        assert_eq!(stats.threads, 500);
+    }
+}

@@ -6,10 +6,10 @@ use formats::texture::Wrap;
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Texels.
-    size: i32,
+    size: i64,
     wrap: Wrap,
     /// Texel offset of the sample.
-    offset: i32,
+    offset: i64,
     step: Step,
     /// Power of two: repeating is a mask.
     power_of_two: bool,
@@ -29,13 +29,14 @@ enum Step {
 impl Axis {
     /// `steps` fixed-point steps are one unit of the texture coordinate; `bytes` has an entry for
     /// each of the level's texels.
-    pub fn new(steps: i64, wrap: Wrap, offset: i32, bytes: Vec<u32>) -> Self {
+    pub fn new(steps: i64, wrap: Wrap, offset: i8, bytes: Vec<u32>) -> Self {
         let size = bytes.len() as i64;
-        let exact = steps % size == 0 && ((steps / size) as u64).is_power_of_two() && steps / size > 1;
+        let exact =
+            steps % size == 0 && ((steps / size) as u64).is_power_of_two() && steps / size > 1;
         Self {
-            size: size as i32,
+            size,
             wrap,
-            offset,
+            offset: offset.into(),
             step: if exact {
                 Step::Shift((steps / size).ilog2())
             } else {
@@ -50,38 +51,35 @@ impl Axis {
     #[inline(always)]
     pub fn linear(&self, coordinate: i32) -> (u32, u32) {
         let first = match self.step {
-            Step::Shift(shift) => coordinate.wrapping_sub(1 << (shift - 1)) >> shift,
+            Step::Shift(shift) => (i64::from(coordinate) - (1 << (shift - 1))) >> shift,
             Step::Ratio(steps) => {
-                let twice = 2 * i64::from(coordinate) * i64::from(self.size) - steps;
-                twice.div_euclid(2 * steps) as i32
+                (2 * i64::from(coordinate) * self.size - steps).div_euclid(2 * steps)
             }
         };
-        let first = first.wrapping_add(self.offset);
-        (self.byte(first), self.byte(first.wrapping_add(1)))
+        let first = first + self.offset;
+        (self.byte(first), self.byte(first + 1))
     }
 
     /// Byte offset of the texel that holds a coordinate.
     #[inline(always)]
     pub fn nearest(&self, coordinate: i32) -> u32 {
         let texel = match self.step {
-            Step::Shift(shift) => coordinate >> shift,
-            Step::Ratio(steps) => {
-                (i64::from(coordinate) * i64::from(self.size)).div_euclid(steps) as i32
-            }
+            Step::Shift(shift) => i64::from(coordinate) >> shift,
+            Step::Ratio(steps) => (i64::from(coordinate) * self.size).div_euclid(steps),
         };
-        self.byte(texel.wrapping_add(self.offset))
+        self.byte(texel + self.offset)
     }
 
     #[inline(always)]
-    fn byte(&self, texel: i32) -> u32 {
+    fn byte(&self, texel: i64) -> u32 {
         self.bytes[self.wrapped(texel) as usize]
     }
 
     #[inline(always)]
-    fn wrapped(&self, texel: i32) -> i32 {
+    fn wrapped(&self, texel: i64) -> i64 {
         match self.wrap {
             Wrap::Repeat if self.power_of_two => texel & (self.size - 1),
-            Wrap::Repeat if (texel as u32) < self.size as u32 => texel,
+            Wrap::Repeat if (texel as u64) < self.size as u64 => texel,
             Wrap::Repeat => texel.rem_euclid(self.size),
             Wrap::MirroredRepeat => {
                 let there_and_back = texel.rem_euclid(2 * self.size);

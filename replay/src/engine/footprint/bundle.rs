@@ -99,6 +99,9 @@ mod tests {
     #[test]
     fn only_equal_neighbours_are_repeats() {
         let bundle = bundle(&[[1, 2, 1, 2], [1, 2, 1, 2], [2, 1, 2, 1], [1, 2, 1, 2]]);
-        assert_eq!([0, 1, 2, 3].map(|i| bundle.repeats(i)), [false, true, false, false]);
+        assert_eq!(
+            [0, 1, 2, 3].map(|i| bundle.repeats(i)),
+            [false, true, false, false]
+        );
     }
 }

@@ -8,16 +8,15 @@
 mod axis;
 mod build;
 mod bundle;
-mod lod;
 
 pub use bundle::Bundle;
 
 use super::ReplayError;
 use crate::config::{RunConfig, SamplingConfig};
 use axis::Axis;
-use formats::texture::{Filter, Sampler};
+use formats::footprint::{quad_lod, select_levels};
 use formats::textrace::{QuadRecord, Tables};
-use lod::Derivatives;
+use formats::texture::{Filter, Sampler};
 use std::sync::Arc;
 
 /// A texture that a footprint falls into.
@@ -57,8 +56,10 @@ struct Group {
 /// What the textures have in common that share footprints.
 #[derive(Debug)]
 struct Kind {
-    /// Fixed-point steps to texels of level 0.
-    to_texels: [f32; 2],
+    /// Texels of level 0.
+    size: [u32; 2],
+    /// The group's, which defines the fixed-point step.
+    extent: [u32; 2],
     sampler: Sampler,
     /// Bytes by which the texture starts after the start of a line.
     skew_bytes: u32,
@@ -85,8 +86,17 @@ impl Footprints {
     /// Memory for [`Self::for_quad`].
     #[must_use]
     pub fn scratch(&self) -> Scratch {
-        let kinds = self.draws.iter().flatten().map(|g| g.kinds.len()).max().unwrap_or(0);
-        Scratch { bundles: vec![[Bundle::default(); 2]; kinds], both: vec![false; kinds] }
+        let kinds = self
+            .draws
+            .iter()
+            .flatten()
+            .map(|g| g.kinds.len())
+            .max()
+            .unwrap_or(0);
+        Scratch {
+            bundles: vec![[Bundle::default(); 2]; kinds],
+            both: vec![false; kinds],
+        }
     }
 
     /// Lines of the whole address space.
@@ -128,17 +138,28 @@ impl Footprints {
     /// Footprints of a record in one kind of texture; true if two levels are read.
     #[inline(always)]
     fn bundles(&self, kind: &Kind, record: &QuadRecord, out: &mut [Bundle; 2]) -> bool {
-        let texels = |d: [i32; 2]| [0, 1].map(|a| d[a] as f32 * kind.to_texels[a]);
-        let derivatives = Derivatives { dx: texels(record.dx), dy: texels(record.dy) };
-        let last = kind.levels.len() as u32 - 1;
-        let levels = lod::levels(lod::lod(derivatives, &self.sampling), &kind.sampler, last);
-        let lanes = if self.helper_lanes { 15 } else { record.mask & 15 };
+        let lod =
+            quad_lod(record, kind.extent, kind.size, self.sampling.lod) + self.sampling.lod_bias;
+        let levels = select_levels(lod, &kind.sampler, kind.levels.len() as u32);
+        let both = levels.count > 1;
+        let lanes = if self.helper_lanes {
+            15
+        } else {
+            record.mask & 15
+        };
         let uv = [0, 1, 2, 3].map(|lane| record.lane_uv(lane));
         self.fill(kind, levels.first, levels.filter, lanes, &uv, &mut out[0]);
-        if levels.both {
-            self.fill(kind, levels.first + 1, levels.filter, lanes, &uv, &mut out[1]);
+        if both {
+            self.fill(
+                kind,
+                levels.first + 1,
+                levels.filter,
+                lanes,
+                &uv,
+                &mut out[1],
+            );
         }
-        levels.both
+        both
     }
 
     #[inline(always)]
@@ -171,3 +192,6 @@ impl Footprints {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

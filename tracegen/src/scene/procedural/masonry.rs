@@ -303,3 +303,20 @@ pub fn roof_tiles(stones: [Rgb; 2]) -> Surface {
         }
     })
 }
+
+/// Polished tiles in two alternating stones, `count` (even) a side.
+#[must_use]
+pub fn checker(stones: [Rgb; 2], count: i32) -> Surface {
+    let surfaces = stones.map(|s| carved_stone([s, mix(s, rgb(0x8f8a84), 0.35)], 0.5, 0.0, 0.2));
+    Box::new(move |u, v| {
+        let cell = courses(u, v, count, count, 0.0);
+        let odd = ((u * count as f32) as i32 + (v * count as f32) as i32) & 1;
+        let shift = (cell.id & 255) as f32 / 256.0;
+        let mut texel = surfaces[odd as usize](u * 2.0 + shift, v * 2.0 + shift);
+        let tile = smoothstep(0.0012, 0.0025, cell.edge);
+        texel.color = mix(rgb(0x55504a), texel.color, tile);
+        texel.height = 0.0015 * tile;
+        texel.rough = lerp(0.7, texel.rough, tile);
+        texel
+    })
+}

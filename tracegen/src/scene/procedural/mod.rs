@@ -4,33 +4,56 @@ pub mod atrium;
 pub mod atrium_furnishing;
 pub mod atrium_materials;
 pub mod atrium_parts;
+pub mod chess;
+pub mod creature;
+pub mod jungle;
+pub mod jungle_plants;
+pub mod jungle_temple;
 pub mod masonry;
 pub mod mesh_builder;
 pub mod noise;
 pub mod organic;
 pub mod scene_builder;
+pub mod teapot;
+pub mod teapot_patches;
 pub mod texture_synth;
 
 use crate::scene::Scene;
 
 type Builder = fn() -> Scene;
 
-const SCENES: &[(&str, Builder)] = &[
-    ("atrium", atrium::rich),
-    ("atrium-plain", atrium::plain),
-    ("atrium-shadows", atrium::shadows),
+const BUILDERS: &[Builder] = &[
+    atrium::rich,
+    atrium::plain,
+    atrium::shadows,
+    jungle::scene,
+    teapot::scene,
+    chess::scene,
 ];
 
+/// In the order of [`BUILDERS`].
 const NAMES: &[(&str, &str)] = &[
     (
         "atrium",
-        "two-storey colonnaded courtyard, 24 materials with three to four maps each",
+        "two-storey colonnaded courtyard, 26 materials with three to four maps each",
     ),
     (
         "atrium-plain",
         "the same architecture with few simple textures",
     ),
-    ("atrium-shadows", "atrium-plain with cascaded shadow maps"),
+    (
+        "atrium-shadows",
+        "atrium-plain with four cascaded shadow maps",
+    ),
+    (
+        "jungle",
+        "temple ruin among instanced foliage with alpha masks, one shadow map",
+    ),
+    (
+        "teapot",
+        "the Utah teapot on a polished floor, 15 K triangles",
+    ),
+    ("chess", "a chess set on a reflective board, 42 K triangles"),
 ];
 
 /// Names of the built-in scenes with a line about each.
@@ -43,10 +66,8 @@ pub fn names() -> &'static [(&'static str, &'static str)] {
 /// scene, bit for bit, whatever the number of threads.
 #[must_use]
 pub fn build(name: &str) -> Option<Scene> {
-    SCENES
-        .iter()
-        .find(|(n, _)| *n == name)
-        .map(|(_, build)| build())
+    let index = NAMES.iter().position(|(known, _)| *known == name)?;
+    BUILDERS.get(index).map(|build| build())
 }
 
 #[cfg(test)]

@@ -209,6 +209,10 @@ fn leaf_outline(shape: LeafShape, x: f32, y: f32) -> (f32, f32) {
                 let (sin, cos) = angle.sin_cos();
                 let (dx, dy) = (x - 0.06 * (base * 7.0).sin(), (y - base) * 2.0);
                 let (lx, ly) = (dx * cos - dy * sin, dx * sin + dy * cos);
+                // Most texels are far from most leaves: skip the powers.
+                if !(-0.1..1.4).contains(&ly) || lx.abs() > 0.4 {
+                    continue;
+                }
                 let (inside, vein) = blade(lx / size * 1.15, ly / size * 0.8, 0.42);
                 if inside * size > best.0 {
                     best = (inside * size, vein);
@@ -390,5 +394,32 @@ pub fn turf(colors: [Rgb; 2], earth: Rgb) -> Surface {
             0.01 * blades,
             0.95,
         )
+    })
+}
+
+/// Scaly hide, darker along the folds.
+#[must_use]
+pub fn skin(colors: [Rgb; 2]) -> Surface {
+    Box::new(move |u, v| {
+        let noise = bank();
+        let (cloud, mottle, grain) = (
+            noise.cloud.at(u, v),
+            noise.mottle.at(u, v),
+            noise.grain.at(u, v),
+        );
+        let scale = noise.pebble.at(u * 3.0 + 0.02 * mottle, v * 3.0);
+        let fold = noise.pebble.at(u + 0.05 * cloud, v + 0.05 * cloud);
+        let bump = 1.0 - scale.min(1.0);
+        let stripe = smoothstep(
+            0.45,
+            0.6,
+            noise.cloud.at(u * 0.0 + 0.02 * mottle + 0.25, v * 2.0),
+        );
+        let color = mix(colors[0], colors[1], 0.65 * stripe + 0.35 * cloud);
+        let color = shade(color, (0.55 + 0.55 * bump) * (0.85 + 0.3 * grain));
+        Texel {
+            open: 0.5 + 0.5 * bump,
+            ..Texel::new(color, 0.004 * bump - 0.004 * fold, 0.62 + 0.2 * scale)
+        }
     })
 }

@@ -11,6 +11,9 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<u64>)] = &[
     ("atrium", 200_000..=280_000),
     ("atrium-plain", 64_000..=68_000),
     ("atrium-shadows", 64_000..=68_000),
+    ("jungle", 300_000..=450_000),
+    ("teapot", 14_700..=15_300),
+    ("chess", 41_160..=42_840),
 ];
 
 /// All built-in scenes, built once for all tests.

@@ -1,0 +1,180 @@
+//! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
+
+use crate::config::{
+    Assign, BlockOrder, FilterOverride, LodFormula, Mode, OrderKind, Replacement, RunConfig,
+    TextureOrder,
+};
+use crate::size::parse_bytes;
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+use formats::texture::TexelFormat;
+use serde::de::value::Error as ValueError;
+use serde::de::{DeserializeOwned, IntoDeserializer};
+use std::path::PathBuf;
+
+/// Reads an enum of the formats crate by its serialised name.
+fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    T::deserialize(text.into_deserializer()).map_err(|e: ValueError| e.to_string())
+}
+
+/// Flags of the replay configuration.
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Machine")]
+pub struct ConfigArgs {
+    /// TOML file with the configuration; flags win over it
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Tile order
+    #[arg(long)]
+    order: Option<OrderKind>,
+    /// Cycle model, or footprints without latencies
+    #[arg(long)]
+    mode: Option<Mode>,
+    /// Size of each core's L1
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    l1: Option<u64>,
+    /// Size of the shared L2
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    l2: Option<u64>,
+    /// Associativity of both levels
+    #[arg(long, value_name = "N")]
+    ways: Option<u32>,
+    /// Associativity of the L1
+    #[arg(long, value_name = "N")]
+    l1_ways: Option<u32>,
+    /// Associativity of the L2
+    #[arg(long, value_name = "N")]
+    l2_ways: Option<u32>,
+    /// Replacement policy of both levels
+    #[arg(long)]
+    replacement: Option<Replacement>,
+    /// Line size of both levels
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    line: Option<u64>,
+    /// Shader cores
+    #[arg(long, value_name = "N")]
+    cores: Option<u32>,
+    /// Assignment of tiles to cores
+    #[arg(long)]
+    assign: Option<Assign>,
+    /// Seed of the random order and of random replacement
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+
+    /// Filter in place of the recorded one: trilinear, bilinear, nearest
+    #[arg(long, value_parser = named::<FilterOverride>, help_heading = "Sampling")]
+    filter: Option<FilterOverride>,
+    /// Level-of-detail formula: llvmpipe, softpipe, exact
+    #[arg(long, value_parser = named::<LodFormula>, help_heading = "Sampling")]
+    lod: Option<LodFormula>,
+    /// Added to the level of detail
+    #[arg(
+        long,
+        value_name = "LEVELS",
+        allow_hyphen_values = true,
+        help_heading = "Sampling"
+    )]
+    lod_bias: Option<f32>,
+    /// Count the helper lanes of partly covered quads, too
+    #[arg(long, help_heading = "Sampling")]
+    helper_lanes: bool,
+
+    /// Format of the colour textures in memory: bc1, bc7, astc-6x6, rgba8, ...
+    #[arg(long, value_name = "FORMAT", value_parser = named::<TexelFormat>, help_heading = "Layout")]
+    texel_format: Option<TexelFormat>,
+    /// Order of the blocks of a level: linear, morton, tiled
+    #[arg(long, value_parser = named::<BlockOrder>, help_heading = "Layout")]
+    block_order: Option<BlockOrder>,
+    /// Block order of uncompressed textures (shadow maps)
+    #[arg(long, value_parser = named::<BlockOrder>, help_heading = "Layout")]
+    uncompressed_order: Option<BlockOrder>,
+    /// Alignment of each texture's first byte
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes, help_heading = "Layout")]
+    base_align: Option<u64>,
+    /// Order of the textures in memory: table, largest-first
+    #[arg(long, value_parser = named::<TextureOrder>, help_heading = "Layout")]
+    texture_order: Option<TextureOrder>,
+
+    /// Cycles of an L1 miss
+    #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
+    l1_penalty: Option<u32>,
+    /// Further cycles of an L2 miss
+    #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
+    l2_penalty: Option<u32>,
+    /// Cycles that a thread which missed takes to be back at the first stage
+    #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
+    loop_cycles: Option<u32>,
+    /// Threads (quads) that a core holds at once
+    #[arg(long, value_name = "N", help_heading = "Texture unit")]
+    tmu_threads: Option<u32>,
+    /// Footprints whose tags are checked in a cycle
+    #[arg(long, value_name = "N", help_heading = "Texture unit")]
+    probe_footprints: Option<u32>,
+}
+
+/// Sets what a flag gives.
+fn set<T>(target: &mut T, flag: Option<T>) {
+    if let Some(value) = flag {
+        *target = value;
+    }
+}
+
+impl ConfigArgs {
+    /// The configuration: the defaults, then `--config`, then the flags.
+    ///
+    /// # Errors
+    /// The file cannot be read, has an unknown key, or the result is impossible.
+    pub fn resolve(&self) -> Result<RunConfig> {
+        let mut config = match &self.config {
+            None => RunConfig::default(),
+            Some(path) => {
+                let text =
+                    std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+                toml::from_str(&text)
+                    .map_err(|e| anyhow!("{}: {}", path.display(), e.to_string().trim()))?
+            }
+        };
+        self.apply(&mut config)?;
+        config.validate()?;
+        Ok(config)
+    }
+
+    /// Puts the flags over a configuration.
+    ///
+    /// # Errors
+    /// A line size that does not fit its type.
+    pub fn apply(&self, config: &mut RunConfig) -> Result<()> {
+        set(&mut config.order, self.order);
+        set(&mut config.mode, self.mode);
+        set(&mut config.l1.size_bytes, self.l1);
+        set(&mut config.l2.size_bytes, self.l2);
+        set(&mut config.l1.ways, self.l1_ways.or(self.ways));
+        set(&mut config.l2.ways, self.l2_ways.or(self.ways));
+        set(&mut config.l1.replacement, self.replacement);
+        set(&mut config.l2.replacement, self.replacement);
+        if let Some(line) = self.line {
+            config.line_bytes = u32::try_from(line).context("--line")?;
+        }
+        set(&mut config.cores, self.cores);
+        set(&mut config.assign, self.assign);
+        set(&mut config.seed, self.seed);
+        set(&mut config.sampling.filter, self.filter);
+        set(&mut config.sampling.lod, self.lod);
+        set(&mut config.sampling.lod_bias, self.lod_bias);
+        config.sampling.helper_lanes |= self.helper_lanes;
+        set(&mut config.layout.texel_format, self.texel_format.map(Some));
+        set(&mut config.layout.block_order, self.block_order);
+        set(
+            &mut config.layout.uncompressed_order,
+            self.uncompressed_order.map(Some),
+        );
+        set(&mut config.layout.base_align_bytes, self.base_align);
+        set(&mut config.layout.texture_order, self.texture_order);
+        set(&mut config.tmu.l1_penalty_cycles, self.l1_penalty);
+        set(&mut config.tmu.l2_penalty_cycles, self.l2_penalty);
+        set(&mut config.tmu.loop_cycles, self.loop_cycles);
+        set(&mut config.tmu.threads, self.tmu_threads);
+        set(&mut config.tmu.probe_footprints, self.probe_footprints);
+        Ok(())
+    }
+}
