@@ -17,7 +17,7 @@ use clap::Args;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::Eye;
 use std::error::Error;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -65,6 +65,9 @@ pub struct ReprojectArgs {
     /// Writes a report with charts and pictures.
     #[arg(long, value_name = "HTML")]
     html: Option<PathBuf>,
+    /// Worker threads; results do not depend on it.
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
 }
 
 /// A ray trace file as the model reads it.
@@ -90,13 +93,15 @@ impl RaySource for TraceFile {
 /// # Errors
 /// A file that cannot be read, parameters that cannot be used, an output that cannot be written.
 pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
+    super::set_threads(args.threads)?;
     let config = read_config(args.config.as_deref())?;
     if args.print_config {
         let text = match args.config {
             None => DEFAULT_TOML.to_owned(),
             Some(_) => toml::to_string(&config)?,
         };
-        return print(&text);
+        super::print(&text)?;
+        return Ok(ExitCode::SUCCESS);
     }
     ensure!(
         args.image.is_none() || args.files.len() == 1,
@@ -125,7 +130,8 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     } else {
         report::text(&entries)
     };
-    print(&text)
+    super::print(&text)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
@@ -214,12 +220,4 @@ fn thumbnails(
         plain_bad: small(&picture::bad_pixels(frame, &plain.decisions, &plain.picture))?,
         plain_flip: small(&plain.flip.picture())?,
     })
-}
-
-/// Prints to standard output; a reader that went away is no error.
-fn print(text: &str) -> anyhow::Result<ExitCode> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
-        _ => Ok(ExitCode::SUCCESS),
-    }
 }

@@ -85,7 +85,10 @@ impl Picture {
         let size_px = self.size_px.map(|s| s.div_ceil(factor));
         let mut out = Self::filled(size_px, [0; 3]);
         for (i, pixel) in out.pixels.iter_mut().enumerate() {
-            let (x, y) = (i as u32 % size_px[0] * factor, i as u32 / size_px[0] * factor);
+            let (x, y) = (
+                i as u32 % size_px[0] * factor,
+                i as u32 / size_px[0] * factor,
+            );
             let (mut sum, mut count) = ([0u32; 3], 0u32);
             for row in y..(y + factor).min(self.size_px[1]) {
                 for column in x..(x + factor).min(self.size_px[0]) {

@@ -97,7 +97,10 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
     }
     if let Some(entry) = entries.first() {
         let config = toml::to_string(&entry.report.config).unwrap_or_default();
-        out.push(Section::new("Configuration", folded("All parameters", &config)));
+        out.push(Section::new(
+            "Configuration",
+            folded("All parameters", &config),
+        ));
     }
     Ok(out)
 }
@@ -112,7 +115,10 @@ pub fn text(entries: &[Entry]) -> String {
         out.push_str(table.trim_end_matches('\n'));
         out.push_str("\n\n");
     };
-    part("Performance and energy", tables::performance(entries).text());
+    part(
+        "Performance and energy",
+        tables::performance(entries).text(),
+    );
     part("Reuse and image error", tables::accuracy(entries).text());
     part("Right pixels by class", tables::classes(entries).text());
     part("G-buffer traffic", tables::traffic(entries).text());

@@ -93,7 +93,9 @@ pub fn curve(report: &Report) -> Result<Markup, PlotError> {
     // Colour reuse saves the units nothing beyond shadow reuse, and looks the same.
     let levels = [(Reuse::Primary, 2), (Reuse::Shadow, 0)];
     let of = |x: &dyn Fn(&crate::sgrt::result::CurvePoint) -> f64| {
-        levels.map(|(reuse, index)| series(reuse, index, x)).to_vec()
+        levels
+            .map(|(reuse, index)| series(reuse, index, x))
+            .to_vec()
     };
     let chart = |title: &str, label: &str, series| LineChart {
         title: title.to_owned(),
@@ -112,7 +114,10 @@ pub fn curve(report: &Report) -> Result<Markup, PlotError> {
         of(&|p| p.wrong_object_pct),
     );
     Ok(figures(&[
-        (flip.svg()?, "One dot a rule; the table below names them.".to_owned()),
+        (
+            flip.svg()?,
+            "One dot a rule; the table below names them.".to_owned(),
+        ),
         (wrong.svg()?, String::new()),
     ]))
 }
