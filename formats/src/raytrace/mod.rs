@@ -5,11 +5,25 @@
 //! cost in the bounding volume hierarchy. Lengths are metres; positions are `f32` relative to
 //! [`RaytraceMeta::origin`], so that a scene far from the world's origin loses no precision.
 
+mod bytes;
 pub mod camera;
+mod codec;
+mod file;
+pub mod half;
+pub mod normal;
+pub mod tables;
+
+#[cfg(test)]
+mod tests;
 
 use crate::textrace::TraceMeta;
 use crate::view::{Eye, TILE_SIZE_PX};
 pub use camera::EyeCamera;
+pub use file::{
+    EncodedRayTile, RAY_INDEX, RAY_INDEX_ENTRY_BYTES, RAY_TILES, Raytrace, RaytraceWriter,
+    encode_ray_tile,
+};
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// What the whole trace says about itself.
@@ -28,10 +42,9 @@ pub struct RaytraceMeta {
     pub samples_per_px: u32,
     /// True where every ray lists the nodes and triangles that it visited.
     pub has_visits: bool,
-    /// Background radiance straight up and at the horizon, linear RGB (a miss is between them).
+    /// Radiance of the sky and of the ground below the horizon, linear RGB: what a miss sees and
+    /// what lights surfaces evenly.
     pub sky: [[f32; 3]; 2],
-    /// Ambient radiance added to diffuse surfaces, linear RGB.
-    pub ambient: [f32; 3],
 }
 
 /// What a material does to a ray.
@@ -90,6 +103,16 @@ pub struct RayTriangle {
     pub material: u32,
     /// Vertices relative to the trace's origin, counter-clockwise from the front.
     pub vertices: [[f32; 3]; 3],
+}
+
+impl RayTriangle {
+    /// Unit normal on the front side; zero for a degenerate triangle.
+    #[must_use]
+    pub fn normal(&self) -> [f32; 3] {
+        let [a, b, c] = self.vertices.map(Vec3::from);
+        let cross = (b - a).as_dvec3().cross((c - a).as_dvec3());
+        cross.normalize_or_zero().as_vec3().to_array()
+    }
 }
 
 /// How rays walk the hierarchy, hence what a step is.
@@ -239,6 +262,33 @@ pub struct Hit {
     pub object: u32,
     /// Index into the material table.
     pub material: u32,
+}
+
+impl Hit {
+    /// The hit of a primary ray `t` metres along a unit direction from an eye; what a trace does
+    /// not store follows from the triangle.
+    #[must_use]
+    pub fn new(
+        eye: &EyeCamera,
+        direction: [f32; 3],
+        t: f32,
+        triangle: &RayTriangle,
+        shading_normal_code: [i16; 2],
+        uv: [f32; 2],
+    ) -> Self {
+        let normal = Vec3::from(triangle.normal());
+        let faces_away = normal.dot(Vec3::from(direction)) > 0.0;
+        Self {
+            t,
+            position: eye.at(direction, t),
+            geometric_normal: if faces_away { -normal } else { normal }.to_array(),
+            shading_normal: normal::decode(shading_normal_code),
+            uv,
+            primitive: triangle.primitive,
+            object: triangle.object,
+            material: triangle.material,
+        }
+    }
 }
 
 /// One pixel (one sample of it where there are several).

@@ -6,14 +6,18 @@ pub mod scene_args;
 pub mod scenes;
 
 use clap::{Parser, Subcommand};
+use formats::container::{VERSION_MAJOR, VERSION_MINOR};
 use std::io;
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
-/// Version with the formats that this build writes.
-const VERSION: &str = concat!(
-    env!("CARGO_PKG_VERSION"),
-    " (writes .textrace format 1, .raytrace format 1)"
-);
+/// Version with the format that this build writes.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    format!(
+        "{} (writes .textrace and .raytrace format {VERSION_MAJOR}.{VERSION_MINOR})",
+        env!("CARGO_PKG_VERSION")
+    )
+});
 
 const EXAMPLES: &str = "\
 Examples:
@@ -27,7 +31,7 @@ Exit codes: 0 done, 2 wrong use or unreadable input.";
 
 /// Renders a scene for both eyes and captures every texture sample or every ray into a trace.
 #[derive(Debug, Parser)]
-#[command(name = "tracegen", version = VERSION, after_help = EXAMPLES, max_term_width = 100)]
+#[command(name = "tracegen", version = VERSION.as_str(), after_help = EXAMPLES, max_term_width = 100)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -1,14 +1,15 @@
 //! `tracegen raster`.
 
 use super::scene_args::{SceneArgs, SceneSetup};
-use crate::raster::backend::{CaptureBackend, DeviceTexture};
+use crate::raster::backend::CaptureBackend;
 use crate::raster::capture::{CaptureJob, Pictures};
 use crate::raster::draws::DrawList;
 use crate::raster::lavapipe::Lavapipe;
 use crate::raster::lighting::Lighting;
+use crate::raster::picture;
 use crate::raster::tiles::CaptureCounts;
-use crate::raster::{picture, textures};
 use crate::scene::LoadOptions;
+use crate::scene::textures::TextureSet;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::textrace::{Tables, TextraceWriter, TraceMeta};
@@ -53,10 +54,17 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         limit_threads(threads)?;
     }
     let started = Instant::now();
-    let setup = args.scene.setup(None, &LoadOptions::ALL)?;
-    let cascades = if args.shadows { CASCADES } else { 0 };
+    let mut setup = args.scene.setup(None, &LoadOptions::ALL)?;
+    let cascades = if args.shadows {
+        CASCADES
+    } else {
+        setup.scene.shadow_cascades.min(CASCADES)
+    };
     let draws = DrawList::new(&setup.scene, cascades)?;
-    let uploads = textures::for_device(&setup.scene);
+    let uploads = TextureSet::compress_and_free(&mut setup.scene)?;
+    for note in &uploads.notes {
+        super::warn(note);
+    }
     let size_px = setup.hmd.eye_size_px;
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
     let tables = tables(&setup, &args.scene.scene, &draws, &uploads, &backend);
@@ -71,7 +79,11 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         parts: 1,
     };
     job.warm_up(&mut backend, &setup.frames[0])?;
-    eprintln!("{}: ready in {:.2} s", args.scene.scene, started.elapsed().as_secs_f64());
+    eprintln!(
+        "{}: ready in {:.2} s",
+        args.scene.scene,
+        started.elapsed().as_secs_f64()
+    );
 
     let mut writer = TextraceWriter::create(&args.output, &tables)
         .with_context(|| format!("cannot write {}", args.output.display()))?;
@@ -86,7 +98,8 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
             Some(pictures)
         };
         let start = Instant::now();
-        let (pictures, counts) = job.capture_frame(&mut backend, views, 2 * frame, &tables, &mut writer)?;
+        let (pictures, counts) =
+            job.capture_frame(&mut backend, views, 2 * frame, &tables, &mut writer)?;
         summary.captured += start.elapsed();
         summary.counts += counts;
         if let Some(plain) = plain {
@@ -99,9 +112,14 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         .finish()
         .with_context(|| format!("cannot write {}", args.output.display()))?;
     summary.captured += start.elapsed();
-    summary.print(setup.frames.len(), size_px, std::fs::metadata(&args.output)?.len());
+    summary.print(
+        setup.frames.len(),
+        size_px,
+        std::fs::metadata(&args.output)?.len(),
+    );
     if let (Some(path), Some(pictures)) = (&args.image, &first_pictures) {
-        picture::write_side_by_side(path, pictures, size_px).with_context(|| format!("cannot write {}", path.display()))?;
+        picture::write_side_by_side(path, pictures, size_px)
+            .with_context(|| format!("cannot write {}", path.display()))?;
     }
     ensure!(
         summary.identical != Some(false),
@@ -112,7 +130,10 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
 
 /// Near and far end of the cascades: from the near plane to where the scene ends.
 fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
-    let farthest = (setup.camera.eye - lo).abs().max((setup.camera.eye - hi).abs()).length();
+    let farthest = (setup.camera.eye - lo)
+        .abs()
+        .max((setup.camera.eye - hi).abs())
+        .length();
     let near = setup.camera.near.max(0.05);
     [near, farthest.min(setup.camera.far).max(2.0 * near)]
 }
@@ -121,11 +142,11 @@ fn tables(
     setup: &SceneSetup,
     spec: &str,
     draws: &DrawList,
-    uploads: &[DeviceTexture],
+    uploads: &TextureSet,
     backend: &dyn CaptureBackend,
 ) -> Tables {
-    let textures = draws.textures(&setup.scene, uploads);
-    let (samplers, draw_table) = draws.tables(&setup.scene, &textures);
+    let textures = draws.textures(uploads);
+    let (samplers, draw_table) = draws.tables(&setup.scene, uploads, &textures);
     Tables {
         meta: TraceMeta {
             tool: concat!("tracegen ", env!("CARGO_PKG_VERSION")).into(),
@@ -196,10 +217,14 @@ impl Summary {
             fragments as f64 / pixels
         );
         if masked_lanes_killed > 0 {
-            eprintln!("{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw");
+            eprintln!(
+                "{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw"
+            );
         }
         if not_finite > 0 {
-            super::warn(&format!("{not_finite} records with texture coordinates that are not finite were left out"));
+            super::warn(&format!(
+                "{not_finite} records with texture coordinates that are not finite were left out"
+            ));
         }
         eprintln!(
             "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record (44 raw)",
@@ -215,12 +240,20 @@ impl Summary {
                 "with capture   {captured:.3} s (the same, and draining, sorting, encoding and writing the trace): {:.2} x plain",
                 captured / plain
             );
-            eprintln!("pictures with and without capture: {}", if identical { "identical" } else { "DIFFERENT" });
+            eprintln!(
+                "pictures with and without capture: {}",
+                if identical { "identical" } else { "DIFFERENT" }
+            );
         } else {
-            eprintln!("with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace)");
+            eprintln!(
+                "with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace)"
+            );
         }
         if let Some(bytes) = peak_rss_bytes() {
-            eprintln!("peak memory    {:.0} MiB", bytes as f64 / f64::from(1 << 20));
+            eprintln!(
+                "peak memory    {:.0} MiB",
+                bytes as f64 / f64::from(1 << 20)
+            );
         }
     }
 }
@@ -245,7 +278,9 @@ fn limit_threads(threads: u16) -> anyhow::Result<()> {
 
 /// Bytes with an optional binary suffix: `64MiB`, `512KiB`, `1GiB`, `4096`.
 fn parse_bytes(text: &str) -> Result<u64, String> {
-    let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    let digits = text
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(text.len());
     let (number, suffix) = text.split_at(digits);
     let shift = match suffix {
         "" | "B" => Some(0),
@@ -271,9 +306,14 @@ mod tests {
     #[test]
     fn output_paths_and_thread_counts_do_not_reach_the_trace() {
         let expected = ["raster", "s.gltf", "--shadows", "--camera", "x"];
-        assert_eq!(kept("raster s.gltf -o a --shadows --image=b.png --camera x"), expected);
         assert_eq!(
-            kept("raster s.gltf --output=a --shadows --threads 2 --no-plain --camera x --record-budget 4MiB -ob"),
+            kept("raster s.gltf -o a --shadows --image=b.png --camera x"),
+            expected
+        );
+        assert_eq!(
+            kept(
+                "raster s.gltf --output=a --shadows --threads 2 --no-plain --camera x --record-budget 4MiB -ob"
+            ),
             expected
         );
     }

@@ -1,10 +1,12 @@
 //! `tracegen scenes`: built-in scenes, or what a file holds.
 
 use super::scene_args::load_scene;
+use crate::scene::textures::{CompressedTexture, TextureSet};
 use crate::scene::{LoadOptions, Scene, procedural};
 use clap::Args;
 use serde::Serialize;
 use std::io::{self, Write};
+use std::time::Instant;
 
 /// Arguments of `tracegen scenes`.
 #[derive(Args, Debug)]
@@ -12,6 +14,9 @@ pub struct ScenesArgs {
     /// A scene file or built-in scene to describe; without it the built-in scenes are listed.
     #[arg(value_name = "SCENE")]
     scene: Option<String>,
+    /// Also read the images, compress them as a capture does, and tell the bytes.
+    #[arg(long, requires = "scene")]
+    textures: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -42,6 +47,7 @@ struct Description {
     instances: usize,
     materials: usize,
     images: Vec<ImageEntry>,
+    texture_bytes: Option<usize>,
     lights: usize,
     bounds_m: Option<[[f32; 3]; 2]>,
     cameras: Vec<CameraEntry>,
@@ -73,7 +79,11 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
     let text = match args.scene {
         None => list(args.json)?,
         Some(spec) => {
-            let description = describe(&load_scene(&spec, &LoadOptions::NO_IMAGES)?);
+            let description = if args.textures {
+                read_textures(&spec)?
+            } else {
+                describe(&load_scene(&spec, &LoadOptions::NO_IMAGES)?)
+            };
             if args.json {
                 json(&description)?
             } else {
@@ -85,6 +95,28 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
     out.write_all(text.as_bytes())?;
     out.flush()?;
     Ok(())
+}
+
+/// Loads and compresses everything; how long that took goes to stderr.
+fn read_textures(spec: &str) -> anyhow::Result<Description> {
+    let start = Instant::now();
+    let mut scene = load_scene(spec, &LoadOptions::ALL)?;
+    let loaded = start.elapsed();
+    let set = TextureSet::compress_and_free(&mut scene)?;
+    for note in &set.notes {
+        super::warn(note);
+    }
+    anstream::eprintln!(
+        "loaded in {:.2} s, {} textures compressed in {:.2} s",
+        loaded.as_secs_f64(),
+        set.textures.len(),
+        (start.elapsed() - loaded).as_secs_f64(),
+    );
+    let bytes = set.textures.iter().map(CompressedTexture::bytes).sum();
+    Ok(Description {
+        texture_bytes: Some(bytes),
+        ..describe(&scene)
+    })
 }
 
 fn json(value: &impl Serialize) -> serde_json::Result<String> {
@@ -137,6 +169,7 @@ fn describe(scene: &Scene) -> Description {
                 color_space: i.color_space,
             })
             .collect(),
+        texture_bytes: None,
         lights: scene.lights.len(),
         bounds_m: scene
             .bounds()
@@ -175,6 +208,12 @@ fn table(d: &Description) -> String {
         texels as f64 / 1e6,
         d.lights,
     );
+    if let Some(bytes) = d.texture_bytes {
+        text += &format!(
+            "textures   {:.1} MiB block-compressed\n",
+            bytes as f64 / 1048576.0
+        );
+    }
     if let Some([low, high]) = d.bounds_m {
         text += &format!("bounds     {} to {} m\n", point(low), point(high));
     }

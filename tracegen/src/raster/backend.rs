@@ -2,16 +2,14 @@
 
 use super::draws::DrawList;
 use super::lighting::Lighting;
-use formats::texture::TexelFormat;
 use formats::view::EyeView;
 use glam::Mat4;
 
-/// Group number under which a masked draw's alpha and depth travel to the in-order replay. It
-/// never reaches a trace.
-pub const DEPTH_GROUP: u8 = 14;
-
 /// Bytes of one raw record.
 pub const RECORD_BYTES: u64 = 44;
+
+/// Bytes of one raw depth.
+pub const DEPTH_BYTES: u64 = 20;
 
 /// One covered quad in one uv group as the instrumented shader writes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -23,12 +21,11 @@ pub struct RawRecord {
     pub primitive: u32,
     /// Index into the draw table.
     pub draw: u32,
-    /// Coordinates of the top-left lane; for [`DEPTH_GROUP`] the depths of lanes 0 and 1.
+    /// Coordinates of the top-left lane, covered or not.
     pub uv: [f32; 2],
-    /// Horizontal derivative of the top row; for [`DEPTH_GROUP`] the depths of lanes 2 and 3.
+    /// Horizontal derivative of the top row.
     pub dx: [f32; 2],
-    /// Vertical derivative of the left column; for [`DEPTH_GROUP`] the bits of the first hold the
-    /// covered lanes (its mask holds those that pass the alpha test).
+    /// Vertical derivative of the left column.
     pub dy: [f32; 2],
     /// Change of the horizontal derivative from the top row to the bottom row.
     pub cross: [f32; 2],
@@ -53,7 +50,7 @@ impl RawRecord {
         (self.header >> 24 & 15) as u8
     }
 
-    /// Uv group, `NO_GROUP` or [`DEPTH_GROUP`].
+    /// Uv group or `NO_GROUP`.
     #[must_use]
     pub fn group(&self) -> u8 {
         (self.header >> 28) as u8
@@ -66,6 +63,26 @@ impl RawRecord {
     }
 }
 
+/// What the in-order replay of an alpha-masked draw needs to know about a quad.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct RawDepth {
+    /// Depth of each lane.
+    pub depth: [f32; 4],
+    /// Covered lanes whose alpha passes the test.
+    pub passing: u32,
+}
+
+/// The raw records of one region, in no particular order.
+#[derive(Clone, Copy, Debug)]
+pub struct RawRecords<'a> {
+    /// One a quad and uv group.
+    pub quads: &'a [RawRecord],
+    /// `depths[i]` belongs to `quads[i]` where that is group 0 of a masked draw, and means nothing
+    /// elsewhere; empty where no draw is masked.
+    pub depths: &'a [RawDepth],
+}
+
 /// A rectangle of the view in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
@@ -73,19 +90,6 @@ pub struct Region {
     pub origin_px: [u32; 2],
     /// Width and height.
     pub size_px: [u32; 2],
-}
-
-/// A texture as the driver gets it: every mip level of every layer, ready to upload.
-#[derive(Clone, Debug)]
-pub struct DeviceTexture {
-    /// Width and height of level 0 in texels, multiples of 4 for block formats.
-    pub size: [u32; 2],
-    /// BC1 or RGBA8.
-    pub format: TexelFormat,
-    /// Colours are sRGB encoded.
-    pub srgb: bool,
-    /// Bytes of each level, largest first.
-    pub levels: Vec<Vec<u8>>,
 }
 
 /// What every draw of a view shares.
@@ -202,7 +206,7 @@ pub trait CaptureBackend {
     fn render_shadows(&mut self, draws: &DrawList, lighting: &Lighting) -> Result<(), RasterError>;
 
     /// Renders a region of a view into the view's picture, and with `capture` hands every record
-    /// of the region to `sink`, in no particular order.
+    /// of the region to `sink`.
     ///
     /// # Errors
     /// Driver errors.
@@ -212,7 +216,7 @@ pub trait CaptureBackend {
         view: &View<'_>,
         region: Region,
         capture: bool,
-        sink: &mut dyn FnMut(&[RawRecord]) -> Result<(), RasterError>,
+        sink: &mut dyn FnMut(RawRecords<'_>) -> Result<(), RasterError>,
     ) -> Result<Rendered, RasterError>;
 
     /// Reads the picture that the regions since have filled: sRGB RGBA8, row by row.

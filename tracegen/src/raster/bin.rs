@@ -27,13 +27,20 @@ impl TileRect {
     #[must_use]
     pub fn tile(&self, index: usize) -> [u32; 2] {
         let index = index as u32;
-        [self.origin[0] + index % self.size[0], self.origin[1] + index / self.size[0]]
+        [
+            self.origin[0] + index % self.size[0],
+            self.origin[1] + index / self.size[0],
+        ]
     }
 
     /// Position of the tile that holds a record's quad, or `None` where it is outside.
     fn index(&self, record: &RawRecord) -> Option<usize> {
-        let column = (record.qx() / 8).checked_sub(self.origin[0]).filter(|c| *c < self.size[0])?;
-        let row = (record.qy() / 8).checked_sub(self.origin[1]).filter(|r| *r < self.size[1])?;
+        let column = (record.qx() / 8)
+            .checked_sub(self.origin[0])
+            .filter(|c| *c < self.size[0])?;
+        let row = (record.qy() / 8)
+            .checked_sub(self.origin[1])
+            .filter(|r| *r < self.size[1])?;
         Some((row * self.size[0] + column) as usize)
     }
 }
@@ -54,7 +61,10 @@ impl Bins {
     /// left out.
     #[must_use]
     pub fn new(records: &[RawRecord], rect: &TileRect) -> Self {
-        let chunk_len = records.len().div_ceil(4 * rayon::current_num_threads()).max(4096);
+        let chunk_len = records
+            .len()
+            .div_ceil(4 * rayon::current_num_threads())
+            .max(4096);
         let chunks = records
             .par_chunks(chunk_len)
             .enumerate()
@@ -66,7 +76,9 @@ impl Bins {
     /// Calls `visit` with every record index of a tile.
     pub fn visit(&self, tile: usize, mut visit: impl FnMut(u32)) {
         for chunk in &self.chunks {
-            chunk.indices[chunk.range(tile)].iter().for_each(|&i| visit(i));
+            chunk.indices[chunk.range(tile)]
+                .iter()
+                .for_each(|&i| visit(i));
         }
     }
 }
@@ -164,7 +176,8 @@ mod tests {
         for tile in 0..rect.count() {
             bins.visit(tile, |_| found += 1);
         }
-        let inside = |r: &&RawRecord| (2..5).contains(&(r.qx() / 8)) && (1..3).contains(&(r.qy() / 8));
+        let inside =
+            |r: &&RawRecord| (2..5).contains(&(r.qx() / 8)) && (1..3).contains(&(r.qy() / 8));
         assert_eq!(found, records.iter().filter(inside).count());
     }
 

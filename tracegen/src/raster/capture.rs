@@ -1,6 +1,6 @@
 //! Captures the frames of a scene into a trace.
 
-use super::backend::{CaptureBackend, RasterError, RawRecord, View};
+use super::backend::{CaptureBackend, RasterError, RawRecords, View};
 use super::bin::{Bins, TileRect};
 use super::draws::DrawList;
 use super::lighting::Lighting;
@@ -53,7 +53,14 @@ impl CaptureJob<'_> {
     fn light_frame(&self, views: &FrameViews) -> Lighting {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
-        lighting.cascades = cascades::fit(views, self.draws.cascades, lighting.to_sun, self.bounds, near, far);
+        lighting.cascades = cascades::fit(
+            views,
+            self.draws.cascades,
+            lighting.to_sun,
+            self.bounds,
+            near,
+            far,
+        );
         lighting
     }
 
@@ -62,7 +69,11 @@ impl CaptureJob<'_> {
     ///
     /// # Errors
     /// Driver errors.
-    pub fn warm_up(&self, backend: &mut dyn CaptureBackend, views: &FrameViews) -> Result<(), RasterError> {
+    pub fn warm_up(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        views: &FrameViews,
+    ) -> Result<(), RasterError> {
         let lighting = self.light_frame(views);
         backend.render_shadows(self.draws, &lighting)?;
         let corner = super::backend::Region {
@@ -124,7 +135,7 @@ impl CaptureJob<'_> {
         tables: &Tables,
         writer: &mut TextraceWriter<W>,
     ) -> Result<(Pictures, CaptureCounts), RasterError> {
-        let rules = TileRules::new(tables);
+        let rules = TileRules::new(tables, self.draws);
         let lighting = self.light_frame(views);
         backend.render_shadows(self.draws, &lighting)?;
         let mut pictures = Pictures::default();
@@ -139,7 +150,7 @@ impl CaptureJob<'_> {
             let visible = cull::visible_draws(self.draws, view.clip_from_world());
             view.visible = &visible;
             let columns = tables.passes[pass].tiles[0];
-            let mut sink = |rect: &TileRect, records: &[RawRecord]| {
+            let mut sink = |rect: &TileRect, records: RawRecords<'_>| {
                 let (tiles, of_region) = encode_region(&rules, tables, rect, records)?;
                 counts += of_region;
                 for (number, tile) in tiles.into_iter().enumerate() {
@@ -151,7 +162,14 @@ impl CaptureJob<'_> {
                 }
                 Ok(())
             };
-            self.parts = regions::capture_view(backend, self.draws, &view, self.size_px, self.parts, &mut sink)?;
+            self.parts = regions::capture_view(
+                backend,
+                self.draws,
+                &view,
+                self.size_px,
+                self.parts,
+                &mut sink,
+            )?;
             *picture = backend.picture()?;
         }
         Ok((pictures, counts))
@@ -163,14 +181,15 @@ fn encode_region(
     rules: &TileRules,
     tables: &Tables,
     rect: &TileRect,
-    records: &[RawRecord],
+    records: RawRecords<'_>,
 ) -> Result<(Vec<EncodedTile>, CaptureCounts), RasterError> {
-    let bins = Bins::new(records, rect);
+    let bins = Bins::new(records.quads, rect);
     let encoded: Vec<(EncodedTile, CaptureCounts)> = (0..rect.count())
         .into_par_iter()
         .map_init(Scratch::default, |scratch, tile| {
             let mut counts = rules.build(records, &bins, tile, scratch);
-            let encoded = encode_tile(tables, &scratch.tile).map_err(|e| RasterError::Write(e.to_string()))?;
+            let encoded = encode_tile(tables, &scratch.tile)
+                .map_err(|e| RasterError::Write(e.to_string()))?;
             counts.tile_bytes = encoded.size_bytes() as u64;
             Ok((encoded, counts))
         })

@@ -30,12 +30,25 @@ pub struct Cascade {
 /// Fits `count` cascades along `to_sun` to both eyes of a frame between `near_m` and `far_m` from
 /// the head; `bounds` are the scene's, so that every caster lies within the depth range.
 #[must_use]
-pub fn fit(views: &FrameViews, count: u32, to_sun: Vec3, bounds: (Vec3, Vec3), near_m: f32, far_m: f32) -> Vec<Cascade> {
-    let up = if to_sun.y.abs() > 0.99 { Vec3::Z } else { Vec3::Y };
+pub fn fit(
+    views: &FrameViews,
+    count: u32,
+    to_sun: Vec3,
+    bounds: (Vec3, Vec3),
+    near_m: f32,
+    far_m: f32,
+) -> Vec<Cascade> {
+    let up = if to_sun.y.abs() > 0.99 {
+        Vec3::Z
+    } else {
+        Vec3::Y
+    };
     let light = look_at_mat4(Vec3::ZERO, -to_sun, up);
     let (depth_lo, depth_hi) = corners(bounds.0, bounds.1)
         .map(|p| -light.transform_point3(p).z)
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), d| (lo.min(d), hi.max(d)));
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), d| {
+            (lo.min(d), hi.max(d))
+        });
     (0..count)
         .map(|k| {
             let slice = [k, k + 1].map(|edge| split(edge, count, near_m, far_m));
@@ -86,7 +99,10 @@ fn slice_sphere(views: &FrameViews, slice: [f32; 2]) -> (Vec3, f32) {
         }
     }
     let center = points.iter().sum::<Vec3>() / points.len() as f32;
-    let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f32::max);
+    let radius = points
+        .iter()
+        .map(|p| p.distance(center))
+        .fold(0.0, f32::max);
     (center, (radius * 16.0).ceil() / 16.0)
 }
 
@@ -135,16 +151,30 @@ mod tests {
     fn every_point_of_both_frusta_lies_in_a_cascade() {
         let views = views(Vec3::new(0.3, -0.1, -1.0));
         let bounds = (Vec3::new(-40.0, -2.0, -40.0), Vec3::new(40.0, 20.0, 40.0));
-        let cascades = fit(&views, 4, Vec3::new(0.4, 0.8, 0.3).normalize(), bounds, 0.1, 30.0);
+        let cascades = fit(
+            &views,
+            4,
+            Vec3::new(0.4, 0.8, 0.3).normalize(),
+            bounds,
+            0.1,
+            30.0,
+        );
         for eye in &views.eyes {
-            let clip = Mat4::from_cols_array_2d(&eye.eye_to_clip) * Mat4::from_cols_array_2d(&eye.world_to_eye);
+            let clip = Mat4::from_cols_array_2d(&eye.eye_to_clip)
+                * Mat4::from_cols_array_2d(&eye.world_to_eye);
             let world = clip.inverse();
             for i in 0..1000_u32 {
-                let ndc = Vec3::new((i % 10) as f32 / 4.5 - 1.0, (i / 10 % 10) as f32 / 4.5 - 1.0, 0.0);
+                let ndc = Vec3::new(
+                    (i % 10) as f32 / 4.5 - 1.0,
+                    (i / 10 % 10) as f32 / 4.5 - 1.0,
+                    0.0,
+                );
                 let near = world.project_point3(ndc);
                 let far = world.project_point3(ndc.with_z(0.9));
                 let p = near.lerp(far, (i / 100) as f32 / 9.0);
-                let depth = -Mat4::from_cols_array_2d(&eye.world_to_eye).transform_point3(p).z;
+                let depth = -Mat4::from_cols_array_2d(&eye.world_to_eye)
+                    .transform_point3(p)
+                    .z;
                 let inside_scene = p.cmpge(bounds.0).all() && p.cmple(bounds.1).all();
                 if inside_scene && (0.1..30.0).contains(&depth) {
                     assert!(

@@ -42,7 +42,7 @@ fn outside(plane: Vec4, [lo, hi]: [Vec3; 2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::draws::DrawCall;
+    use crate::raster::draws::{DrawCall, DrawMode};
     use glam::Affine3A;
 
     fn list(boxes: &[[Vec3; 2]]) -> DrawList {
@@ -52,6 +52,7 @@ mod tests {
                 .map(|&bounds| DrawCall {
                     mesh: 0,
                     material: 0,
+                    mode: DrawMode::Opaque,
                     transform: Affine3A::IDENTITY,
                     mirrored: false,
                     first_primitive: 0,

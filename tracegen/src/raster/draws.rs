@@ -2,9 +2,10 @@
 
 use super::backend::RasterError;
 use super::groups::MaterialGroups;
-use crate::scene::{AlphaMode, Scene};
-use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
+use crate::scene::textures::TextureSet;
+use crate::scene::{AlphaMode, Material, Scene};
 use formats::textrace::{Draw, Sample, UvGroup};
+use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Vec3};
 
 /// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
@@ -14,6 +15,29 @@ pub const SHADOW_SIZE: u32 = 2048;
 /// footprints tile a 4x4 neighbourhood without overlap.
 pub const SHADOW_TAPS: [[i8; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
 
+/// How a draw treats alpha. Where alpha is a constant, the test is made here and not a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DrawMode {
+    /// Every fragment is kept.
+    Opaque,
+    /// Fragments are discarded by their texture's alpha.
+    Masked,
+    /// Blended over what is there, depth not written.
+    Blended,
+}
+
+impl DrawMode {
+    /// The mode of a material, or `None` where nothing of it is seen.
+    fn new(material: &Material) -> Option<Self> {
+        match material.alpha {
+            AlphaMode::Opaque => Some(Self::Opaque),
+            AlphaMode::Blend => Some(Self::Blended),
+            AlphaMode::Mask(_) if material.base_color_texture.is_some() => Some(Self::Masked),
+            AlphaMode::Mask(cutoff) => (material.base_color.w >= cutoff).then_some(Self::Opaque),
+        }
+    }
+}
+
 /// One draw call: one instance of one mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct DrawCall {
@@ -21,6 +45,8 @@ pub struct DrawCall {
     pub mesh: usize,
     /// Index into the scene's materials.
     pub material: usize,
+    /// How it treats alpha.
+    pub mode: DrawMode,
     /// Object to world.
     pub transform: Affine3A,
     /// The transform mirrors: front faces wind the other way round.
@@ -44,7 +70,7 @@ pub struct DrawList {
 
 impl DrawList {
     /// Orders the scene's instances: opaque and masked ones in the scene's order, then blended
-    /// ones in the scene's order. Instances without triangles are left out.
+    /// ones in the scene's order. Instances that show nothing are left out.
     ///
     /// # Errors
     /// More primitives than 32 bits number, or an index out of range.
@@ -54,7 +80,11 @@ impl DrawList {
         for blended in [false, true] {
             for instance in &scene.instances {
                 let mesh = scene.meshes.get(instance.mesh).ok_or_else(|| {
-                    RasterError::Scene(format!("instance of mesh {} of {}", instance.mesh, scene.meshes.len()))
+                    RasterError::Scene(format!(
+                        "instance of mesh {} of {}",
+                        instance.mesh,
+                        scene.meshes.len()
+                    ))
                 })?;
                 let material = scene.materials.get(mesh.material).ok_or_else(|| {
                     RasterError::Scene(format!(
@@ -64,10 +94,17 @@ impl DrawList {
                         scene.materials.len()
                     ))
                 })?;
-                if (material.alpha == AlphaMode::Blend) != blended || mesh.triangles() == 0 {
+                let Some(mode) = DrawMode::new(material) else {
+                    continue;
+                };
+                if (mode == DrawMode::Blended) != blended || mesh.triangles() == 0 {
                     continue;
                 }
-                if let Some(index) = mesh.indices.iter().find(|&&i| i as usize >= mesh.positions.len()) {
+                if let Some(index) = mesh
+                    .indices
+                    .iter()
+                    .find(|&&i| i as usize >= mesh.positions.len())
+                {
                     return Err(RasterError::Scene(format!(
                         "mesh {}: index {index} beyond its {} vertices",
                         mesh.name,
@@ -77,6 +114,7 @@ impl DrawList {
                 calls.push(DrawCall {
                     mesh: instance.mesh,
                     material: mesh.material,
+                    mode,
                     transform: instance.transform,
                     mirrored: instance.mirrored(),
                     first_primitive: next_primitive,
@@ -99,23 +137,10 @@ impl DrawList {
         })
     }
 
-    /// Texture table of the trace: the scene's images in their order, then the shadow maps.
-    /// `levels` and `sizes` are those of the uploaded textures.
+    /// Texture table of the trace: the scene's textures in their order, then the shadow maps.
     #[must_use]
-    pub fn textures(&self, scene: &Scene, uploaded: &[super::backend::DeviceTexture]) -> Vec<Texture> {
-        let mut textures: Vec<Texture> = scene
-            .images
-            .iter()
-            .zip(uploaded)
-            .map(|(image, device)| Texture {
-                name: image.name.clone(),
-                size: device.size,
-                levels: device.levels.len() as u32,
-                layers: 1,
-                format: device.format,
-                color_space: image.color_space,
-            })
-            .collect();
+    pub fn textures(&self, set: &TextureSet) -> Vec<Texture> {
+        let mut textures: Vec<Texture> = set.textures.iter().map(|t| t.texture.clone()).collect();
         if self.cascades > 0 {
             textures.push(Texture {
                 name: "shadow cascades".into(),
@@ -129,9 +154,15 @@ impl DrawList {
         textures
     }
 
-    /// Sampler and draw tables of the trace; `textures` is [`DrawList::textures`]' result.
+    /// Sampler and draw tables of the trace; `textures` is [`DrawList::textures`]' result for the
+    /// same `set`.
     #[must_use]
-    pub fn tables(&self, scene: &Scene, textures: &[Texture]) -> (Vec<Sampler>, Vec<Draw>) {
+    pub fn tables(
+        &self,
+        scene: &Scene,
+        set: &TextureSet,
+        textures: &[Texture],
+    ) -> (Vec<Sampler>, Vec<Draw>) {
         let mut samplers = Vec::new();
         let material_groups: Vec<Vec<UvGroup>> = scene
             .materials
@@ -146,11 +177,15 @@ impl DrawList {
                         let samples = group
                             .iter()
                             .filter_map(|&slot| slots[slot])
-                            .map(|t| Sample {
-                                texture: t.image as u32,
-                                sampler: intern(&mut samplers, t.sampler),
-                                layer: 0,
-                                offset: [0, 0],
+                            .filter_map(|t| {
+                                // Images that only unplaced materials use have no texture.
+                                let texture = (*set.of_image.get(t.image)?)?;
+                                Some(Sample {
+                                    texture: texture as u32,
+                                    sampler: intern(&mut samplers, t.sampler),
+                                    layer: 0,
+                                    offset: [0, 0],
+                                })
                             })
                             .collect();
                         uv_group(samples, textures)
@@ -161,7 +196,7 @@ impl DrawList {
                     let samples = SHADOW_TAPS
                         .iter()
                         .map(|&offset| Sample {
-                            texture: scene.images.len() as u32,
+                            texture: set.textures.len() as u32,
                             sampler,
                             layer: layer as u16,
                             offset,
@@ -201,10 +236,13 @@ fn uv_group(samples: Vec<Sample>, textures: &[Texture]) -> UvGroup {
 }
 
 fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
-    let index = samplers.iter().position(|s| *s == sampler).unwrap_or_else(|| {
-        samplers.push(sampler);
-        samplers.len() - 1
-    });
+    let index = samplers
+        .iter()
+        .position(|s| *s == sampler)
+        .unwrap_or_else(|| {
+            samplers.push(sampler);
+            samplers.len() - 1
+        });
     index as u16
 }
 

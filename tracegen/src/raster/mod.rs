@@ -21,5 +21,4 @@ pub mod masked;
 pub mod picture;
 pub mod quantise;
 pub mod regions;
-pub mod textures;
 pub mod tiles;

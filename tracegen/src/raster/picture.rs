@@ -8,11 +8,18 @@ use std::path::Path;
 ///
 /// # Errors
 /// What the file system or the encoder reports.
-pub fn write_side_by_side(path: &Path, pictures: &Pictures, size_px: [u32; 2]) -> anyhow::Result<()> {
+pub fn write_side_by_side(
+    path: &Path,
+    pictures: &Pictures,
+    size_px: [u32; 2],
+) -> anyhow::Result<()> {
     let [width, height] = size_px;
     let row_bytes = width as usize * 4;
     let mut pixels = Vec::with_capacity(2 * row_bytes * height as usize);
-    for (left, right) in pictures[0].chunks_exact(row_bytes).zip(pictures[1].chunks_exact(row_bytes)) {
+    for (left, right) in pictures[0]
+        .chunks_exact(row_bytes)
+        .zip(pictures[1].chunks_exact(row_bytes))
+    {
         pixels.extend_from_slice(left);
         pixels.extend_from_slice(right);
     }

@@ -1,8 +1,8 @@
 //! From the shader's floats to the trace's fixed point.
 
 use super::backend::RawRecord;
-use formats::texture::{Sampler, Wrap};
 use formats::textrace::{SUBTEXELS, UvGroup};
+use formats::texture::{Sampler, Wrap};
 
 /// Coordinates stay below this, derivatives below half of it, so that no sum of a lane's terms
 /// (`uv + dx + dy + cross`) leaves 32 bits.
@@ -123,14 +123,20 @@ mod tests {
     #[test]
     fn rounding_agrees_with_the_library() {
         for value in [0.0, 0.5, 1.5, -0.5, -2.5, 2.4999, 1e8 + 0.3, -536_870_911.7] {
-            assert_eq!(round(value, LIMIT), value.round_ties_even() as i32, "{value}");
+            assert_eq!(
+                round(value, LIMIT),
+                value.round_ties_even() as i32,
+                "{value}"
+            );
         }
         assert_eq!(round(1e30, LIMIT), 1 << 29);
     }
 
     #[test]
     fn moderate_coordinates_keep_their_value() {
-        let fixed = Quantiser::default().quantise(&rule(1024, Wrap::Repeat), &at(3.5)).unwrap();
+        let fixed = Quantiser::default()
+            .quantise(&rule(1024, Wrap::Repeat), &at(3.5))
+            .unwrap();
         assert_eq!(fixed.uv, [7 << 20, -(7 << 20)]);
         assert_eq!(fixed.dx, [1 << 19, 0]);
     }
@@ -148,14 +154,19 @@ mod tests {
 
     #[test]
     fn clamped_coordinates_stay_outside_however_large() {
-        let fixed = Quantiser::default().quantise(&rule(1024, Wrap::ClampToEdge), &at(1e9)).unwrap();
+        let fixed = Quantiser::default()
+            .quantise(&rule(1024, Wrap::ClampToEdge), &at(1e9))
+            .unwrap();
         assert_eq!(fixed.uv, [1 << 29, -(1 << 29)]);
     }
 
     #[test]
     fn coordinates_that_are_not_finite_are_refused() {
         for bad in [f32::NAN, f32::INFINITY] {
-            assert_eq!(Quantiser::default().quantise(&rule(4, Wrap::Repeat), &at(bad)), None);
+            assert_eq!(
+                Quantiser::default().quantise(&rule(4, Wrap::Repeat), &at(bad)),
+                None
+            );
         }
     }
 }

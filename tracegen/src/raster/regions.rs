@@ -5,7 +5,7 @@
 //! of a row. Memory stays bounded by one region's records however large the frame, and each
 //! region's tiles are complete, so they can be written at once.
 
-use super::backend::{CaptureBackend, RasterError, RawRecord, Region, Rendered, View};
+use super::backend::{CaptureBackend, RasterError, RawRecords, Region, Rendered, View};
 use super::bin::TileRect;
 use super::draws::DrawList;
 use formats::view::TILE_SIZE_PX;
@@ -22,7 +22,7 @@ pub fn capture_view(
     view: &View<'_>,
     size_px: [u32; 2],
     parts: u32,
-    sink: &mut dyn FnMut(&TileRect, &[RawRecord]) -> Result<(), RasterError>,
+    sink: &mut dyn FnMut(&TileRect, RawRecords<'_>) -> Result<(), RasterError>,
 ) -> Result<u32, RasterError> {
     let whole = TileRect {
         origin: [0, 0],
@@ -34,14 +34,18 @@ pub fn capture_view(
     let mut rendered = 0;
     while let Some(rect) = open.pop() {
         let mut handed_over = false;
-        let mut pass_on = |records: &[RawRecord]| {
+        let mut pass_on = |records: RawRecords<'_>| {
             handed_over = true;
             sink(&rect, records)
         };
         match backend.render(draws, view, region(&rect, size_px), true, &mut pass_on)? {
             Rendered::Complete { .. } => {
                 if !handed_over {
-                    sink(&rect, &[])?;
+                    let nothing = RawRecords {
+                        quads: &[],
+                        depths: &[],
+                    };
+                    sink(&rect, nothing)?;
                 }
                 rendered += 1;
             }
@@ -77,7 +81,9 @@ pub fn render_view(
         origin_px: [0, 0],
         size_px,
     };
-    backend.render(draws, view, whole, false, &mut |_| Ok(())).map(|_| ())
+    backend
+        .render(draws, view, whole, false, &mut |_| Ok(()))
+        .map(|_| ())
 }
 
 /// Cuts a rectangle into up to `parts` bands of whole rows, or a single row into runs of tiles;
@@ -101,7 +107,8 @@ fn split(rect: &TileRect, parts: u32) -> Vec<TileRect> {
 /// Pixels of a rectangle of tiles, cut off at the view's edge.
 fn region(rect: &TileRect, size_px: [u32; 2]) -> Region {
     let origin_px = rect.origin.map(|t| t * TILE_SIZE_PX);
-    let size = [0, 1].map(|axis: usize| (rect.size[axis] * TILE_SIZE_PX).min(size_px[axis] - origin_px[axis]));
+    let size = [0, 1]
+        .map(|axis: usize| (rect.size[axis] * TILE_SIZE_PX).min(size_px[axis] - origin_px[axis]));
     Region {
         origin_px,
         size_px: size,
@@ -115,7 +122,10 @@ mod tests {
     #[test]
     fn parts_cover_the_rectangle_in_order_without_overlap() {
         for (size, parts) in [([60, 68], 5), ([60, 68], 1000), ([60, 1], 7), ([1, 1], 3)] {
-            let rect = TileRect { origin: [3, 4], size };
+            let rect = TileRect {
+                origin: [3, 4],
+                size,
+            };
             let mut tiles = Vec::new();
             for part in split(&rect, parts).into_iter().rev() {
                 tiles.extend((0..part.count()).map(|i| part.tile(i)));

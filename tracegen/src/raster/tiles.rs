@@ -1,8 +1,9 @@
 //! From a tile's raw records to the trace's `Tile`.
 
-use super::backend::{DEPTH_GROUP, RawRecord};
+use super::backend::{RawRecord, RawRecords};
 use super::bin::{Bins, sort_key};
-use super::masked::{MaskedDepth, covered};
+use super::draws::{DrawList, DrawMode};
+use super::masked::MaskedDepth;
 use super::quantise::{GroupScale, Quantiser};
 use formats::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, Tables, Tile};
 use std::ops::AddAssign;
@@ -39,6 +40,8 @@ impl AddAssign for CaptureCounts {
 pub struct TileRules {
     /// By draw and group.
     scales: Vec<Vec<GroupScale>>,
+    /// By draw: its quads carry depths.
+    masked: Vec<bool>,
 }
 
 /// Memory that building a tile reuses.
@@ -52,22 +55,42 @@ pub struct Scratch {
 }
 
 impl TileRules {
-    /// Rules for the draws of `tables`.
+    /// Rules for the draws of `tables`, which are those of `draws`.
     #[must_use]
-    pub fn new(tables: &Tables) -> Self {
+    pub fn new(tables: &Tables, draws: &DrawList) -> Self {
         Self {
             scales: tables
                 .draws
                 .iter()
-                .map(|draw| draw.groups.iter().map(|g| GroupScale::new(g, &tables.samplers)).collect())
+                .map(|draw| {
+                    draw.groups
+                        .iter()
+                        .map(|g| GroupScale::new(g, &tables.samplers))
+                        .collect()
+                })
+                .collect(),
+            masked: draws
+                .calls
+                .iter()
+                .map(|c| c.mode == DrawMode::Masked)
                 .collect(),
         }
     }
 
     /// Builds tile `tile` of the bins into `scratch.tile`.
-    pub fn build(&self, records: &[RawRecord], bins: &Bins, tile: usize, scratch: &mut Scratch) -> CaptureCounts {
+    pub fn build(
+        &self,
+        records: RawRecords<'_>,
+        bins: &Bins,
+        tile: usize,
+        scratch: &mut Scratch,
+    ) -> CaptureCounts {
         scratch.order.clear();
-        bins.visit(tile, |i| scratch.order.push((sort_key(&records[i as usize]), i)));
+        bins.visit(tile, |i| {
+            scratch
+                .order
+                .push((sort_key(&records.quads[i as usize]), i))
+        });
         scratch.order.sort_unstable();
         scratch.tile.clear();
         scratch.depth.clear();
@@ -85,23 +108,34 @@ impl TileRules {
     }
 
     /// Adds the records of one quad of one primitive.
-    fn add_quad(&self, records: &[RawRecord], quad: &[(u64, u32)], scratch: &mut Scratch, counts: &mut CaptureCounts) {
-        let of = |entry: &(u64, u32)| &records[entry.1 as usize];
-        let Some(first) = quad.first().map(of) else { return };
+    fn add_quad(
+        &self,
+        records: RawRecords<'_>,
+        quad: &[(u64, u32)],
+        scratch: &mut Scratch,
+        counts: &mut CaptureCounts,
+    ) {
+        let of = |entry: &(u64, u32)| &records.quads[entry.1 as usize];
+        let Some(first) = quad.first().map(of) else {
+            return;
+        };
         let (x, y) = ((first.qx() & 7) as u8, (first.qy() & 7) as u8);
         let mut alive = 15;
-        let depths = quad.iter().map(of).filter(|r| r.group() == DEPTH_GROUP);
-        let mut tested = None;
-        for record in depths {
-            let survivors = scratch.depth.survivors(record, x, y);
-            counts.masked_lanes_killed += u64::from((covered(record) & !survivors).count_ones());
-            *tested.get_or_insert(0) |= survivors;
-        }
-        if let Some(survivors) = tested {
-            alive = survivors;
+        if self.masked.get(first.draw as usize) == Some(&true) {
+            alive = 0;
+            for &(_, index) in quad.iter().filter(|entry| of(entry).group() == 0) {
+                let (Some(depth), covered) =
+                    (records.depths.get(index as usize), of(&(0, index)).mask())
+                else {
+                    continue;
+                };
+                let survivors = scratch.depth.survivors(first.draw, x, y, covered, depth);
+                counts.masked_lanes_killed += u64::from((covered & !survivors).count_ones());
+                alive |= survivors;
+            }
         }
         let mut lanes = 0;
-        for record in quad.iter().map(of).filter(|r| r.group() != DEPTH_GROUP) {
+        for record in quad.iter().map(of) {
             let mask = record.mask() & alive;
             if mask == 0 {
                 continue;
@@ -116,7 +150,10 @@ impl TileRules {
             };
             self.open_run(record, scratch);
             if record.group() != NO_GROUP {
-                let rule = self.scales.get(record.draw as usize).and_then(|g| g.get(usize::from(record.group())));
+                let rule = self
+                    .scales
+                    .get(record.draw as usize)
+                    .and_then(|g| g.get(usize::from(record.group())));
                 let quantiser = &mut scratch.quantisers[usize::from(record.group())];
                 let Some(fixed) = rule.and_then(|rule| quantiser.quantise(rule, record)) else {
                     counts.not_finite += 1;
@@ -136,7 +173,11 @@ impl TileRules {
     /// Starts the run of the record's primitive unless it is the one under way.
     fn open_run(&self, record: &RawRecord, scratch: &mut Scratch) {
         let tile = &mut scratch.tile;
-        if tile.runs.last().is_none_or(|run| run.primitive != record.primitive) {
+        if tile
+            .runs
+            .last()
+            .is_none_or(|run| run.primitive != record.primitive)
+        {
             // A run whose records were all left out makes room for the next.
             if tile.runs.last().is_some_and(|run| run.count == 0) {
                 tile.runs.pop();

@@ -1,1 +1,16 @@
-//! The companion ray tracer: traces stereo pairs and writes ray traces.
+//! Ray tracing: a scene seen by both eyes, with every ray's work in the hierarchy recorded.
+
+pub mod bvh;
+pub mod frame;
+pub mod light;
+pub mod material;
+pub mod picture;
+pub mod ray;
+pub mod reference;
+pub mod scene;
+pub mod soup;
+pub mod texture;
+pub mod tracer;
+
+#[cfg(test)]
+mod tests;

@@ -86,7 +86,11 @@ impl Gpu {
     ///
     /// # Errors
     /// [`RasterError::Driver`].
-    pub fn checked<T>(&self, doing: &'static str, work: impl FnOnce() -> T) -> Result<T, RasterError> {
+    pub fn checked<T>(
+        &self,
+        doing: &'static str,
+        work: impl FnOnce() -> T,
+    ) -> Result<T, RasterError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);

@@ -6,10 +6,13 @@ mod targets;
 mod uniforms;
 mod upload;
 
-use super::backend::{CaptureBackend, DeviceTexture, RECORD_BYTES, RasterError, RawRecord, Region, Rendered, View};
-use super::draws::{DrawCall, DrawList};
+use super::backend::{
+    CaptureBackend, DEPTH_BYTES, RECORD_BYTES, RasterError, RawRecords, Region, Rendered, View,
+};
+use super::draws::{DrawCall, DrawList, DrawMode};
 use super::lighting::Lighting;
-use crate::scene::{AlphaMode, Scene};
+use crate::scene::Scene;
+use crate::scene::textures::TextureSet;
 use device::Gpu;
 use pipelines::{PipelineKey, Pipelines, Role};
 use targets::{ShadowMaps, Targets};
@@ -32,7 +35,6 @@ pub struct Lavapipe {
 
 #[derive(Clone, Copy)]
 struct MaterialState {
-    alpha: AlphaMode,
     double_sided: bool,
     textures: u32,
     leaders: u32,
@@ -47,15 +49,18 @@ impl Lavapipe {
     pub fn new(
         scene: &Scene,
         draws: &DrawList,
-        textures: &[DeviceTexture],
+        textures: &TextureSet,
         view_size_px: [u32; 2],
         record_budget_bytes: u64,
     ) -> Result<Self, RasterError> {
         let gpu = device::open()?;
         let pipelines = Pipelines::new(&gpu)?;
         let buffers = SceneBuffers::new(&gpu, &pipelines.layouts, scene, draws, textures)?;
-        let targets = Targets::new(&gpu, view_size_px, record_budget_bytes)?;
-        let shadow_maps = gpu.checked("making the shadow maps", || ShadowMaps::new(&gpu, draws.cascades))?;
+        let masked = draws.calls.iter().any(|c| c.mode == DrawMode::Masked);
+        let targets = Targets::new(&gpu, view_size_px, record_budget_bytes, masked)?;
+        let shadow_maps = gpu.checked("making the shadow maps", || {
+            ShadowMaps::new(&gpu, draws.cascades)
+        })?;
         let eye_bindings = bind_view(
             &gpu,
             &pipelines,
@@ -69,7 +74,6 @@ impl Lavapipe {
             .iter()
             .zip(&draws.groups)
             .map(|(material, groups)| MaterialState {
-                alpha: material.alpha,
                 double_sided: material.double_sided,
                 textures: groups.present,
                 leaders: groups.leaders,
@@ -99,8 +103,16 @@ impl Lavapipe {
             role,
             capture,
             // A shadow caster without alpha test is drawn alike whatever its material.
-            textures: if role == Role::Shadow { 0 } else { material.textures },
-            leaders: if shadow || !capture { 0 } else { material.leaders },
+            textures: if role == Role::Shadow {
+                0
+            } else {
+                material.textures
+            },
+            leaders: if shadow || !capture {
+                0
+            } else {
+                material.leaders
+            },
             cascades: if shadow { 0 } else { cascades },
             double_sided: shadow || material.double_sided,
             mirrored: !shadow && call.mirrored,
@@ -108,39 +120,50 @@ impl Lavapipe {
     }
 
     /// Pipelines of a draw in the order in which it uses them.
-    fn roles(&self, call: &DrawCall, capture: bool) -> &'static [(Role, bool)] {
-        match (self.materials[call.material].alpha, capture) {
-            (AlphaMode::Opaque, false) => &[(Role::Opaque, false)],
-            (AlphaMode::Opaque, true) => &[(Role::Opaque, true)],
-            (AlphaMode::Blend, false) => &[(Role::Blended, false)],
-            (AlphaMode::Blend, true) => &[(Role::Blended, true)],
-            (AlphaMode::Mask(_), false) => &[(Role::Masked, false)],
-            (AlphaMode::Mask(_), true) => &[(Role::MaskedRecord, true), (Role::Masked, false)],
+    fn roles(call: &DrawCall, capture: bool) -> &'static [(Role, bool)] {
+        match (call.mode, capture) {
+            (DrawMode::Opaque, false) => &[(Role::Opaque, false)],
+            (DrawMode::Opaque, true) => &[(Role::Opaque, true)],
+            (DrawMode::Blended, false) => &[(Role::Blended, false)],
+            (DrawMode::Blended, true) => &[(Role::Blended, true)],
+            (DrawMode::Masked, false) => &[(Role::Masked, false)],
+            (DrawMode::Masked, true) => &[(Role::MaskedRecord, true), (Role::Masked, false)],
         }
     }
 
-    fn shadow_role(&self, call: &DrawCall) -> Option<Role> {
-        match self.materials[call.material].alpha {
-            AlphaMode::Opaque => Some(Role::Shadow),
-            AlphaMode::Mask(_) => Some(Role::ShadowMasked),
-            AlphaMode::Blend => None,
+    fn shadow_role(call: &DrawCall) -> Option<Role> {
+        match call.mode {
+            DrawMode::Opaque => Some(Role::Shadow),
+            DrawMode::Masked => Some(Role::ShadowMasked),
+            DrawMode::Blended => None,
         }
     }
 
     fn keys_of(&self, call: &DrawCall, cascades: u32) -> Vec<PipelineKey> {
-        let roles = [false, true].into_iter().flat_map(|capture| self.roles(call, capture));
+        let roles = [false, true]
+            .into_iter()
+            .flat_map(|capture| Self::roles(call, capture));
         let mut keys: Vec<PipelineKey> = roles
             .map(|&(role, capture)| self.key(call, role, capture, cascades))
             .collect();
         if cascades > 0 {
-            keys.extend(self.shadow_role(call).map(|role| self.key(call, role, false, cascades)));
+            keys.extend(Self::shadow_role(call).map(|role| self.key(call, role, false, cascades)));
         }
         keys
     }
 
     /// Issues one draw through one pipeline, setting only the state that changes.
-    fn issue(&self, pass: &mut wgpu::RenderPass<'_>, state: &mut PassState, index: u32, call: &DrawCall, key: PipelineKey) {
-        let (Some(mesh), Some(pipeline)) = (&self.scene.meshes[call.mesh], self.pipelines.get(&key)) else {
+    fn issue(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        state: &mut PassState,
+        index: u32,
+        call: &DrawCall,
+        key: PipelineKey,
+    ) {
+        let (Some(mesh), Some(pipeline)) =
+            (&self.scene.meshes[call.mesh], self.pipelines.get(&key))
+        else {
             // Every draw's mesh is uploaded and its pipelines prepared when the backend is made.
             return;
         };
@@ -183,11 +206,14 @@ impl CaptureBackend for Lavapipe {
         // The map cannot be bound while it is rendered: the casters get a stand-in.
         let stand_in = ShadowMaps::new(&self.gpu, 0);
         for (cascade, layer) in lighting.cascades.iter().zip(&self.shadow_maps.layers) {
-            let uniform = self.gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("cascade"),
-                contents: bytemuck::bytes_of(&ViewData::of_cascade(cascade, lighting)),
-                usage: wgpu::BufferUsages::UNIFORM,
-            });
+            let uniform = self
+                .gpu
+                .device
+                .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                    label: Some("cascade"),
+                    contents: bytemuck::bytes_of(&ViewData::of_cascade(cascade, lighting)),
+                    usage: wgpu::BufferUsages::UNIFORM,
+                });
             let bindings = bind_view(
                 &self.gpu,
                 &self.pipelines,
@@ -214,7 +240,7 @@ impl CaptureBackend for Lavapipe {
                 let mut state = PassState::default();
                 for &index in &visible {
                     let call = &draws.calls[index as usize];
-                    if let Some(role) = self.shadow_role(call) {
+                    if let Some(role) = Self::shadow_role(call) {
                         let key = self.key(call, role, false, 0);
                         self.issue(&mut pass, &mut state, index, call, key);
                     }
@@ -232,12 +258,13 @@ impl CaptureBackend for Lavapipe {
         view: &View<'_>,
         region: Region,
         capture: bool,
-        sink: &mut dyn FnMut(&[RawRecord]) -> Result<(), RasterError>,
+        sink: &mut dyn FnMut(RawRecords<'_>) -> Result<(), RasterError>,
     ) -> Result<Rendered, RasterError> {
         let gpu = &self.gpu;
         let targets = &self.targets;
         let data = ViewData::of_eye(view, targets.capacity);
-        gpu.queue.write_buffer(&targets.view_uniform, 0, bytemuck::bytes_of(&data));
+        gpu.queue
+            .write_buffer(&targets.view_uniform, 0, bytemuck::bytes_of(&data));
         gpu.queue.write_buffer(&targets.counter, 0, &[0; 4]);
         gpu.checked("rendering a view", || {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -278,7 +305,7 @@ impl CaptureBackend for Lavapipe {
             let mut state = PassState::default();
             for &index in view.visible {
                 let call = &draws.calls[index as usize];
-                for &(role, capture) in self.roles(call, capture) {
+                for &(role, capture) in Self::roles(call, capture) {
                     let key = self.key(call, role, capture, draws.cascades);
                     self.issue(&mut pass, &mut state, index, call, key);
                 }
@@ -290,16 +317,27 @@ impl CaptureBackend for Lavapipe {
             gpu.wait("rendering a view")?;
             return Ok(Rendered::Complete { records: 0 });
         }
-        let needed = u64::from(gpu.read(&targets.counter, 0..4, |bytes| Ok(bytemuck::pod_read_unaligned::<u32>(bytes)))?);
+        let needed = u64::from(gpu.read(&targets.counter, 0..4, |bytes| {
+            Ok(bytemuck::pod_read_unaligned::<u32>(bytes))
+        })?);
         if needed > u64::from(targets.capacity) {
             return Ok(Rendered::Overflow { needed });
         }
         if needed > 0 {
-            gpu.read(&targets.records, 0..needed * RECORD_BYTES, |bytes| {
-                sink(bytemuck::try_cast_slice(bytes).map_err(|e| RasterError::Driver {
-                    doing: "reading the records",
-                    message: e.to_string(),
-                })?)
+            let depths = if targets.has_depths {
+                needed * DEPTH_BYTES
+            } else {
+                0
+            };
+            gpu.read(&targets.records, 0..needed * RECORD_BYTES, |quads| {
+                let quads = records_of(quads)?;
+                if depths == 0 {
+                    return sink(RawRecords { quads, depths: &[] });
+                }
+                gpu.read(&targets.depths, 0..depths, |depths| {
+                    let depths = records_of(depths)?;
+                    sink(RawRecords { quads, depths })
+                })
             })?;
         }
         Ok(Rendered::Complete { records: needed })
@@ -308,6 +346,13 @@ impl CaptureBackend for Lavapipe {
     fn picture(&mut self) -> Result<Vec<u8>, RasterError> {
         self.targets.read_picture(&self.gpu)
     }
+}
+
+fn records_of<T: bytemuck::Pod>(bytes: &[u8]) -> Result<&[T], RasterError> {
+    bytemuck::try_cast_slice(bytes).map_err(|e| RasterError::Driver {
+        doing: "reading the records",
+        message: e.to_string(),
+    })
 }
 
 fn bind_view(
@@ -331,6 +376,7 @@ fn bind_view(
         targets.records.as_entire_binding(),
         wgpu::BindingResource::TextureView(shadow_map),
         wgpu::BindingResource::Sampler(&sampler),
+        targets.depths.as_entire_binding(),
     ];
     let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
         .zip(resources)

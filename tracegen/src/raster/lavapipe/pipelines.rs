@@ -72,25 +72,35 @@ impl Pipelines {
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
         gpu.checked("compiling the shader", || {
-            let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("capture.wgsl"),
-                source: wgpu::ShaderSource::Wgsl(include_str!("../shaders/capture.wgsl").into()),
-            });
+            let module = gpu
+                .device
+                .create_shader_module(wgpu::ShaderModuleDescriptor {
+                    label: Some("capture.wgsl"),
+                    source: wgpu::ShaderSource::Wgsl(
+                        include_str!("../shaders/capture.wgsl").into(),
+                    ),
+                });
             let layouts = Layouts {
-                view: gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                    label: Some("view"),
-                    entries: &view_entries(),
-                }),
-                material: gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                    label: Some("material"),
-                    entries: &material_entries(),
-                }),
+                view: gpu
+                    .device
+                    .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                        label: Some("view"),
+                        entries: &view_entries(),
+                    }),
+                material: gpu
+                    .device
+                    .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                        label: Some("material"),
+                        entries: &material_entries(),
+                    }),
             };
-            let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: None,
-                bind_group_layouts: &[Some(&layouts.view), Some(&layouts.material)],
-                immediate_size: 0,
-            });
+            let layout = gpu
+                .device
+                .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                    label: None,
+                    bind_group_layouts: &[Some(&layouts.view), Some(&layouts.material)],
+                    immediate_size: 0,
+                });
             let background = background(gpu, &module, &layout);
             Self {
                 layouts,
@@ -127,6 +137,7 @@ impl Pipelines {
             ("LEADERS", f64::from(key.leaders)),
             ("CASCADES", f64::from(key.cascades)),
             ("BLENDED", f64::from(u8::from(key.role == Role::Blended))),
+            ("MASKED", f64::from(u8::from(key.role == Role::Masked))),
         ];
         let compilation_options = wgpu::PipelineCompilationOptions {
             constants: &constants,
@@ -150,88 +161,101 @@ impl Pipelines {
                 wgpu::ColorWrites::ALL
             },
         })];
-        gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: None,
-            layout: Some(&self.layout),
-            vertex: wgpu::VertexState {
-                module: &self.module,
-                entry_point: Some("vertex_main"),
-                compilation_options: compilation_options.clone(),
-                buffers: &[Some(wgpu::VertexBufferLayout {
-                    array_stride: VERTEX_STRIDE,
-                    step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &attributes,
-                })],
-            },
-            primitive: wgpu::PrimitiveState {
-                front_face: if key.mirrored {
-                    wgpu::FrontFace::Cw
-                } else {
-                    wgpu::FrontFace::Ccw
+        gpu.device
+            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: None,
+                layout: Some(&self.layout),
+                vertex: wgpu::VertexState {
+                    module: &self.module,
+                    entry_point: Some("vertex_main"),
+                    compilation_options: compilation_options.clone(),
+                    buffers: &[Some(wgpu::VertexBufferLayout {
+                        array_stride: VERTEX_STRIDE,
+                        step_mode: wgpu::VertexStepMode::Vertex,
+                        attributes: &attributes,
+                    })],
                 },
-                // Shadow maps hold both faces: walls that are modelled from one side block light.
-                cull_mode: (!key.double_sided && !shadow).then_some(wgpu::Face::Back),
-                ..wgpu::PrimitiveState::default()
+                primitive: wgpu::PrimitiveState {
+                    front_face: if key.mirrored {
+                        wgpu::FrontFace::Cw
+                    } else {
+                        wgpu::FrontFace::Ccw
+                    },
+                    // Shadow maps hold both faces: walls that are modelled from one side block light.
+                    cull_mode: (!key.double_sided && !shadow).then_some(wgpu::Face::Back),
+                    ..wgpu::PrimitiveState::default()
+                },
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH_FORMAT,
+                    depth_write_enabled: Some(!matches!(
+                        key.role,
+                        Role::Blended | Role::MaskedRecord
+                    )),
+                    depth_compare: Some(wgpu::CompareFunction::Less),
+                    stencil: wgpu::StencilState::default(),
+                    bias: if shadow {
+                        wgpu::DepthBiasState {
+                            constant: 2,
+                            slope_scale: 2.0,
+                            clamp: 0.0,
+                        }
+                    } else {
+                        wgpu::DepthBiasState::default()
+                    },
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: entry_point.map(|entry_point| wgpu::FragmentState {
+                    module: &self.module,
+                    entry_point: Some(entry_point),
+                    compilation_options,
+                    targets: if shadow { &[] } else { &color },
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+    }
+}
+
+fn background(
+    gpu: &Gpu,
+    module: &wgpu::ShaderModule,
+    layout: &wgpu::PipelineLayout,
+) -> wgpu::RenderPipeline {
+    gpu.device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("background"),
+            layout: Some(layout),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some("vertex_background"),
+                compilation_options: Default::default(),
+                buffers: &[],
             },
+            primitive: wgpu::PrimitiveState::default(),
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
-                depth_write_enabled: Some(!matches!(key.role, Role::Blended | Role::MaskedRecord)),
-                depth_compare: Some(wgpu::CompareFunction::Less),
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Always),
                 stencil: wgpu::StencilState::default(),
-                bias: if shadow {
-                    wgpu::DepthBiasState {
-                        constant: 2,
-                        slope_scale: 2.0,
-                        clamp: 0.0,
-                    }
-                } else {
-                    wgpu::DepthBiasState::default()
-                },
+                bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState::default(),
-            fragment: entry_point.map(|entry_point| wgpu::FragmentState {
-                module: &self.module,
-                entry_point: Some(entry_point),
-                compilation_options,
-                targets: if shadow { &[] } else { &color },
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some("fragment_background"),
+                compilation_options: Default::default(),
+                targets: &[Some(COLOR_FORMAT.into())],
             }),
             multiview_mask: None,
             cache: None,
         })
-    }
 }
 
-fn background(gpu: &Gpu, module: &wgpu::ShaderModule, layout: &wgpu::PipelineLayout) -> wgpu::RenderPipeline {
-    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("background"),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: Some("vertex_background"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH_FORMAT,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Always),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: Some("fragment_background"),
-            compilation_options: Default::default(),
-            targets: &[Some(COLOR_FORMAT.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
-}
-
-fn entry(binding: u32, visibility: wgpu::ShaderStages, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
+fn entry(
+    binding: u32,
+    visibility: wgpu::ShaderStages,
+    ty: wgpu::BindingType,
+) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility,
@@ -248,11 +272,15 @@ fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     }
 }
 
-fn view_entries() -> [wgpu::BindGroupLayoutEntry; 6] {
+fn view_entries() -> [wgpu::BindGroupLayoutEntry; 7] {
     let fragment = wgpu::ShaderStages::FRAGMENT;
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
     [
-        entry(0, wgpu::ShaderStages::VERTEX_FRAGMENT, buffer(wgpu::BufferBindingType::Uniform)),
+        entry(
+            0,
+            wgpu::ShaderStages::VERTEX_FRAGMENT,
+            buffer(wgpu::BufferBindingType::Uniform),
+        ),
         entry(1, wgpu::ShaderStages::VERTEX, storage(true)),
         entry(2, fragment, storage(false)),
         entry(3, fragment, storage(false)),
@@ -265,7 +293,12 @@ fn view_entries() -> [wgpu::BindGroupLayoutEntry; 6] {
                 multisampled: false,
             },
         ),
-        entry(5, fragment, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
+        entry(
+            5,
+            fragment,
+            wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
+        ),
+        entry(6, fragment, storage(false)),
     ]
 }
 

@@ -3,7 +3,7 @@
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
 use super::uniforms::ViewData;
-use crate::raster::backend::{RECORD_BYTES, RasterError};
+use crate::raster::backend::{DEPTH_BYTES, RECORD_BYTES, RasterError};
 use crate::raster::draws::SHADOW_SIZE;
 
 /// Attachments, record buffer and read-back buffer of a view.
@@ -18,6 +18,10 @@ pub struct Targets {
     pub depth_view: wgpu::TextureView,
     /// Raw records.
     pub records: wgpu::Buffer,
+    /// Raw depths, one a record.
+    pub depths: wgpu::Buffer,
+    /// `depths` is as long as `records`; without masked draws it is a stand-in.
+    pub has_depths: bool,
     /// Records appended, those beyond the capacity counted too.
     pub counter: wgpu::Buffer,
     /// Records that fit.
@@ -31,11 +35,17 @@ pub struct Targets {
 
 impl Targets {
     /// Makes the attachments for views of `size_px` and a record buffer of at most
-    /// `budget_bytes`, within the device's limit for one binding.
+    /// `budget_bytes`, within the device's limit for one binding,
+    /// with depths beside them if `has_depths`.
     ///
     /// # Errors
     /// A size of 0 or beyond the device's limit, and driver errors.
-    pub fn new(gpu: &Gpu, size_px: [u32; 2], budget_bytes: u64) -> Result<Self, RasterError> {
+    pub fn new(
+        gpu: &Gpu,
+        size_px: [u32; 2],
+        budget_bytes: u64,
+        has_depths: bool,
+    ) -> Result<Self, RasterError> {
         let limits = gpu.device.limits();
         // Records hold 12 bits of quad column and row.
         let limit = limits.max_texture_dimension_2d.min(8192);
@@ -49,7 +59,9 @@ impl Targets {
             }
         }
         let binding = u64::from(limits.max_storage_buffer_binding_size as u32);
-        let capacity = (budget_bytes.min(binding).min(limits.max_buffer_size) / RECORD_BYTES).max(1);
+        let capacity =
+            (budget_bytes.min(binding).min(limits.max_buffer_size) / RECORD_BYTES).max(1);
+        let depths = if has_depths { capacity } else { 1 };
         let row_bytes = (size_px[0] * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         gpu.checked("making the render targets", || {
             let color = attachment(gpu, size_px, 1, COLOR_FORMAT, wgpu::TextureUsages::COPY_SRC);
@@ -69,9 +81,14 @@ impl Targets {
                 depth_view: depth.create_view(&Default::default()),
                 color,
                 records: buffer(capacity * RECORD_BYTES, Usage::STORAGE | Usage::MAP_READ),
+                depths: buffer(depths * DEPTH_BYTES, Usage::STORAGE | Usage::MAP_READ),
+                has_depths,
                 counter: buffer(4, Usage::STORAGE | Usage::MAP_READ | Usage::COPY_DST),
                 capacity: capacity as u32,
-                view_uniform: buffer(size_of::<ViewData>() as u64, Usage::UNIFORM | Usage::COPY_DST),
+                view_uniform: buffer(
+                    size_of::<ViewData>() as u64,
+                    Usage::UNIFORM | Usage::COPY_DST,
+                ),
                 readback: buffer(
                     u64::from(row_bytes) * u64::from(size_px[1]),
                     Usage::MAP_READ | Usage::COPY_DST,

@@ -2,11 +2,12 @@
 
 use super::device::Gpu;
 use super::pipelines::Layouts;
-use crate::raster::backend::{DeviceTexture, RasterError};
+use crate::raster::backend::RasterError;
 use crate::raster::draws::DrawList;
 use crate::raster::groups::MATERIAL_TEXTURES;
+use crate::scene::textures::{CompressedTexture, TextureSet};
 use crate::scene::{AlphaMode, Material, Mesh, Scene};
-use formats::texture::{Filter, MipFilter, Sampler, TexelFormat, Wrap};
+use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
 use glam::{Mat4, Vec4};
 use wgpu::util::DeviceExt;
 
@@ -72,7 +73,7 @@ impl SceneBuffers {
         layouts: &Layouts,
         scene: &Scene,
         draws: &DrawList,
-        textures: &[DeviceTexture],
+        textures: &TextureSet,
     ) -> Result<Self, RasterError> {
         let mut used = vec![false; scene.meshes.len()];
         for call in &draws.calls {
@@ -84,6 +85,7 @@ impl SceneBuffers {
             meshes.push(used.then(|| upload_mesh(gpu, mesh, limit)).transpose()?);
         }
         let views = textures
+            .textures
             .iter()
             .map(|t| upload_texture(gpu, t))
             .collect::<Result<Vec<_>, _>>()?;
@@ -91,14 +93,16 @@ impl SceneBuffers {
         let materials = scene
             .materials
             .iter()
-            .map(|m| bind_material(gpu, layouts, m, &views, &absent))
+            .map(|m| bind_material(gpu, layouts, m, textures, &views, &absent))
             .collect();
         let instances = instance_rows(draws);
-        let instances = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("instances"),
-            contents: bytemuck::cast_slice(&instances),
-            usage: wgpu::BufferUsages::STORAGE,
-        });
+        let instances = gpu
+            .device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("instances"),
+                contents: bytemuck::cast_slice(&instances),
+                usage: wgpu::BufferUsages::STORAGE,
+            });
         Ok(Self {
             meshes,
             materials,
@@ -125,23 +129,37 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
             let (uv0, uv1) = (at2(&mesh.uv0, i), at2(&mesh.uv1, i));
             VertexData {
                 position: position.to_array(),
-                normal: mesh.normals.get(i).copied().unwrap_or(glam::Vec3::Y).to_array(),
-                tangent: mesh.tangents.get(i).copied().unwrap_or(Vec4::new(1.0, 0.0, 0.0, 1.0)).to_array(),
+                normal: mesh
+                    .normals
+                    .get(i)
+                    .copied()
+                    .unwrap_or(glam::Vec3::Y)
+                    .to_array(),
+                tangent: mesh
+                    .tangents
+                    .get(i)
+                    .copied()
+                    .unwrap_or(Vec4::new(1.0, 0.0, 0.0, 1.0))
+                    .to_array(),
                 uv: [uv0.x, uv0.y, uv1.x, uv1.y],
             }
         })
         .collect();
     let buffer = |contents: &[u8], usage| {
-        gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: None,
-            contents,
-            usage,
-        })
+        gpu.device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: None,
+                contents,
+                usage,
+            })
     };
     // A trailing partial triangle would be no primitive: leave it out of the index range.
     Ok(MeshBuffers {
         vertices: buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
-        indices: buffer(bytemuck::cast_slice(&mesh.indices), wgpu::BufferUsages::INDEX),
+        indices: buffer(
+            bytemuck::cast_slice(&mesh.indices),
+            wgpu::BufferUsages::INDEX,
+        ),
         index_count: mesh.triangles() as u32 * 3,
     })
 }
@@ -155,7 +173,12 @@ fn instance_rows(draws: &DrawList) -> Vec<InstanceData> {
             // A flattened instance has no inverse; its normals keep the object's direction.
             let normal = if inverse.is_finite() { inverse } else { matrix };
             let mut normal_from_object = Mat4::from_mat3(normal);
-            normal_from_object.w_axis = Vec4::new(f32::from_bits(draw), f32::from_bits(call.first_primitive), 0.0, 1.0);
+            normal_from_object.w_axis = Vec4::new(
+                f32::from_bits(draw),
+                f32::from_bits(call.first_primitive),
+                0.0,
+                1.0,
+            );
             InstanceData {
                 world_from_object: Mat4::from(call.transform).to_cols_array_2d(),
                 normal_from_object: normal_from_object.to_cols_array_2d(),
@@ -169,24 +192,37 @@ fn instance_rows(draws: &DrawList) -> Vec<InstanceData> {
 }
 
 /// Stands for the textures that a material lacks; the pipelines never sample it.
-fn white() -> DeviceTexture {
-    DeviceTexture {
-        size: [1, 1],
-        format: TexelFormat::Rgba8,
-        srgb: false,
+fn white() -> CompressedTexture {
+    CompressedTexture {
+        texture: Texture {
+            name: "absent".into(),
+            size: [1, 1],
+            levels: 1,
+            layers: 1,
+            format: TexelFormat::Rgba8,
+            color_space: ColorSpace::Linear,
+        },
         levels: vec![vec![255; 4]],
     }
 }
 
-fn upload_texture(gpu: &Gpu, texture: &DeviceTexture) -> Result<wgpu::TextureView, RasterError> {
-    let format = match (texture.format, texture.srgb) {
-        (TexelFormat::Bc1, true) => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
-        (TexelFormat::Bc1, false) => wgpu::TextureFormat::Bc1RgbaUnorm,
-        (TexelFormat::Rgba8, true) => wgpu::TextureFormat::Rgba8UnormSrgb,
-        (TexelFormat::Rgba8, false) => wgpu::TextureFormat::Rgba8Unorm,
-        (other, _) => {
+fn upload_texture(
+    gpu: &Gpu,
+    compressed: &CompressedTexture,
+) -> Result<wgpu::TextureView, RasterError> {
+    let texture = &compressed.texture;
+    let srgb = texture.color_space == ColorSpace::Srgb;
+    let format = match texture.format {
+        TexelFormat::Bc1 if srgb => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
+        TexelFormat::Bc1 => wgpu::TextureFormat::Bc1RgbaUnorm,
+        TexelFormat::Bc3 if srgb => wgpu::TextureFormat::Bc3RgbaUnormSrgb,
+        TexelFormat::Bc3 => wgpu::TextureFormat::Bc3RgbaUnorm,
+        TexelFormat::Rgba8 if srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        TexelFormat::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
+        other => {
             return Err(RasterError::Scene(format!(
-                "textures are uploaded as BC1 or RGBA8, not {other:?}"
+                "texture {}: expected BC1, BC3 or RGBA8, found {other:?}",
+                texture.name
             )));
         }
     };
@@ -209,7 +245,7 @@ fn upload_texture(gpu: &Gpu, texture: &DeviceTexture) -> Result<wgpu::TextureVie
                         height: texture.size[1],
                         depth_or_array_layers: 1,
                     },
-                    mip_level_count: texture.levels.len() as u32,
+                    mip_level_count: texture.levels,
                     sample_count: 1,
                     dimension: wgpu::TextureDimension::D2,
                     format,
@@ -217,7 +253,7 @@ fn upload_texture(gpu: &Gpu, texture: &DeviceTexture) -> Result<wgpu::TextureVie
                     view_formats: &[],
                 },
                 wgpu::util::TextureDataOrder::LayerMajor,
-                &texture.levels.concat(),
+                &compressed.levels.concat(),
             )
             .create_view(&wgpu::TextureViewDescriptor::default())
     })
@@ -227,6 +263,7 @@ fn bind_material(
     gpu: &Gpu,
     layouts: &Layouts,
     material: &Material,
+    set: &TextureSet,
     views: &[wgpu::TextureView],
     absent: &wgpu::TextureView,
 ) -> wgpu::BindGroup {
@@ -236,17 +273,21 @@ fn bind_material(
         gpu.device.create_sampler(&sampler_descriptor(&state))
     });
     let data = material_data(material);
-    let uniform = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("material"),
-        contents: bytemuck::bytes_of(&data),
-        usage: wgpu::BufferUsages::UNIFORM,
-    });
+    let uniform = gpu
+        .device
+        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("material"),
+            contents: bytemuck::bytes_of(&data),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
     let mut entries = vec![wgpu::BindGroupEntry {
         binding: 0,
         resource: uniform.as_entire_binding(),
     }];
     for (binding, texture) in (1..).zip(&textures) {
-        let view = texture.and_then(|t| views.get(t.image)).unwrap_or(absent);
+        let view = texture
+            .and_then(|t| (*set.of_image.get(t.image)?).and_then(|i| views.get(i)))
+            .unwrap_or(absent);
         entries.push(wgpu::BindGroupEntry {
             binding,
             resource: wgpu::BindingResource::TextureView(view),
@@ -306,7 +347,11 @@ fn sampler_descriptor(state: &Sampler) -> wgpu::SamplerDescriptor<'static> {
             MipFilter::Linear => wgpu::MipmapFilterMode::Linear,
         },
         // Vulkan has no sampler without levels; a quarter of a level above 0 never reaches 1.
-        lod_max_clamp: if state.mip == MipFilter::None { 0.25 } else { 32.0 },
+        lod_max_clamp: if state.mip == MipFilter::None {
+            0.25
+        } else {
+            32.0
+        },
         ..wgpu::SamplerDescriptor::default()
     }
 }

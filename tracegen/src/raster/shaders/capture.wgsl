@@ -14,6 +14,8 @@ override LEADERS: u32 = 0u;
 override CASCADES: u32 = 0u;
 // Alpha reaches the target (blended materials).
 override BLENDED: bool = false;
+// The base colour texture has BC1's one-bit alpha, whose transparent texels are black.
+override MASKED: bool = false;
 
 const BASE_COLOR: u32 = 0u;
 const NORMAL: u32 = 1u;
@@ -22,10 +24,13 @@ const SPECULAR: u32 = 3u;
 const OCCLUSION: u32 = 4u;
 const EMISSIVE: u32 = 5u;
 
-// Groups beyond the material's own, see backend.rs and formats::textrace.
-const DEPTH_GROUP: u32 = 14u;
+// Group of a quad that samples nothing, see formats::textrace.
 const NO_GROUP: u32 = 15u;
+// Words of a record and of a depth, see backend.rs.
 const RECORD_WORDS: u32 = 11u;
+const DEPTH_WORDS: u32 = 5u;
+// Index of no record.
+const NONE: u32 = 0xffffffffu;
 
 struct PointLight {
     position: vec4<f32>,
@@ -73,6 +78,7 @@ struct Material {
 @group(0) @binding(3) var<storage, read_write> records: array<u32>;
 @group(0) @binding(4) var shadow_map: texture_depth_2d_array;
 @group(0) @binding(5) var shadow_sampler: sampler_comparison;
+@group(0) @binding(6) var<storage, read_write> depths: array<u32>;
 
 @group(1) @binding(0) var<uniform> material: Material;
 @group(1) @binding(1) var base_color_texture: texture_2d<f32>;
@@ -152,7 +158,8 @@ fn quad_mask(lane: Lane, takes: bool) -> u32 {
     return (subgroupBallot(takes).x >> lane.shift) & 15u;
 }
 
-fn append(lane: Lane, mask: u32, group: u32, a: vec4<f32>, b: vec4<f32>) {
+// Appends a record and tells its index.
+fn append(lane: Lane, mask: u32, group: u32, a: vec4<f32>, b: vec4<f32>) -> u32 {
     let index = atomicAdd(&counter, 1u);
     if index < view.counts.y {
         let word = index * RECORD_WORDS;
@@ -168,14 +175,17 @@ fn append(lane: Lane, mask: u32, group: u32, a: vec4<f32>, b: vec4<f32>) {
         records[word + 9u] = bitcast<u32>(b.z);
         records[word + 10u] = bitcast<u32>(b.w);
     }
+    return index;
 }
 
-// Must be called in uniform control flow: the derivatives need the helper lanes.
-fn record_uv(lane: Lane, group: u32, takes: bool, uv: vec2<f32>) {
+// Tells the record's index to the lane that appended it. Must be called in uniform control flow:
+// the derivatives need the helper lanes.
+fn record_uv(lane: Lane, group: u32, takes: bool, uv: vec2<f32>) -> u32 {
     let dx = dpdx(uv);
     let dy = dpdy(uv);
     let cross = dpdx(dy);
     let mask = quad_mask(lane, takes);
+    var index = NONE;
     if takes && firstTrailingBit(mask) == lane.index {
         // Back from this lane to the top-left one, the top row and the left column.
         let right = f32(lane.index & 1u);
@@ -183,41 +193,50 @@ fn record_uv(lane: Lane, group: u32, takes: bool, uv: vec2<f32>) {
         let dx_top = dx - down * cross;
         let dy_left = dy - right * cross;
         let top_left = uv - right * dx_top - down * dy_left - right * down * cross;
-        append(lane, mask, group, vec4(top_left, dx_top), vec4(dy_left, cross));
+        index = append(lane, mask, group, vec4(top_left, dx_top), vec4(dy_left, cross));
     }
+    return index;
 }
 
-fn record_material(lane: Lane, in: Fragment) {
+// One record a uv group of the material; tells the index of group 0's.
+fn record_material(lane: Lane, in: Fragment) -> u32 {
+    var first = NONE;
     if LEADERS == 0u && CASCADES == 0u {
         let mask = quad_mask(lane, true);
         if firstTrailingBit(mask) == lane.index {
-            append(lane, mask, NO_GROUP, vec4(0.0), vec4(0.0));
+            _ = append(lane, mask, NO_GROUP, vec4(0.0), vec4(0.0));
         }
     }
-    if (LEADERS & 1u) != 0u { record_uv(lane, 0u, true, texture_uv(0u, in.uv)); }
-    if (LEADERS & 2u) != 0u { record_uv(lane, countOneBits(LEADERS & 1u), true, texture_uv(1u, in.uv)); }
-    if (LEADERS & 4u) != 0u { record_uv(lane, countOneBits(LEADERS & 3u), true, texture_uv(2u, in.uv)); }
-    if (LEADERS & 8u) != 0u { record_uv(lane, countOneBits(LEADERS & 7u), true, texture_uv(3u, in.uv)); }
-    if (LEADERS & 16u) != 0u { record_uv(lane, countOneBits(LEADERS & 15u), true, texture_uv(4u, in.uv)); }
-    if (LEADERS & 32u) != 0u { record_uv(lane, countOneBits(LEADERS & 31u), true, texture_uv(5u, in.uv)); }
+    if (LEADERS & 1u) != 0u { first = record_uv(lane, 0u, true, texture_uv(0u, in.uv)); }
+    if (LEADERS & 2u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 1u), true, texture_uv(1u, in.uv)); }
+    if (LEADERS & 4u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 3u), true, texture_uv(2u, in.uv)); }
+    if (LEADERS & 8u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 7u), true, texture_uv(3u, in.uv)); }
+    if (LEADERS & 16u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 15u), true, texture_uv(4u, in.uv)); }
+    if (LEADERS & 32u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 31u), true, texture_uv(5u, in.uv)); }
+    return first;
 }
 
-// Depth of the four lanes and which of them pass the alpha test, for the in-order replay.
-fn record_depth(lane: Lane, passes: bool, depth: f32) {
+// Depth of the four lanes and which of them pass the alpha test, for the in-order replay;
+// `index` is that of the quad's record in group 0.
+fn record_depth(lane: Lane, index: u32, passes: bool, depth: f32) {
     let dx = dpdx(depth);
     let dy = dpdy(depth);
     let cross = dpdx(dy);
     let passing = quad_mask(lane, passes);
-    let covered = quad_mask(lane, true);
-    if firstTrailingBit(covered) == lane.index {
+    if index < view.counts.y {
         let right = f32(lane.index & 1u);
         let down = f32(lane.index >> 1u);
         let dx_top = dx - down * cross;
         let dy_left = dy - right * cross;
         let top_left = depth - right * dx_top - down * dy_left - right * down * cross;
-        let row = vec2(top_left, top_left + dx_top);
-        let next_row = row + vec2(dy_left, dy_left + cross);
-        append(lane, passing, DEPTH_GROUP, vec4(row, next_row), vec4(bitcast<f32>(covered), 0.0, 0.0, 0.0));
+        let top = vec2(top_left, top_left + dx_top);
+        let bottom = top + vec2(dy_left, dy_left + cross);
+        let word = index * DEPTH_WORDS;
+        depths[word] = bitcast<u32>(top.x);
+        depths[word + 1u] = bitcast<u32>(top.y);
+        depths[word + 2u] = bitcast<u32>(bottom.x);
+        depths[word + 3u] = bitcast<u32>(bottom.y);
+        depths[word + 4u] = passing;
     }
 }
 
@@ -233,7 +252,9 @@ fn texture_uv(slot: u32, uv: vec4<f32>) -> vec2<f32> {
 fn base_color(in: Fragment) -> vec4<f32> {
     var color = material.base_color;
     if (TEXTURES & (1u << BASE_COLOR)) != 0u {
-        color *= textureSample(base_color_texture, base_color_sampler, texture_uv(BASE_COLOR, in.uv));
+        var texel = textureSample(base_color_texture, base_color_sampler, texture_uv(BASE_COLOR, in.uv));
+        if MASKED { texel = vec4(texel.rgb / max(texel.a, 0.02), texel.a); }
+        color *= texel;
     }
     return color;
 }
@@ -293,14 +314,14 @@ fn record_shadow(lane: Lane, found: ShadowLookup, world: vec3<f32>, normal: vec3
     let first = countOneBits(LEADERS);
     for (var k = 0u; k < CASCADES; k++) {
         let p = shadow_coordinates(k, world, normal);
-        record_uv(lane, first + k, found.cascade == i32(k), p.xy);
+        _ = record_uv(lane, first + k, found.cascade == i32(k), p.xy);
     }
     // Lanes outside every cascade sample nothing; without a texture they still count.
     if LEADERS == 0u {
         let alone = found.cascade < 0;
         let mask = quad_mask(lane, alone);
         if alone && firstTrailingBit(mask) == lane.index {
-            append(lane, mask, NO_GROUP, vec4(0.0), vec4(0.0));
+            _ = append(lane, mask, NO_GROUP, vec4(0.0), vec4(0.0));
         }
     }
 }
@@ -396,7 +417,7 @@ fn shade(in: Fragment, front: bool, base: vec4<f32>, found: ShadowLookup) -> vec
     let mirror = reflect(-s.to_eye, normal);
     let gloss = (1.0 - roughness) * (1.0 - roughness);
     light += (s.albedo * sky_radiance(normal) + s.f0 * sky_radiance(mirror) * gloss) * occlusion;
-    return vec4(tone_map(light), select(1.0, base.a, BLENDED));
+    return vec4(tone_map(0.75 * light), select(1.0, base.a, BLENDED));
 }
 
 // Everything that a fragment of an opaque or blended draw does.
@@ -405,7 +426,7 @@ fn capture_and_shade(in: Fragment, front: bool, primitive: u32, invocation: u32)
     let found = find_cascade(in.world, geometric);
     if CAPTURE {
         let lane = lane_of(in, primitive, invocation);
-        record_material(lane, in);
+        _ = record_material(lane, in);
         if CASCADES > 0u { record_shadow(lane, found, in.world, geometric); }
     }
     return shade(in, front, base_color(in), found);
@@ -442,12 +463,12 @@ fn fragment_masked_record(
     @builtin(subgroup_invocation_id) invocation: u32,
 ) -> @location(0) vec4<f32> {
     let lane = lane_of(in, primitive, invocation);
-    record_material(lane, in);
+    let index = record_material(lane, in);
     if CASCADES > 0u {
         let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
         record_shadow(lane, find_cascade(in.world, geometric), in.world, geometric);
     }
-    record_depth(lane, base_color(in).a >= material.specular.w, in.position.z);
+    record_depth(lane, index, base_color(in).a >= material.specular.w, in.position.z);
     return vec4(0.0);
 }
 
@@ -475,7 +496,7 @@ fn fragment_background(in: Background) -> @location(0) vec4<f32> {
     let zenith = view.sky.rgb * vec3(0.75, 0.85, 1.0);
     let sky = mix(view.sky.rgb, zenith, clamp(direction.y, 0.0, 1.0));
     let radiance = mix(view.ground.rgb, sky, smoothstep(-0.1, 0.02, direction.y));
-    return vec4(tone_map(radiance), 1.0);
+    return vec4(tone_map(0.75 * radiance), 1.0);
 }
 
 // Alpha-masked casters.

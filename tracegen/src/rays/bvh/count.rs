@@ -1,0 +1,76 @@
+//! What a traversal notes about its work.
+
+use formats::raytrace::Visit;
+
+/// Receives the work of one ray, in order.
+pub trait Counter {
+    /// A step at an inner node.
+    fn step(&mut self, node: u32);
+    /// Tests of `count` triangles from a slot on.
+    fn triangles(&mut self, first_slot: u32, count: u32);
+    /// A look-up of a triangle's alpha.
+    fn alpha(&mut self);
+}
+
+/// Notes nothing: the yardstick for the cost of counting.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoCounter;
+
+impl Counter for NoCounter {
+    #[inline(always)]
+    fn step(&mut self, _: u32) {}
+    #[inline(always)]
+    fn triangles(&mut self, _: u32, _: u32) {}
+    #[inline(always)]
+    fn alpha(&mut self) {}
+}
+
+/// Counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Inner nodes visited.
+    pub steps: u32,
+    /// Triangles tested.
+    pub triangle_tests: u32,
+    /// Alpha look-ups.
+    pub alpha_tests: u32,
+}
+
+impl Counter for Counts {
+    #[inline(always)]
+    fn step(&mut self, _: u32) {
+        self.steps += 1;
+    }
+    #[inline(always)]
+    fn triangles(&mut self, _: u32, count: u32) {
+        self.triangle_tests += count;
+    }
+    #[inline(always)]
+    fn alpha(&mut self) {
+        self.alpha_tests += 1;
+    }
+}
+
+/// Counts and lists every visit.
+#[derive(Debug)]
+pub struct Visits<'a> {
+    /// Totals.
+    pub counts: Counts,
+    /// Visits in order, appended.
+    pub list: &'a mut Vec<Visit>,
+}
+
+impl Counter for Visits<'_> {
+    fn step(&mut self, node: u32) {
+        self.counts.step(node);
+        self.list.push(Visit::Node(node));
+    }
+    fn triangles(&mut self, first_slot: u32, count: u32) {
+        self.counts.triangles(first_slot, count);
+        let slots = first_slot..first_slot + count;
+        self.list.extend(slots.map(Visit::Triangle));
+    }
+    fn alpha(&mut self) {
+        self.counts.alpha();
+    }
+}

@@ -1,0 +1,188 @@
+//! A whole stereo frame: tiles traced in parallel, written in order.
+
+use super::scene::TraceScene;
+use super::tracer::{TraceSettings, Tracer, triangle};
+use formats::Result;
+use formats::raytrace::{
+    EncodedRayTile, EyeCamera, RayKind, RayTile, RayTriangle, RaytraceTables, RaytraceWriter,
+    encode_ray_tile,
+};
+use glam::Vec3;
+use rayon::prelude::*;
+use std::io::{Seek, Write};
+
+/// Tiles traced before they are written: enough to keep all threads busy, few enough that the
+/// memory for encoded tiles stays small.
+const TILES_AT_ONCE: u32 = 256;
+
+/// Linear pixels of one eye, row by row.
+pub struct EyeImage {
+    /// Width and height.
+    pub size_px: [u32; 2],
+    /// Mean radiance of each pixel's samples.
+    pub pixels: Vec<Vec3>,
+}
+
+/// What a frame cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameStats {
+    /// Rays by kind, in the order of [`RayKind`].
+    pub rays: [u64; 4],
+    /// Steps.
+    pub steps: u64,
+    /// Triangle tests.
+    pub triangle_tests: u64,
+    /// Pixels (or samples) that hit something.
+    pub hits: u64,
+}
+
+impl FrameStats {
+    fn add(&mut self, tile: &RayTile) {
+        for ray in &tile.rays {
+            self.rays[ray.kind as usize] += 1;
+            self.steps += u64::from(ray.steps);
+            self.triangle_tests += u64::from(ray.triangle_tests);
+        }
+        self.hits += tile.pixels.iter().filter(|p| p.hit.is_some()).count() as u64;
+    }
+
+    fn merge(&mut self, other: &Self) {
+        for (sum, n) in self.rays.iter_mut().zip(other.rays) {
+            *sum += n;
+        }
+        self.steps += other.steps;
+        self.triangle_tests += other.triangle_tests;
+        self.hits += other.hits;
+    }
+
+    /// Rays of all kinds.
+    #[must_use]
+    pub fn total_rays(&self) -> u64 {
+        self.rays.iter().sum()
+    }
+
+    /// Rays of one kind.
+    #[must_use]
+    pub fn rays_of(&self, kind: RayKind) -> u64 {
+        self.rays[kind as usize]
+    }
+}
+
+/// A traced frame.
+pub struct Frame {
+    /// Both eyes' pictures.
+    pub images: [EyeImage; 2],
+    /// Triangles that primary rays hit, for the trace's table.
+    pub triangles: Vec<RayTriangle>,
+    /// Cost.
+    pub stats: FrameStats,
+}
+
+/// What a worker hands over for a tile.
+struct TileResult {
+    encoded: Result<EncodedRayTile>,
+    origin_px: [u32; 2],
+    size_px: [u32; 2],
+    colors: Vec<Vec3>,
+    primitives: Vec<u32>,
+    stats: FrameStats,
+}
+
+/// Traces the tiles of both eyes and appends them to a trace. The result does not depend on the
+/// number of threads. `progress` is told the tiles done after each batch.
+///
+/// # Errors
+/// When writing fails.
+pub fn trace_frame<W: Write + Seek>(
+    scene: &TraceScene,
+    settings: TraceSettings,
+    tables: &RaytraceTables,
+    writer: &mut RaytraceWriter<W>,
+    mut progress: impl FnMut(u64),
+) -> Result<Frame> {
+    let size_px = tables.meta.eyes[0].size_px;
+    let blank = || EyeImage {
+        size_px,
+        pixels: vec![Vec3::ZERO; size_px[0] as usize * size_px[1] as usize],
+    };
+    let mut frame = Frame {
+        images: [blank(), blank()],
+        triangles: Vec::new(),
+        stats: FrameStats::default(),
+    };
+    let mut hit = vec![false; scene.soup.triangles.len()];
+    let tiles = tables.tile_count();
+    for (eye, image) in tables.meta.eyes.iter().zip(&mut frame.images) {
+        let mut first = 0;
+        while first < tiles {
+            let last = (first + TILES_AT_ONCE).min(tiles);
+            let results: Vec<TileResult> = (first..last)
+                .into_par_iter()
+                .map_init(
+                    || (Tracer::new(scene, settings), RayTile::default()),
+                    |(tracer, tile), number| {
+                        tile.clear();
+                        (tile.origin_px, tile.size_px) = tables.tile_rect(number);
+                        trace_tile(tracer, settings, eye, tile)
+                    },
+                )
+                .collect();
+            for result in results {
+                writer.tile(&result.encoded?)?;
+                frame.stats.merge(&result.stats);
+                for primitive in result.primitives {
+                    hit[primitive as usize] = true;
+                }
+                let width = result.size_px[0] as usize;
+                for (row, colors) in result.colors.chunks(width.max(1)).enumerate() {
+                    let y = result.origin_px[1] as usize + row;
+                    let at = y * size_px[0] as usize + result.origin_px[0] as usize;
+                    image.pixels[at..at + colors.len()].copy_from_slice(colors);
+                }
+            }
+            progress(u64::from(last - first));
+            first = last;
+        }
+    }
+    frame.triangles = (0u32..)
+        .zip(hit)
+        .filter(|(_, hit)| *hit)
+        .map(|(primitive, _)| triangle(scene, primitive))
+        .collect();
+    Ok(frame)
+}
+
+fn trace_tile(
+    tracer: &mut Tracer<'_>,
+    settings: TraceSettings,
+    eye: &EyeCamera,
+    tile: &mut RayTile,
+) -> TileResult {
+    tracer.tile(eye, tile);
+    let mut stats = FrameStats::default();
+    stats.add(tile);
+    let mut primitives: Vec<u32> = tile
+        .pixels
+        .iter()
+        .filter_map(|p| p.hit.map(|h| h.primitive))
+        .collect();
+    primitives.sort_unstable();
+    primitives.dedup();
+    let samples = settings.samples_per_px as usize;
+    let colors = tile
+        .pixels
+        .chunks(samples.max(1))
+        .map(|pixel| {
+            let sum: Vec3 = pixel.iter().map(|p| Vec3::from(p.color())).sum();
+            sum / pixel.len() as f32
+        })
+        .collect();
+    TileResult {
+        encoded: encode_ray_tile(tile, settings.visits),
+        origin_px: tile.origin_px,
+        size_px: tile.size_px,
+        colors,
+        primitives,
+        stats,
+    }
+}
