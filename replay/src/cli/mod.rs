@@ -1,6 +1,7 @@
 //! The command line, one file a subcommand.
 
 mod config_args;
+mod reproject;
 mod run;
 
 pub use config_args::ConfigArgs;
@@ -28,6 +29,8 @@ struct Cli {
 enum Command {
     /// Replay one trace in one tile order through one cache configuration.
     Run(Box<run::Args>),
+    /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
+    Reproject(Box<reproject::ReprojectArgs>),
 }
 
 /// Parses the command line and runs it. Errors go to stderr.
@@ -35,6 +38,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Run(args) => run::run(&args),
+        Command::Reproject(args) => reproject::run(*args),
     };
     match outcome {
         Ok(code) => code,
