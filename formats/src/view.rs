@@ -16,7 +16,7 @@ pub enum Eye {
 }
 
 /// Tangents of the four half-angles of an eye's frustum, all positive for an on-axis eye.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FovTangents {
     /// Towards the left edge of the eye's image.
     pub left: f32,
@@ -29,7 +29,7 @@ pub struct FovTangents {
 }
 
 /// A head-mounted display: pixels, frusta and eye poses relative to the head.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hmd {
     /// Preset name, or `custom`.
     pub name: String,

@@ -19,8 +19,10 @@ pub(super) struct Broken {
 
 /// Position of a quad on the Morton curve of its tile, 0 to 63 (x in the even bits).
 #[must_use]
-pub fn quad_morton(x: u8, y: u8) -> u8 {
-    let spread = |v: u8| (v & 1) | (v & 2) << 1 | (v & 4) << 2;
+pub const fn quad_morton(x: u8, y: u8) -> u8 {
+    const fn spread(v: u8) -> u8 {
+        (v & 1) | (v & 2) << 1 | (v & 4) << 2
+    }
     spread(x) | spread(y) << 1
 }
 

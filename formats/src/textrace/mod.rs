@@ -5,6 +5,7 @@
 //! every uv group that its draw samples. Addresses are not stored: they follow from the texture
 //! table and from the layout that replay chooses.
 
+mod delta;
 mod index;
 mod invariant;
 mod raw;
@@ -40,13 +41,15 @@ pub const TILES: ChunkTag = ChunkTag(*b"TILE");
 #[repr(u8)]
 pub enum Encoding {
     /// Records as they are in memory.
-    #[default]
     Raw = 0,
+    /// Bit-packed differences from a linear prediction.
+    #[default]
+    Delta = 1,
 }
 
 impl Encoding {
     fn from_id(id: u64) -> Option<Self> {
-        [Self::Raw]
+        [Self::Raw, Self::Delta]
             .into_iter()
             .find(|encoding| *encoding as u64 == id)
     }
@@ -55,12 +58,13 @@ impl Encoding {
     fn most_records(self, bytes: u32) -> u64 {
         match self {
             Self::Raw => u64::from(bytes) / raw::RECORD_BYTES as u64,
+            Self::Delta => u64::from(bytes) * 8 / u64::from(delta::MIN_RECORD_BITS),
         }
     }
 }
 
 /// The whole description of a trace but for its quads.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TraceMeta {
     /// Program and version that wrote the trace, `tracegen 0.1.0`.
     pub tool: String,
@@ -241,7 +245,7 @@ impl Tile {
 }
 
 /// The tables of a trace: everything that is needed to turn a record into texel addresses.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tables {
     /// Description.
     pub meta: TraceMeta,

@@ -3,7 +3,8 @@
 
 use super::index::IndexEntry;
 use super::{
-    Encoding, INDEX_ENTRY_BYTES, Pass, TILE_INDEX, TILES, Tables, Tile, invariant, raw, tables,
+    Encoding, INDEX_ENTRY_BYTES, Pass, TILE_INDEX, TILES, Tables, Tile, delta, invariant, raw,
+    tables,
 };
 use crate::container::{Container, Kind};
 use crate::error::{FormatError, Place, Result};
@@ -162,6 +163,9 @@ impl Textrace {
         match entry.encoding {
             Encoding::Raw => parse_all(file, place, at, bytes, |input| {
                 raw::decode(runs, records, input, out)
+            }),
+            Encoding::Delta => parse_all(file, place, at, bytes, |input| {
+                delta::decode(runs, records, input, out)
             }),
         }?;
         invariant::check(&self.tables.draws, out).map_err(|broken| {

@@ -156,7 +156,7 @@ fn read_everything(bytes: Vec<u8>) -> crate::Result<()> {
     Ok(())
 }
 
-fn small() -> Vec<u8> {
+fn small(encoding: Encoding) -> Vec<u8> {
     let run = |primitive, draw, first, count| PrimitiveRun {
         primitive,
         draw,
@@ -182,28 +182,30 @@ fn small() -> Vec<u8> {
             record(7, 7, NO_GROUP),
         ],
     };
-    write(Encoding::default(), &[(0, 0, tile.clone()), (1, 3, tile)])
+    write(encoding, &[(0, 0, tile.clone()), (1, 3, tile)])
 }
 
 #[test]
 fn every_truncation_is_refused() {
-    let whole = small();
-    read_everything(whole.clone()).unwrap();
-    for length in 0..whole.len() {
-        assert!(
-            read_everything(whole[..length].to_vec()).is_err(),
-            "{length} bytes"
-        );
+    for whole in [small(Encoding::Raw), small(Encoding::Delta)] {
+        read_everything(whole.clone()).unwrap();
+        for length in 0..whole.len() {
+            assert!(
+                read_everything(whole[..length].to_vec()).is_err(),
+                "{length} bytes"
+            );
+        }
     }
 }
 
 #[test]
 fn every_flipped_bit_is_noticed() {
-    let whole = small();
-    for bit in 0..whole.len() * 8 {
-        let mut bytes = whole.clone();
-        bytes[bit / 8] ^= 1 << (bit % 8);
-        assert!(read_everything(bytes).is_err(), "bit {bit}");
+    for whole in [small(Encoding::Raw), small(Encoding::Delta)] {
+        for bit in 0..whole.len() * 8 {
+            let mut bytes = whole.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            assert!(read_everything(bytes).is_err(), "bit {bit}");
+        }
     }
 }
 
@@ -211,7 +213,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn tiles_come_back_as_written(a in tile(), b in tile()) {
-        for encoding in [Encoding::Raw] {
+        for encoding in [Encoding::Raw, Encoding::Delta] {
             let bytes = write(encoding, &[(0, 1, a.clone()), (1, 5, b.clone())]);
             let trace = Textrace::from_bytes(bytes).unwrap();
             prop_assert_eq!(trace.tables(), &tables());

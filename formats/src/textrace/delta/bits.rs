@@ -1,0 +1,73 @@
+//! Bits in little-endian order: the first bit is the lowest bit of the first byte.
+
+/// Zero bytes after the last bit, so that a reader can always load eight bytes at once.
+pub const PADDING_BYTES: usize = 8;
+
+/// Most bits that [`BitReader::peek`] is sure to hold.
+pub(super) const PEEK_BITS: u32 = 57;
+
+/// Appends bits to bytes.
+pub(super) struct BitWriter {
+    bytes: Vec<u8>,
+    pending: u64,
+    count: u32,
+}
+
+impl BitWriter {
+    pub(super) fn new(bytes: Vec<u8>) -> Self {
+        Self {
+            bytes,
+            pending: 0,
+            count: 0,
+        }
+    }
+
+    /// Appends the lowest `count` bits of `value`, at most 32.
+    pub(super) fn put(&mut self, value: u32, count: u32) {
+        debug_assert!(count == 32 || u64::from(value) < 1 << count);
+        self.pending |= u64::from(value) << self.count;
+        self.count += count;
+        while self.count >= 8 {
+            self.bytes.push(self.pending.to_le_bytes()[0]);
+            self.pending >>= 8;
+            self.count -= 8;
+        }
+    }
+
+    pub(super) fn finish(mut self) -> Vec<u8> {
+        if self.count > 0 {
+            self.bytes.push(self.pending.to_le_bytes()[0]);
+        }
+        self.bytes.extend([0; PADDING_BYTES]);
+        self.bytes
+    }
+}
+
+/// Reads bits from bytes that end with padding.
+pub(super) struct BitReader<'a> {
+    bytes: &'a [u8],
+    bit: usize,
+}
+
+impl<'a> BitReader<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, bit: 0 }
+    }
+
+    /// The next bits, at least [`PEEK_BITS`] of them; `None` at the end.
+    #[inline(always)]
+    pub(super) fn peek(&self) -> Option<u64> {
+        let word = self.bytes.get(self.bit >> 3..)?.first_chunk::<8>()?;
+        Some(u64::from_le_bytes(*word) >> (self.bit & 7))
+    }
+
+    #[inline(always)]
+    pub(super) fn skip(&mut self, count: u32) {
+        self.bit += count as usize;
+    }
+
+    /// The bytes that no read bit lies in.
+    pub(super) fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.bit.div_ceil(8)..).unwrap_or_default()
+    }
+}

@@ -1,0 +1,65 @@
+//! Encoding 1: what a linear prediction leaves over, bit-packed.
+//!
+//! Texture coordinates over a primitive are a plane seen in perspective, so a quad's derivatives
+//! follow from the previous quad's, and its coordinates from both by the trapezoid rule. Small
+//! primitives of one draw continue each other, so the first quad of a run is predicted from the
+//! run before. All arithmetic wraps, so the encoding is lossless whatever the numbers are.
+//!
+//! Layout: the runs as bytes, then the records as bits, then [`PADDING_BYTES`] zero bytes.
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+mod bits;
+mod predict;
+mod records;
+mod runs;
+
+use super::Tile;
+use crate::parse::{Fault, Parsed, ensure};
+use bits::{BitReader, BitWriter};
+
+pub use bits::PADDING_BYTES;
+
+/// Fewest bits that a record takes, which bounds the records that a tile's bytes can hold.
+pub const MIN_RECORD_BITS: u32 = records::CONTROL_BITS;
+
+pub(super) fn encode(tile: &Tile) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(tile.records.len() * 12 + tile.runs.len() * 4 + 16);
+    runs::encode(&tile.runs, &mut bytes);
+    let mut bits = BitWriter::new(bytes);
+    records::encode(tile, &mut bits);
+    bits.finish()
+}
+
+pub(super) fn decode<'a>(
+    run_count: u32,
+    record_count: u32,
+    input: &'a [u8],
+    tile: &mut Tile,
+) -> Parsed<'a, ()> {
+    let (packed, ()) = runs::decode(run_count, record_count, input, &mut tile.runs)?;
+    let mut bits = BitReader::new(packed);
+    let short = |bits: &BitReader<'a>| {
+        let rest = bits.rest();
+        nom::Err::Failure(Fault::new(
+            rest,
+            "a record",
+            format_args!("{} bytes left", rest.len()),
+        ))
+    };
+    let mut state = records::State::new();
+    for run in &tile.runs {
+        records::decode_run(run, &mut state, &mut bits, &mut tile.records)
+            .ok_or_else(|| short(&bits))?;
+    }
+    let rest = bits.rest();
+    ensure(
+        rest,
+        rest.len() == PADDING_BYTES && rest.iter().all(|byte| *byte == 0),
+        || format!("{PADDING_BYTES} zero bytes after the last record"),
+        format_args!("{} bytes", rest.len()),
+    )?;
+    Ok((&[], ()))
+}
+
+#[cfg(test)]
+mod tests;

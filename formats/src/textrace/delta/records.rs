@@ -1,0 +1,262 @@
+//! Records as bits: a control word, then four pairs of residuals.
+//!
+//! Control word, lowest bit first:
+//!
+//! | bits | meaning |
+//! | --- | --- |
+//! | 4 x 4 | width codes of the dx, dy, cross and uv residuals |
+//! | 3 | step along the Morton curve since the run's last record, 7: six more bits hold it |
+//! | 4 | coverage mask |
+//! | 1 | 1: the group is the one that followed the last record's group before; 0: four more bits |
+//!
+//! Then the escapes in that order, then dx, dy, cross and uv, each u before v, in the width that
+//! the larger of the two needs.
+
+use super::bits::{BitReader, BitWriter, PEEK_BITS};
+use super::predict::{Context, Derivatives, Pair, split};
+use crate::textrace::{PrimitiveRun, QuadRecord, Tile, quad_morton};
+use std::num::Wrapping;
+
+/// Bits of the control word.
+pub(super) const CONTROL_BITS: u32 = 24;
+/// Bits of the control word and of both escapes.
+const LONGEST_CONTROL_BITS: u32 = CONTROL_BITS + 6 + 4;
+const _: () = assert!(LONGEST_CONTROL_BITS <= PEEK_BITS);
+
+/// Width in bits that each width code stands for.
+const WIDTHS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 18, 24, 32];
+
+/// Number of groups that a record can name.
+const GROUPS: usize = 16;
+
+/// What is remembered from record to record of a tile.
+pub(super) struct State {
+    contexts: [Context; GROUPS],
+    /// Group that came after each group the last time.
+    follows: [u8; GROUPS],
+    /// Group of the last record.
+    group: u8,
+    draw: u32,
+    /// Groups that this run has had, a bit each.
+    seen: u16,
+    /// Position of the run's last record on the Morton curve.
+    morton: u32,
+}
+
+impl State {
+    pub(super) fn new() -> Self {
+        let mut follows = [0; GROUPS];
+        for (group, follow) in (0u8..).zip(&mut follows) {
+            *follow = group;
+        }
+        Self {
+            contexts: [Context::default(); GROUPS],
+            follows,
+            group: 0,
+            draw: 0,
+            seen: 0,
+            morton: 0,
+        }
+    }
+
+    fn start_run(&mut self, run: &PrimitiveRun) {
+        // Another draw has other textures: its coordinates do not continue these.
+        if run.draw != self.draw {
+            *self = Self::new();
+            self.draw = run.draw;
+        }
+        self.seen = 0;
+        self.morton = 0;
+    }
+
+    /// The group that is expected next.
+    #[inline(always)]
+    fn expected_group(&self) -> u8 {
+        let group = usize::from(self.group) % GROUPS;
+        self.follows.get(group).copied().unwrap_or_default()
+    }
+
+    /// Notes the next record's group.
+    #[inline(always)]
+    fn note_group(&mut self, group: u8) {
+        if let Some(follow) = self.follows.get_mut(usize::from(self.group) % GROUPS) {
+            *follow = group;
+        }
+        self.group = group;
+    }
+}
+
+/// Writes the records of a whole tile.
+pub(super) fn encode(tile: &Tile, bits: &mut BitWriter) {
+    let mut state = State::new();
+    let mut records = tile.records.iter();
+    for run in &tile.runs {
+        state.start_run(run);
+        for record in records.by_ref().take(run.count as usize) {
+            encode_record(record, &mut state, bits);
+        }
+    }
+}
+
+fn encode_record(record: &QuadRecord, state: &mut State, bits: &mut BitWriter) {
+    let (x, y) = (i32::from(record.x), i32::from(record.y));
+    let (uv, now) = split(record);
+    let group = usize::from(record.group) % GROUPS;
+    let expected = state.expected_group();
+    let Some(context) = state.contexts.get_mut(group) else {
+        return;
+    };
+    let guess = context.derivatives(x, y);
+    let residuals = [
+        residual(now.dx, guess.dx),
+        residual(now.dy, guess.dy),
+        residual(now.cross, guess.cross),
+        residual(uv, context.uv(x, y, &now)),
+    ];
+    let morton = u32::from(quad_morton(record.x, record.y));
+    let step = morton - state.morton;
+    let codes = residuals.map(|[u, v]| width_code(u | v));
+    for code in codes {
+        bits.put(code, 4);
+    }
+    bits.put(step.min(7), 3);
+    bits.put(u32::from(record.mask), 4);
+    bits.put(u32::from(record.group == expected), 1);
+    if step >= 7 {
+        bits.put(step, 6);
+    }
+    if record.group != expected {
+        bits.put(u32::from(record.group), 4);
+    }
+    for (pair, code) in residuals.into_iter().zip(codes) {
+        for value in pair {
+            bits.put(value, width(code));
+        }
+    }
+    let same_run = state.seen >> group & 1 == 1;
+    context.learn(x, y, uv, now, same_run);
+    state.seen |= 1 << group;
+    state.morton = morton;
+    state.note_group(record.group);
+}
+
+/// Reads the records of one run; `None` where the bits end early or a position is off the tile.
+#[inline]
+pub(super) fn decode_run(
+    run: &PrimitiveRun,
+    state: &mut State,
+    bits: &mut BitReader<'_>,
+    records: &mut Vec<QuadRecord>,
+) -> Option<()> {
+    state.start_run(run);
+    for _ in 0..run.count {
+        records.push(decode_record(state, bits)?);
+    }
+    Some(())
+}
+
+#[inline(always)]
+fn decode_record(state: &mut State, bits: &mut BitReader<'_>) -> Option<QuadRecord> {
+    let control = bits.peek()?;
+    let field = |from: u32, count: u32| ((control >> from) & ((1 << count) - 1)) as u32;
+    let widths = [0, 4, 8, 12].map(|from| width(field(from, 4)));
+    let mut step = field(16, 3);
+    let mask = field(19, 4) as u8;
+    let mut used = CONTROL_BITS;
+    let mut group = state.expected_group();
+    if step == 7 {
+        step = field(used, 6);
+        used += 6;
+    }
+    if field(23, 1) == 0 {
+        group = field(used, 4) as u8;
+        used += 4;
+    }
+    bits.skip(used);
+    let morton = state.morton + step;
+    let &(x, y) = POSITIONS.get(morton as usize)?;
+    let context = state.contexts.get_mut(usize::from(group) % GROUPS)?;
+    let (column, row) = (i32::from(x), i32::from(y));
+    let [dx_width, dy_width, cross_width, uv_width] = widths;
+    let guess = context.derivatives(column, row);
+    let now = Derivatives {
+        dx: take(bits, dx_width, guess.dx)?,
+        dy: take(bits, dy_width, guess.dy)?,
+        cross: take(bits, cross_width, guess.cross)?,
+    };
+    let uv = take(bits, uv_width, context.uv(column, row, &now))?;
+    context.learn(column, row, uv, now, state.seen >> group & 1 == 1);
+    state.seen |= 1 << group;
+    state.morton = morton;
+    state.note_group(group);
+    Some(QuadRecord {
+        x,
+        y,
+        mask,
+        group,
+        uv: uv.map(|number| number.0),
+        dx: now.dx.map(|number| number.0),
+        dy: now.dy.map(|number| number.0),
+        cross: now.cross.map(|number| number.0),
+    })
+}
+
+/// Reads a pair of residuals and adds them to the prediction.
+#[inline(always)]
+fn take(bits: &mut BitReader<'_>, width: u32, guess: Pair) -> Option<Pair> {
+    let [u, v] = if 2 * width <= PEEK_BITS {
+        let both = bits.peek()?;
+        bits.skip(2 * width);
+        let low = (1u64 << width) - 1;
+        [both & low, both >> width & low]
+    } else {
+        let u = bits.peek()?;
+        bits.skip(width);
+        let v = bits.peek()?;
+        bits.skip(width);
+        [u, v]
+    };
+    let [guess_u, guess_v] = guess;
+    Some([guess_u + unfold(u as u32), guess_v + unfold(v as u32)])
+}
+
+/// Zigzag: small numbers of either sign become small unsigned ones.
+fn residual(actual: Pair, guess: Pair) -> [u32; 2] {
+    let fold = |number: i32| ((number << 1) ^ (number >> 31)).cast_unsigned();
+    let ([a, b], [c, d]) = (actual, guess);
+    [fold((a - c).0), fold((b - d).0)]
+}
+
+#[inline(always)]
+fn unfold(value: u32) -> Wrapping<i32> {
+    Wrapping((value >> 1).cast_signed() ^ -((value & 1).cast_signed()))
+}
+
+/// The smallest width code that holds `value`.
+fn width_code(value: u32) -> u32 {
+    let needed = 32 - value.leading_zeros();
+    (0..16).find(|code| width(*code) >= needed).unwrap_or(15)
+}
+
+#[inline(always)]
+fn width(code: u32) -> u32 {
+    WIDTHS.get(code as usize & 15).copied().map_or(0, u32::from)
+}
+
+/// Column and row of each position of the Morton curve.
+const POSITIONS: [(u8, u8); 64] = {
+    let mut positions = [(0, 0); 64];
+    let mut y = 0;
+    while y < 8 {
+        let mut x = 0;
+        while x < 8 {
+            #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+            {
+                positions[quad_morton(x, y) as usize] = (x, y);
+            }
+            x += 1;
+        }
+        y += 1;
+    }
+    positions
+};
