@@ -34,7 +34,7 @@ pub struct ReprojectArgs {
     files: Vec<PathBuf>,
     /// Which reprojected pixels are rejected and traced: `none` (the paper's plain reuse), or
     /// `depth[=SHARE]` (behind a neighbour), `row[=SHARE]` (behind a surface of its row), `object`
-    /// (no neighbour of its object), `silhouette` (a neighbour of another object), `triangle` (the
+    /// (no neighbour of its object), `opaque` (its material has alpha cut-outs), `silhouette` (a neighbour of another object), `triangle` (the
     /// right-eye ray misses the reused triangle), `triangles` (and those around it), joined by `+`.
     #[arg(long, value_name = "RULE", default_value = DEFAULT_RULE)]
     rule: Rule,
@@ -217,7 +217,11 @@ fn thumbnails(
         left: small(&analysis.left())?,
         bad: small(&picture::bad_pixels(frame, &ours.decisions, &ours.picture))?,
         flip: small(&ours.flip.picture())?,
-        plain_bad: small(&picture::bad_pixels(frame, &plain.decisions, &plain.picture))?,
+        plain_bad: small(&picture::bad_pixels(
+            frame,
+            &plain.decisions,
+            &plain.picture,
+        ))?,
         plain_flip: small(&plain.flip.picture())?,
     })
 }

@@ -242,8 +242,10 @@ pub fn curve_rules() -> Vec<Rule> {
         "triangle",
         "triangles",
         "depth=0.02+object+triangle",
-        super::DEFAULT_RULE,
-        "depth=0.02+silhouette+triangles",
+        "depth=0.02+object+triangles",
+        "depth=0.02+object+opaque+triangle",
+        "depth=0.02+object+opaque+triangles",
+        "depth=0.02+object+opaque+silhouette+triangle",
     ]
     .into_iter()
     .filter_map(|text| text.parse().ok())

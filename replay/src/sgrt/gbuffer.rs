@@ -2,8 +2,8 @@
 //! G-buffer in DRAM.
 //!
 //! Tile by tile (paper section III), shading leaves a tile's records in internal SRAM, from which
-//! the reproject and reuse kernels read; only error detection needs other tiles, so position and
-//! numbers of every left pixel go to DRAM once and DMA fetches each row once, for all tiles of the
+//! the reproject and reuse kernels read; only error detection needs other tiles, so what
+//! it reads of every left pixel goes to DRAM once and DMA fetches each row once, for all tiles of the
 //! row band. On the whole screen, every record goes to DRAM and each kernel reads it back.
 
 use super::config::Gbuffer;

@@ -32,6 +32,8 @@ pub struct Rule {
     pub row: Option<f32>,
     /// Rejects a candidate none of whose 4-neighbours is of its object.
     pub object: bool,
+    /// Rejects a candidate on a material with alpha cut-outs, where the next ray may pass through.
+    pub opaque: bool,
     /// Rejects a candidate any of whose 8 neighbours is missing or of another object.
     pub silhouette: bool,
     /// Intersects the right-eye ray with triangles.
@@ -57,7 +59,7 @@ pub const DEFAULT_DEPTH_SHARE: f32 = 0.02;
 /// A rule that cannot be understood.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 #[error(
-    "rule: expected none, or depth[=SHARE], row[=SHARE], object, silhouette, triangle, triangles \
+    "rule: expected none, or depth[=SHARE], row[=SHARE], object, opaque, silhouette, triangle, triangles \
      joined by '+'; found '{0}'"
 )]
 pub struct RuleError(String);
@@ -88,6 +90,7 @@ impl FromStr for Rule {
                 ("depth", _) => rule.depth = Some(share),
                 ("row", _) => rule.row = Some(share),
                 ("object", None) => rule.object = true,
+                ("opaque", None) => rule.opaque = true,
                 ("silhouette", None) => rule.silhouette = true,
                 ("triangle", None) => rule.retest = Retest::Same,
                 ("triangles", None) => rule.retest = Retest::Around,
@@ -104,6 +107,7 @@ impl fmt::Display for Rule {
         parts.extend(self.depth.map(|t| format!("depth={t}")));
         parts.extend(self.row.map(|t| format!("row={t}")));
         parts.extend(self.object.then(|| "object".to_owned()));
+        parts.extend(self.opaque.then(|| "opaque".to_owned()));
         parts.extend(self.silhouette.then(|| "silhouette".to_owned()));
         match self.retest {
             Retest::None => {}
@@ -230,7 +234,12 @@ impl Judge<'_> {
             exact: None,
             tests: 0,
         };
-        if hidden || self.is_suspicious(index, candidate, source.object) {
+        let material = self.frame.tables.materials.get(source.material as usize);
+        let cut_out = !source.is_sky() && material.is_some_and(|m| m.alpha_masked);
+        if hidden
+            || (self.rule.opaque && cut_out)
+            || self.is_suspicious(index, candidate, source.object)
+        {
             decision.class = PixelClass::Bad;
             return decision;
         }

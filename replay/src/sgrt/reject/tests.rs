@@ -24,7 +24,7 @@ fn a_rule_prints_as_it_is_written() {
         "none",
         "depth=0.05+object",
         "row=0.02+silhouette+triangle",
-        "object+triangles",
+        "object+opaque+triangles",
     ] {
         assert_eq!(text.parse::<Rule>().expect(text).to_string(), text);
     }
