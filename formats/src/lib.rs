@@ -7,6 +7,7 @@
 pub mod container;
 pub mod error;
 pub mod footprint;
+pub mod interop;
 pub mod layout;
 pub mod parse;
 pub mod raytrace;

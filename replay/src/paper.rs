@@ -108,22 +108,6 @@ pub fn z2_twin(scene: &str, shadow_maps: bool) -> Option<&'static str> {
     }
 }
 
-/// TMU utilisation (0 to 1) that Table 2 implies for L1 and L2 miss rates (0 to 1).
-///
-/// Fitted to the table's 48 rows: mean error 0.20 points, largest 0.65. `P1` and `P2` are the
-/// probabilities that a thread has any L1 miss and any L2 miss; `n1`, `n2` the footprints of a
-/// thread, `k1`, `k2` the share of its issue slots that a loop wastes.
-#[must_use]
-pub fn closed_form_utilization(l1_miss: f64, l2_miss: f64) -> f64 {
-    const N1: f64 = 17.12;
-    const N2: f64 = 9.64;
-    const K1: f64 = 0.124;
-    const K2: f64 = 0.767;
-    let p1 = 1.0 - (1.0 - l1_miss).powf(N1);
-    let p2 = 1.0 - (1.0 - l1_miss * l2_miss).powf(N2);
-    1.0 / (1.0 + K1 * (p1 - p2) + K2 * p2)
-}
-
 /// One scene of the SGRT paper: section IV and Figure 3.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SgrtRow {
@@ -219,20 +203,6 @@ mod tests {
         assert!((mean(&reductions(OrderKind::Z2Lrta)) - 24.8).abs() < 0.4);
         assert!((mean(&sta) - 27.9).abs() < 0.4);
         assert!((sta.iter().copied().fold(0.0, f64::max) - 47.8).abs() < 0.4);
-    }
-
-    #[test]
-    fn the_closed_form_fits_every_row_of_table_2() {
-        let errors: Vec<f64> = z2_table()
-            .iter()
-            .map(|r| {
-                let u = closed_form_utilization(r.l1_miss_pct / 100.0, r.l2_miss_pct / 100.0);
-                (100.0 * u - r.tmu_util_pct).abs()
-            })
-            .collect();
-        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-        assert!(mean < 0.21, "{mean}");
-        assert!(errors.iter().all(|e| *e <= 0.66), "{errors:?}");
     }
 
     #[test]

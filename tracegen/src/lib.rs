@@ -5,3 +5,4 @@ pub mod cli;
 pub mod raster;
 pub mod rays;
 pub mod scene;
+pub mod verify;

@@ -260,4 +260,4 @@ pub struct Tables {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

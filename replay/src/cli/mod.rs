@@ -1,8 +1,20 @@
 //! The command line, one file a subcommand.
 
 mod config_args;
+pub mod convert;
+pub mod diff;
+pub mod dump;
+mod experiment_args;
+pub mod info;
+mod paper;
+mod report;
 mod reproject;
 mod run;
+mod sweep;
+#[cfg(test)]
+mod testing;
+mod trace_file;
+pub mod validate;
 
 pub use config_args::ConfigArgs;
 
@@ -29,6 +41,22 @@ struct Cli {
 enum Command {
     /// Replay one trace in one tile order through one cache configuration.
     Run(Box<run::Args>),
+    /// Print what a trace holds.
+    Info(info::InfoArgs),
+    /// Check every checksum and invariant of a trace.
+    Validate(validate::ValidateArgs),
+    /// Print decoded quad records as JSON Lines.
+    Dump(dump::DumpArgs),
+    /// Print the first difference between two traces.
+    Diff(diff::DiffArgs),
+    /// Write a trace's accesses for other simulators, or the trace in another encoding.
+    Convert(Box<convert::ConvertArgs>),
+    /// Replay the Z2 paper's experiment: its caches and orders, beside its published figures.
+    Paper(Box<paper::Args>),
+    /// Replay every point of an experiment file; goes on where it stopped.
+    Sweep(sweep::Args),
+    /// Write the experiment as one self-contained page, with JSON and CSV beside it.
+    Report(Box<report::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
 }
@@ -38,6 +66,14 @@ enum Command {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Run(args) => run::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Validate(args) => validate::run(&args),
+        Command::Dump(args) => dump::run(&args),
+        Command::Diff(args) => diff::run(&args),
+        Command::Convert(args) => convert::run(&args),
+        Command::Paper(args) => paper::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Reproject(args) => reproject::run(*args),
     };
     match outcome {

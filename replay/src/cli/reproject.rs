@@ -225,3 +225,97 @@ fn thumbnails(
         plain_flip: small(&plain.flip.picture())?,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sgrt::synthetic::{View, globe, trace, wall};
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        args: ReprojectArgs,
+    }
+
+    fn args(list: &[&str]) -> ReprojectArgs {
+        let words = std::iter::once("reproject").chain(list.iter().copied());
+        Cli::try_parse_from(words).expect("valid arguments").args
+    }
+
+    /// A small trace in a folder of its own.
+    fn trace_file() -> (tempfile::TempDir, String) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.raytrace");
+        let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
+        scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
+        let bytes = trace(&scene, View::default()).to_bytes();
+        std::fs::write(&path, bytes).expect("written");
+        (folder, path.display().to_string())
+    }
+
+    #[test]
+    fn a_trace_file_gives_the_result_of_the_trace_in_memory() {
+        let (_folder, path) = trace_file();
+        let args = args(&[&path]);
+        let entry = analyse(Path::new(&path), &args, &SgrtConfig::default()).expect("analysed");
+        let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
+        scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
+        let source = trace(&scene, View::default());
+        let direct = Analysis::load(&source)
+            .expect("loads")
+            .run(&args.rule, args.reuse, &SgrtConfig::default())
+            .expect("runs");
+        assert_eq!(entry.report.result, direct.outcome);
+        assert!(entry.report.result.reuse_pct > 80.0);
+    }
+
+    #[test]
+    fn picture_and_page_are_written_beside_nothing_else() {
+        let (folder, path) = trace_file();
+        let out = |name: &str| folder.path().join(name).display().to_string();
+        let (png, html) = (out("a.png"), out("a.html"));
+        run(args(&[&path, "--image", &png, "--html", &html, "--json"])).expect("runs");
+        let picture = image::open(&png).expect("a picture").into_rgb8();
+        assert_eq!(picture.dimensions(), (3 * 72 + 2 * 8, 40));
+        assert!(
+            std::fs::read_to_string(&html)
+                .expect("a page")
+                .contains("91.54")
+        );
+        assert_eq!(
+            std::fs::read_dir(folder.path()).expect("a folder").count(),
+            3
+        );
+    }
+
+    #[test]
+    fn a_damaged_trace_is_refused_and_nothing_is_written() {
+        let (folder, path) = trace_file();
+        let bytes = std::fs::read(&path).expect("readable");
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("written");
+        let html = folder.path().join("a.html");
+        let error = run(args(&[&path, "--html", &html.display().to_string()])).unwrap_err();
+        assert!(format!("{error:#}").contains("a.raytrace"), "{error:#}");
+        assert!(!html.exists());
+    }
+
+    #[test]
+    fn one_picture_of_several_files_is_refused() {
+        let error = run(args(&["a", "b", "--image", "c.png"])).unwrap_err();
+        assert_eq!(error.to_string(), "--image: expected one FILE, found 2");
+    }
+
+    #[test]
+    fn parameters_that_cannot_be_used_name_file_and_key() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("p.toml");
+        std::fs::write(&path, "[tni]\nunits = 0\n").expect("written");
+        let error = read_config(Some(&path)).unwrap_err();
+        let text = format!("{error:#}");
+        assert!(
+            text.contains("p.toml") && text.contains("tni.units"),
+            "{text}"
+        );
+    }
+}

@@ -118,7 +118,7 @@ fn percent(rate: f64) -> String {
 }
 
 /// A table without lines whose columns but the first are numbers.
-fn plain(header: &[&str]) -> Table {
+pub(super) fn plain(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header(header);
     for column in table.column_iter_mut().skip(1) {

@@ -11,6 +11,8 @@ pub struct Quad<'a> {
     pub at: TileRef,
     /// Index of its draw.
     pub draw: u32,
+    /// Global number of its primitive.
+    pub primitive: u32,
     /// Its records, one a uv group (and one a shadow cascade).
     pub records: &'a [QuadRecord],
 }
@@ -39,6 +41,7 @@ pub struct Feed {
     next: usize,
     end: usize,
     draw: u32,
+    primitive: u32,
 }
 
 impl Feed {
@@ -95,6 +98,7 @@ impl Feed {
             self.next = run.first as usize;
             self.end = run.first as usize + run.count as usize;
             self.draw = run.draw;
+            self.primitive = run.primitive;
         }
         let left = &self.tiles[self.slot].records[self.next..self.end];
         let position = |r: &QuadRecord| (r.x, r.y);
@@ -104,6 +108,7 @@ impl Feed {
         Some(Quad {
             at: self.at[self.slot]?,
             draw: self.draw,
+            primitive: self.primitive,
             records: &left[..count],
         })
     }

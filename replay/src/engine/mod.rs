@@ -12,6 +12,7 @@ mod testing;
 mod tests;
 mod timed;
 
+pub use feed::{Feed, Quad};
 pub use source::{MemoryTrace, TileSource};
 
 use crate::cache::{self, Cache, Lru, WaysOf};

@@ -3,6 +3,7 @@
 pub mod csv;
 pub mod files;
 pub mod html;
+pub mod picture;
 pub mod plots;
 pub mod sgrt;
 pub mod theme;

@@ -20,6 +20,8 @@ pub const SERIES: [RGBColor; 8] = [
 
 /// Text.
 pub const INK: RGBColor = RGBColor(0x1F, 0x23, 0x28);
+/// The page itself, to lift text off lines.
+pub const PAPER: RGBColor = RGBColor(0xFF, 0xFF, 0xFF);
 /// Secondary text: tick labels, notes.
 pub const MUTED: RGBColor = RGBColor(0x5B, 0x63, 0x6C);
 /// Horizontal grid lines.

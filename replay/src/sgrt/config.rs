@@ -253,7 +253,7 @@ impl SgrtConfig {
             ("cache.l2_bytes", c.l2_bytes, c.l2_ways),
         ] {
             let set = c.line_bytes.saturating_mul(u64::from(ways));
-            if bytes % set != 0 || !(bytes / set).is_power_of_two() {
+            if !bytes.is_multiple_of(set) || !(bytes / set).is_power_of_two() {
                 return Err(ConfigError::Range {
                     key: key.to_owned(),
                     expected: "a power of two of sets (ways x line_bytes each)",

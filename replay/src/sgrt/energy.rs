@@ -8,28 +8,28 @@ use super::work::BatchWork;
 use formats::raytrace::BvhSummary;
 use serde::{Deserialize, Serialize};
 
-/// Energy by component, picojoules.
+/// Energy by component in picojoules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EnergyPj {
     /// Steps, tests and hand-over of the fixed-function units.
-    pub tni: f64,
+    pub tni_pj: f64,
     /// Kernels.
-    pub srp: f64,
+    pub srp_pj: f64,
     /// Node and triangle caches.
-    pub caches: f64,
+    pub caches_pj: f64,
     /// Tile buffers.
-    pub sram: f64,
+    pub sram_pj: f64,
     /// External memory.
-    pub dram: f64,
+    pub dram_pj: f64,
     /// Leakage and clocks over the frame's time.
-    pub static_: f64,
+    pub static_pj: f64,
 }
 
 impl EnergyPj {
     /// All components.
     #[must_use]
     pub fn total(&self) -> f64 {
-        self.tni + self.srp + self.caches + self.sram + self.dram + self.static_
+        self.tni_pj + self.srp_pj + self.caches_pj + self.sram_pj + self.dram_pj + self.static_pj
     }
 }
 
@@ -64,14 +64,14 @@ pub fn energy(activity: &Activity, bvh: &BvhSummary, config: &SgrtConfig) -> Ene
         + work.shaded as f64 * e.shading_dram_bytes
         + activity.frame_buffer_px as f64 * e.frame_buffer_bytes;
     EnergyPj {
-        tni: steps * e.step_pj + tests * e.triangle_test_pj + rays * e.ray_pj,
-        srp: activity.srp.lane_cycles() * e.srp_lane_cycle_pj,
-        caches: read_bytes * e.l1_pj_per_byte
+        tni_pj: steps * e.step_pj + tests * e.triangle_test_pj + rays * e.ray_pj,
+        srp_pj: activity.srp.lane_cycles() * e.srp_lane_cycle_pj,
+        caches_pj: read_bytes * e.l1_pj_per_byte
             + activity.misses.l1 * config.cache.line_bytes as f64 * e.l2_pj_per_byte,
-        sram: activity.gbuffer.on_chip_bytes as f64 * e.sram_pj_per_byte,
-        dram: dram_bytes * e.dram_pj_per_byte,
+        sram_pj: activity.gbuffer.on_chip_bytes as f64 * e.sram_pj_per_byte,
+        dram_pj: dram_bytes * e.dram_pj_per_byte,
         // A milliwatt is a picojoule a nanosecond.
-        static_: activity.time_ns * e.static_mw,
+        static_pj: activity.time_ns * e.static_mw,
     }
 }
 
@@ -104,13 +104,13 @@ mod tests {
         let got = energy(&activity, &bvh(), &config);
         let e = &config.energy;
         assert_eq!(
-            got.tni,
+            got.tni_pj,
             10.0 * e.step_pj + 4.0 * e.triangle_test_pj + 2.0 * e.ray_pj
         );
-        assert_eq!(got.sram, 100.0 * e.sram_pj_per_byte);
+        assert_eq!(got.sram_pj, 100.0 * e.sram_pj_per_byte);
         let bytes = 7.0 + 3.0 * e.shading_dram_bytes + 5.0 * e.frame_buffer_bytes;
-        assert_eq!(got.dram, bytes * e.dram_pj_per_byte);
-        assert_eq!(got.static_, 11.0 * e.static_mw);
-        assert_eq!(got.srp, 0.0);
+        assert_eq!(got.dram_pj, bytes * e.dram_pj_per_byte);
+        assert_eq!(got.static_pj, 11.0 * e.static_mw);
+        assert_eq!(got.srp_pj, 0.0);
     }
 }

@@ -6,7 +6,7 @@
 //! a near one, or one that something hides from the right eye only. Rules reject what looks
 //! suspicious; they combine with `+`.
 
-use super::frame::{Frame, SKY};
+use super::frame::{Frame, SKY, Sample};
 use super::reproject::{Candidate, Reprojection};
 use formats::raytrace::RayTriangle;
 use formats::raytrace::camera::sample_position_px;
@@ -32,7 +32,7 @@ pub struct Rule {
     pub row: Option<f32>,
     /// Rejects a candidate none of whose 4-neighbours is of its object.
     pub object: bool,
-    /// Rejects a candidate on a material with alpha cut-outs, where the next ray may pass through.
+    /// Rejects a hit on a material with alpha cut-outs, where a ray beside it may pass through.
     pub opaque: bool,
     /// Rejects a candidate any of whose 8 neighbours is missing or of another object.
     pub silhouette: bool,
@@ -59,8 +59,8 @@ pub const DEFAULT_DEPTH_SHARE: f32 = 0.02;
 /// A rule that cannot be understood.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 #[error(
-    "rule: expected none, or depth[=SHARE], row[=SHARE], object, opaque, silhouette, triangle, triangles \
-     joined by '+'; found '{0}'"
+    "rule: expected none, or depth[=SHARE], row[=SHARE], object, opaque, silhouette, triangle, \
+     triangles joined by '+'; found '{0}'"
 )]
 pub struct RuleError(String);
 
@@ -249,6 +249,11 @@ impl Judge<'_> {
         decision
     }
 
+    fn has_cut_outs(&self, sample: &Sample) -> bool {
+        let material = self.frame.tables.materials.get(sample.material as usize);
+        !sample.is_sky() && material.is_some_and(|m| m.alpha_masked)
+    }
+
     fn is_suspicious(&self, index: usize, candidate: &Candidate, object: u32) -> bool {
         let rule = self.rule;
         let arrived = |n: &usize| !self.candidates[*n].is_missing();
@@ -310,6 +315,12 @@ impl Judge<'_> {
         }
         decision.tests = tests as u8;
         match nearest {
+            Some((_, source, _))
+                if self.rule.opaque
+                    && self.has_cut_outs(&self.frame.left().samples[source as usize]) =>
+            {
+                decision.class = PixelClass::Bad;
+            }
             Some((t, source, primitive)) => {
                 decision.source = source;
                 decision.primitive = primitive;

@@ -83,6 +83,12 @@ pub struct Outcome {
     pub relative_performance: f64,
     /// Energy over that of tracing both eyes in full.
     pub relative_energy: f64,
+    /// Unit cycles of tracing both eyes in full over those with reprojection: what the ratio would
+    /// be if the units were always the bottleneck.
+    pub tni_relative_performance: f64,
+    /// Traversal steps that are primary rays', of both eyes' in full: reusing a share r of primary
+    /// hits can save at most half of r times this.
+    pub primary_steps_pct: f64,
     /// Cycles of the traversal and intersection units.
     pub tni_cycles: u64,
     /// Cycles of the programmable cores.
@@ -235,6 +241,9 @@ impl Outcome {
             position_over_2px_pct: accuracy.pct(reused.position_over[1]),
             relative_performance: evaluation.relative_performance(),
             relative_energy: evaluation.relative_energy(),
+            tni_relative_performance: reference.tni_cycles / run.tni_cycles,
+            primary_steps_pct: 100.0 * reference.work.by_class[0].steps as f64
+                / reference.work.steps().max(1) as f64,
             tni_cycles: cycles(run.tni_cycles),
             srp_cycles: cycles(run.srp.total()),
             reference_tni_cycles: cycles(reference.tni_cycles),

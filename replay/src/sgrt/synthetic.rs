@@ -3,9 +3,11 @@
 use super::frame::{Frame, RaySource};
 use super::reject::intersect;
 use formats::raytrace::camera::sample_position_px;
+use formats::raytrace::half::round3;
 use formats::raytrace::{
     BvhSummary, EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayMaterial, RayRecord,
-    RayTile, RayTriangle, RaytraceMeta, RaytraceTables, TraversalKind,
+    RayTile, RayTriangle, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
+    encode_ray_tile,
 };
 use formats::textrace::TraceMeta;
 use formats::view::{Eye, FovTangents, Hmd};
@@ -69,6 +71,18 @@ impl RaySource for Synthetic {
     ) -> Result<(), Box<dyn Error + Send + Sync>> {
         *tile = self.tiles[eye as usize][index as usize].clone();
         Ok(())
+    }
+}
+
+impl Synthetic {
+    /// The trace as a file's bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut writer = RaytraceWriter::in_memory().expect("a writer");
+        for tile in self.tiles.iter().flatten() {
+            let encoded = encode_ray_tile(tile, false).expect("a valid tile");
+            writer.tile(&encoded).expect("written");
+        }
+        writer.into_bytes(&self.tables).expect("finished")
     }
 }
 
@@ -154,7 +168,6 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
             samples_per_px: view.samples_per_px,
             has_visits: false,
             sky: [[0.3, 0.5, 0.9]; 2],
-            ambient: [0.1; 3],
         },
         bvh: bvh(),
         materials: vec![material("diffuse", false), material("mirror", true)],
@@ -221,7 +234,7 @@ fn trace_pixel(
         return PixelRecord {
             first_ray,
             ray_count: 1,
-            view_dependent: [0.3 * up, 0.5 * up, 0.9],
+            view_dependent: round3([0.3 * up, 0.5 * up, 0.9]),
             ..PixelRecord::default()
         };
     };
@@ -244,8 +257,8 @@ fn trace_pixel(
             material: placed.material,
             ..Hit::default()
         }),
-        view_independent: [shade(1.0), shade(3.0), placed.object as f32 * 0.1],
-        view_dependent,
+        view_independent: round3([shade(1.0), shade(3.0), placed.object as f32 * 0.1]),
+        view_dependent: round3(view_dependent),
         first_ray,
         ray_count: rays.len() as u32 - first_ray,
     }

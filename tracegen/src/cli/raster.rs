@@ -50,9 +50,7 @@ pub struct RasterArgs {
 /// # Errors
 /// Unreadable input, no driver, or a file that cannot be written.
 pub fn run(args: RasterArgs) -> anyhow::Result<()> {
-    if let Some(threads) = args.threads {
-        limit_threads(threads)?;
-    }
+    prepare_environment(args.threads)?;
     let started = Instant::now();
     let mut setup = args.scene.setup(None, &LoadOptions::ALL)?;
     let cascades = if args.shadows {
@@ -98,8 +96,9 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
             Some(pictures)
         };
         let start = Instant::now();
-        let (pictures, counts) =
+        let (pictures, counts, sorting) =
             job.capture_frame(&mut backend, views, 2 * frame, &tables, &mut writer)?;
+        summary.sorting += sorting;
         summary.captured += start.elapsed();
         summary.counts += counts;
         if let Some(plain) = plain {
@@ -194,6 +193,7 @@ fn lasting_arguments(arguments: impl Iterator<Item = String>) -> Vec<String> {
 struct Summary {
     plain: Duration,
     captured: Duration,
+    sorting: Duration,
     counts: CaptureCounts,
     identical: Option<bool>,
 }
@@ -237,7 +237,8 @@ impl Summary {
             let plain = self.plain.as_secs_f64();
             eprintln!("plain render   {plain:.3} s ({includes})");
             eprintln!(
-                "with capture   {captured:.3} s (the same, and draining, sorting, encoding and writing the trace): {:.2} x plain",
+                "with capture   {captured:.3} s (the same, and draining and {:.3} s of sorting, encoding and writing the trace): {:.2} x plain",
+                self.sorting.as_secs_f64(),
                 captured / plain
             );
             eprintln!(
@@ -266,14 +267,23 @@ fn peak_rss_bytes() -> Option<u64> {
     Some(kib * 1024)
 }
 
-/// Limits llvmpipe's rasteriser threads and rayon's.
-fn limit_threads(threads: u16) -> anyhow::Result<()> {
+/// Sets what Mesa reads from the environment, and limits the threads.
+fn prepare_environment(threads: Option<u16>) -> anyhow::Result<()> {
     // SAFETY: the command has started no thread yet, so nothing reads the environment meanwhile.
-    unsafe { std::env::set_var("LP_NUM_THREADS", threads.to_string()) };
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.into())
-        .build_global()
-        .context("cannot limit the threads")
+    unsafe {
+        // Mesa's device selection asks a display server, in vain and aloud where there is none.
+        std::env::set_var("NODEVICE_SELECT", "1");
+        if let Some(threads) = threads {
+            std::env::set_var("LP_NUM_THREADS", threads.to_string());
+        }
+    }
+    if let Some(threads) = threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.into())
+            .build_global()
+            .context("cannot limit the threads")?;
+    }
+    Ok(())
 }
 
 /// Bytes with an optional binary suffix: `64MiB`, `512KiB`, `1GiB`, `4096`.

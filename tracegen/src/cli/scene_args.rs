@@ -126,7 +126,7 @@ impl CameraArgs {
     pub fn resolve(&self, scene: &Scene) -> Result<Camera, cameras::CameraError> {
         let from_scene = cameras::find(scene, self.camera.as_deref())?;
         let camera = match (self.eye, self.target) {
-            (Some(eye), Some(target)) => self.from_flags(eye, target, from_scene),
+            (Some(eye), Some(target)) => self.posed(eye, target, from_scene),
             _ => from_scene.clone(),
         };
         cameras::validate(&camera)?;
@@ -139,11 +139,11 @@ impl CameraArgs {
             return Ok(());
         };
         let planes = cameras::default_camera(&Scene::default());
-        cameras::validate(&self.from_flags(eye, target, &planes))
+        cameras::validate(&self.posed(eye, target, &planes))
     }
 
     /// Near and far planes come from the scene's own camera: they fit its scale.
-    fn from_flags(&self, eye: Vec3, target: Vec3, planes: &Camera) -> Camera {
+    fn posed(&self, eye: Vec3, target: Vec3, planes: &Camera) -> Camera {
         Camera {
             name: "custom".into(),
             eye,
@@ -296,5 +296,112 @@ fn parse_tangents(text: &str) -> Result<[FovTangents; 2], String> {
     match text.split_once(';') {
         Some((left, right)) => Ok([eye(left)?, eye(right)?]),
         None => eye(text).map(|left| [left, hmd::mirrored(&left)]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Debug, Parser)]
+    struct Cli {
+        #[command(flatten)]
+        args: SceneArgs,
+    }
+
+    fn parse(flags: &str) -> Result<SceneArgs, String> {
+        Cli::try_parse_from(
+            ["test", "scene"]
+                .into_iter()
+                .chain(flags.split_whitespace()),
+        )
+        .map(|cli| cli.args)
+        .map_err(|e| e.to_string())
+    }
+
+    fn hmd_of(flags: &str) -> Hmd {
+        parse(flags).unwrap().hmd.resolve(None, None).unwrap()
+    }
+
+    #[test]
+    fn no_flags_mean_the_default_display() {
+        assert_eq!(hmd_of(""), hmd::preset("symmetric-100").unwrap());
+    }
+
+    #[test]
+    fn another_size_keeps_the_angle_and_square_pixels() {
+        let hmd = hmd_of("--size 1024x1024");
+        assert_eq!(hmd.name, "custom");
+        let fov = hmd.fov[0];
+        assert_eq!(fov.left, fov.up);
+        assert!((fov.left - 50f32.to_radians().tan()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_vertical_field_of_view_decides_the_horizontal_one() {
+        let args = parse("--size 200x100 --vfov 90").unwrap();
+        assert_eq!(args.camera.vfov, Some(VerticalFov::Degrees(90.0)));
+        let fov = args.hmd.resolve(None, Some(90.0)).unwrap().fov[0];
+        assert!(
+            (fov.up - 1.0).abs() < 1e-6 && (fov.right - 2.0).abs() < 1e-6,
+            "{fov:?}"
+        );
+    }
+
+    #[test]
+    fn tangents_of_one_eye_are_mirrored_for_the_other() {
+        let [left, right] = hmd_of("--fov-tangents 1.4,1.2,1,0.9").fov;
+        assert_eq!((left.left, left.right, left.down), (1.4, 1.2, 0.9));
+        assert_eq!(right, hmd::mirrored(&left));
+        let [_, right] = hmd_of("--fov-tangents 1,1,1,1;2,1,1,1").fov;
+        assert_eq!(right.left, 2.0);
+    }
+
+    #[test]
+    fn lengths_are_given_in_millimetres() {
+        assert!((hmd_of("--ipd 70").ipd_m - 0.07).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_cannot_be_parsed_is_told() {
+        for (flags, part) in [
+            ("--size 0x5", "0x5"),
+            ("--size 9000x10", "8192"),
+            ("--size wide", "WIDTHxHEIGHT"),
+            ("--eye 1,2 --target 0,0,0", "3 numbers"),
+            ("--eye 1,2,nan --target 0,0,0", "finite"),
+            ("--eye 1,2,3", "--target"),
+            (
+                "--camera a --eye 1,2,3 --target 0,0,0",
+                "cannot be used with",
+            ),
+            ("--fov-tangents 1,2,3", "4 numbers"),
+            ("--frames 0", "frames"),
+            ("--vfov 60 --hfov 90", "cannot be used with"),
+        ] {
+            let error = parse(flags).expect_err(flags);
+            assert!(error.contains(part), "{flags}: {error}");
+        }
+    }
+
+    #[test]
+    fn angles_and_poses_out_of_range_are_told_before_the_scene_is_read() {
+        for (flags, part) in [
+            ("--hfov 180", "less than 180"),
+            ("--hfov 0", "more than 0"),
+            ("--hfov nan", "NaN"),
+            ("--ipd -1", "0 to 1000 mm"),
+            ("--cant 60", "-45 to 45"),
+            ("--hmd rift", "rift"),
+            ("--eye 1,1,1 --target 1,1,1", "away from the eye"),
+        ] {
+            let args = parse(flags).unwrap();
+            let error = args
+                .setup(None, &LoadOptions::NO_IMAGES)
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(part), "{flags}: {error}");
+        }
     }
 }

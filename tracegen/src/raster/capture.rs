@@ -123,7 +123,7 @@ impl CaptureJob<'_> {
     }
 
     /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the
-    /// number of the left eye's pass.
+    /// number of the left eye's pass. The time is what sorting, encoding and writing took.
     ///
     /// # Errors
     /// Driver errors, a record budget that one tile overflows, and errors of writing.
@@ -134,12 +134,13 @@ impl CaptureJob<'_> {
         first_pass: usize,
         tables: &Tables,
         writer: &mut TextraceWriter<W>,
-    ) -> Result<(Pictures, CaptureCounts), RasterError> {
+    ) -> Result<(Pictures, CaptureCounts, Duration), RasterError> {
         let rules = TileRules::new(tables, self.draws);
         let lighting = self.light_frame(views);
         backend.render_shadows(self.draws, &lighting)?;
         let mut pictures = Pictures::default();
         let mut counts = CaptureCounts::default();
+        let mut sorting = Duration::ZERO;
         let eyes = views.eyes.into_iter().zip(&mut pictures).zip(first_pass..);
         for ((eye, picture), pass) in eyes {
             let mut view = View {
@@ -151,6 +152,7 @@ impl CaptureJob<'_> {
             view.visible = &visible;
             let columns = tables.passes[pass].tiles[0];
             let mut sink = |rect: &TileRect, records: RawRecords<'_>| {
+                let start = Instant::now();
                 let (tiles, of_region) = encode_region(&rules, tables, rect, records)?;
                 counts += of_region;
                 for (number, tile) in tiles.into_iter().enumerate() {
@@ -160,6 +162,7 @@ impl CaptureJob<'_> {
                         .append(pass, index, tile)
                         .map_err(|e| RasterError::Write(e.to_string()))?;
                 }
+                sorting += start.elapsed();
                 Ok(())
             };
             self.parts = regions::capture_view(
@@ -172,7 +175,7 @@ impl CaptureJob<'_> {
             )?;
             *picture = backend.picture()?;
         }
-        Ok((pictures, counts))
+        Ok((pictures, counts, sorting))
     }
 }
 

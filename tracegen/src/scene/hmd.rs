@@ -179,3 +179,46 @@ pub fn disparity_px(hmd: &Hmd, z_m: f32) -> f32 {
     let fov = &hmd.fov[0];
     hmd.eye_size_px[0] as f32 / (fov.left + fov.right) * hmd.ipd_m / z_m
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_is_valid_and_tells_its_source() {
+        for name in PRESETS {
+            let hmd = preset(name).unwrap();
+            assert_eq!(validate(&hmd), Ok(()));
+            assert!(!hmd.source.is_empty());
+        }
+        let error = preset("rift").unwrap_err().to_string();
+        assert!(error.contains("'rift'") && error.contains("dk2"), "{error}");
+    }
+
+    #[test]
+    fn the_default_has_square_pixels() {
+        let hmd = preset("symmetric-100").unwrap();
+        let fov = hmd.fov[0];
+        assert!((fov.left - 1.191_753_6).abs() < 1e-6);
+        let per_pixel = (fov.left + fov.right) / 960.0 - (fov.up + fov.down) / 1080.0;
+        assert!(per_pixel.abs() < 1e-9);
+    }
+
+    #[test]
+    fn figures_out_of_range_are_named() {
+        let good = preset("symmetric-100").unwrap();
+        let mut bad = [good.clone(), good.clone(), good.clone(), good.clone(), good];
+        bad[0].eye_size_px = [0, 1080];
+        bad[1].fov[1].left = f32::NAN;
+        bad[2].fov[0].up = -bad[2].fov[0].down;
+        bad[3].ipd_m = -0.01;
+        bad[4].cant_deg = f32::INFINITY;
+        for (hmd, part) in bad
+            .iter()
+            .zip(["0x1080", "NaN", "up + down", "-10 mm", "inf degrees"])
+        {
+            let error = validate(hmd).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+}

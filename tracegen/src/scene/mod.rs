@@ -10,6 +10,8 @@ pub mod images;
 pub mod load;
 pub mod obj;
 pub mod procedural;
+#[cfg(test)]
+mod real_scenes;
 pub mod textures;
 mod uri;
 

@@ -1,7 +1,8 @@
 //! Grouped bars with optional reference marks (a paper's values) over them.
 
 use super::{
-    Anchor, PlotError, Scale, SeriesStyle, draw, fill, heading, horizontal_grid, stroke, text, wrap,
+    Anchor, LegendEntry, PlotError, Scale, SeriesStyle, Symbol, draw, fill, heading,
+    horizontal_grid, legend, legend_width_px, stroke, text, wrap,
 };
 use crate::report::theme;
 
@@ -75,7 +76,7 @@ impl BarChart {
         let per_group = self.series.len().max(1) as f64;
         let bar_px = self.bar_width_px();
         let gap_px = (bar_px * 0.8).max(14.0);
-        let group_px = bar_px * per_group + gap_px;
+        let group_px = (bar_px * per_group + gap_px).max(self.widest_word_px() + 10.0);
         let plot_width = (group_px * self.groups.len() as f64).max(320.0);
         let group_px = plot_width / self.groups.len().max(1) as f64;
         let label_lines = self
@@ -84,7 +85,7 @@ impl BarChart {
             .map(|g| wrap(&g.label, group_px - 6.0, theme::LABEL_PX).len())
             .max()
             .unwrap_or(1);
-        let legend_width: f64 = self.legend_width_px() + LEFT_PX + RIGHT_PX;
+        let legend_width: f64 = legend_width_px(&self.legend()) + LEFT_PX + RIGHT_PX;
         let heading_width = theme::text_width_px(&self.title, theme::TITLE_PX)
             .max(theme::text_width_px(&self.value_label, theme::LABEL_PX))
             + 16.0;
@@ -119,7 +120,7 @@ impl BarChart {
             (width.ceil() as u32, height.ceil() as u32),
             |area| {
                 heading(area, &self.title, &self.value_label)?;
-                self.legend(area)?;
+                legend(area, (LEFT_PX, 53.0), &self.legend())?;
                 horizontal_grid(
                     area,
                     &scale,
@@ -208,6 +209,15 @@ impl BarChart {
         )
     }
 
+    /// Group names break at spaces, so that neighbours cannot touch when a group has this width.
+    fn widest_word_px(&self) -> f64 {
+        self.groups
+            .iter()
+            .flat_map(|g| wrap(&g.label, 0.0, theme::LABEL_PX))
+            .map(|word| theme::text_width_px(&word, theme::LABEL_PX))
+            .fold(0.0, f64::max)
+    }
+
     /// Wide enough that the numbers over neighbouring bars do not touch.
     fn bar_width_px(&self) -> f64 {
         let Some(decimals) = self.decimals else {
@@ -222,39 +232,18 @@ impl BarChart {
         (widest + 5.0).max(22.0)
     }
 
-    fn legend_entries(&self) -> impl Iterator<Item = (&str, Option<plotters::style::RGBColor>)> {
-        self.series
-            .iter()
-            .map(|s| (s.name.as_str(), Some(s.color)))
-            .chain(self.mark_name.as_deref().map(|name| (name, None)))
-    }
-
-    fn legend_width_px(&self) -> f64 {
-        self.legend_entries()
-            .map(|(name, _)| 34.0 + theme::text_width_px(name, theme::LABEL_PX))
-            .sum()
-    }
-
-    /// Names in a row under the heading: bars have no end to write a name at.
-    fn legend(&self, area: &super::Area) -> Result<(), String> {
-        let mut x = LEFT_PX;
-        let y = 53.0;
-        for (name, color) in self.legend_entries() {
-            match color {
-                Some(color) => fill(area, (x, y - 5.0), (x + 12.0, y + 5.0), color)?,
-                None => stroke(area, &[(x, y), (x + 12.0, y)], theme::INK, theme::LINE_PX)?,
-            }
-            text(
-                area,
-                (x + 17.0, y),
-                name,
-                theme::LABEL_PX,
-                theme::INK,
-                Anchor::Start,
-            )?;
-            x += 34.0 + theme::text_width_px(name, theme::LABEL_PX);
-        }
-        Ok(())
+    fn legend(&self) -> Vec<LegendEntry<'_>> {
+        let series = self.series.iter().map(|s| LegendEntry {
+            name: &s.name,
+            color: s.color,
+            symbol: Symbol::Box,
+        });
+        let mark = self.mark_name.as_deref().map(|name| LegendEntry {
+            name,
+            color: theme::INK,
+            symbol: Symbol::Stroke,
+        });
+        series.chain(mark).collect()
     }
 }
 
@@ -299,6 +288,24 @@ mod tests {
             bad.svg().unwrap_err().to_string(),
             "plot `Crytek`: group `8/128` holds NaN"
         );
+    }
+
+    #[test]
+    fn long_group_names_do_not_touch() {
+        let mut long = chart();
+        long.groups[0].label = "layout.base_align_bytes = 65536".into();
+        let mut second = long.groups[0].clone();
+        second.label = "sampling.helper_lanes = true".into();
+        long.groups.push(second);
+        let svg = long.svg().unwrap();
+        let centre = |word: &str| -> f64 {
+            let end = svg.find(&format!("\n{word}\n")).unwrap();
+            let x = svg[..end].rfind(" x=\"").unwrap() + 4;
+            svg[x..].split('"').next().unwrap().parse().unwrap()
+        };
+        let apart = centre("sampling.helper_lanes =") - centre("layout.base_align_bytes =");
+        let widest = theme::text_width_px("layout.base_align_bytes =", theme::LABEL_PX);
+        assert!(apart >= widest, "{apart} < {widest}");
     }
 
     #[test]

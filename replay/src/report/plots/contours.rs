@@ -1,8 +1,11 @@
 //! A function of two miss rates as contour lines, with measured points over it.
 
-use super::{Anchor, PlotError, Scale, SeriesStyle, draw, heading, horizontal_grid, stroke, text};
+use super::{
+    Anchor, LegendEntry, PlotError, Scale, SeriesStyle, Symbol, dot, draw, heading,
+    horizontal_grid, legend, legend_width_px, stroke, text,
+};
 use crate::report::theme;
-use plotters::prelude::{Circle, Color};
+use plotters::prelude::Color;
 
 /// Points of one series.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,10 +73,11 @@ impl ContourChart<'_> {
             .into_iter()
             .map(|v| (v, theme::tick_label(v, 20.0)))
             .collect();
-        let size = ((right + 26.0) as u32, (bottom + 44.0) as u32);
+        let width = (right + 26.0).max(LEFT_PX + legend_width_px(&self.legend()));
+        let size = (width.ceil() as u32, (bottom + 44.0) as u32);
         draw(&self.title, size, |area| {
             heading(area, &self.title, &self.y_label)?;
-            self.legend(area)?;
+            legend(area, (LEFT_PX, 54.0), &self.legend())?;
             horizontal_grid(area, &y, &ticks, (LEFT_PX, right), Some(0.0))?;
             let mut tick = low.log2().ceil().exp2();
             while tick <= high * 1.0001 {
@@ -107,12 +111,7 @@ impl ContourChart<'_> {
                     series.style.color.filled()
                 };
                 for &(px, py) in &series.points {
-                    let at = (
-                        x.at(px.clamp(low, high)).round() as i32,
-                        y.at(py).round() as i32,
-                    );
-                    area.draw(&Circle::new(at, 4, style))
-                        .map_err(|e| e.to_string())?;
+                    dot(area, (x.at(px.clamp(low, high)), y.at(py)), style)?;
                 }
             }
             Ok(())
@@ -168,27 +167,15 @@ impl ContourChart<'_> {
         Some(0.5 * (low + high))
     }
 
-    fn legend(&self, area: &super::Area) -> Result<(), String> {
-        let mut x = LEFT_PX;
-        for series in &self.series {
-            let style = if series.hollow {
-                series.style.color.stroke_width(1)
-            } else {
-                series.style.color.filled()
-            };
-            area.draw(&Circle::new((x as i32 + 6, 55), 4, style))
-                .map_err(|e| e.to_string())?;
-            text(
-                area,
-                (x + 15.0, 55.0),
-                &series.style.name,
-                theme::LABEL_PX,
-                theme::INK,
-                Anchor::Start,
-            )?;
-            x += 30.0 + theme::text_width_px(&series.style.name, theme::LABEL_PX);
-        }
-        Ok(())
+    fn legend(&self) -> Vec<LegendEntry<'_>> {
+        self.series
+            .iter()
+            .map(|s| LegendEntry {
+                name: &s.style.name,
+                color: s.style.color,
+                symbol: if s.hollow { Symbol::Ring } else { Symbol::Dot },
+            })
+            .collect()
     }
 }
 

@@ -14,10 +14,15 @@ pub struct HBarChart {
     pub series: Vec<SeriesStyle>,
     /// Row names and values, one a series.
     pub rows: Vec<(String, Vec<Option<f64>>)>,
+    /// Decimals of the values written at the bars' ends; `None` writes none.
+    pub decimals: Option<usize>,
 }
 
 const TOP_PX: f64 = 66.0;
 const BAR_PX: f64 = 6.0;
+/// Bars with a number beside them are a line of text high.
+const NUMBERED_BAR_PX: f64 = 12.0;
+const ROW_GAP_PX: f64 = 7.0;
 const PLOT_WIDTH_PX: f64 = 300.0;
 const LONGEST_NAME_CHARS: usize = 34;
 
@@ -45,7 +50,12 @@ impl HBarChart {
             .map(|n| theme::text_width_px(n, theme::TICK_PX))
             .fold(40.0, f64::max);
         let left = 8.0 + name_width + 8.0;
-        let row_px = BAR_PX * self.series.len().max(1) as f64 + 7.0;
+        let bar_px = if self.decimals.is_some() {
+            NUMBERED_BAR_PX
+        } else {
+            BAR_PX
+        };
+        let row_px = bar_px * self.series.len().max(1) as f64 + ROW_GAP_PX;
         let bottom = TOP_PX + row_px * self.rows.len() as f64;
         let largest = self
             .rows
@@ -56,7 +66,7 @@ impl HBarChart {
         let step = theme::nice_step(largest, 5);
         let high = (largest / step).ceil() * step;
         let scale = Scale::linear(0.0, high, left, left + PLOT_WIDTH_PX);
-        let width = (left + PLOT_WIDTH_PX + 22.0)
+        let width = (left + PLOT_WIDTH_PX + if self.decimals.is_some() { 60.0 } else { 22.0 })
             .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0);
         draw(
             &self.title,
@@ -96,7 +106,7 @@ impl HBarChart {
                 }
                 for (r, ((_, values), name)) in self.rows.iter().zip(&names).enumerate() {
                     let top = TOP_PX + row_px * r as f64 + 3.5;
-                    let middle = top + (row_px - 7.0) / 2.0;
+                    let middle = top + (row_px - ROW_GAP_PX) / 2.0;
                     text(
                         area,
                         (left - 8.0, middle),
@@ -107,13 +117,18 @@ impl HBarChart {
                     )?;
                     for (s, (value, style)) in values.iter().zip(&self.series).enumerate() {
                         if let Some(value) = value {
-                            let y = top + BAR_PX * s as f64;
+                            let y = top + bar_px * s as f64;
                             fill(
                                 area,
                                 (left, y),
-                                (scale.at(*value), y + BAR_PX - 1.0),
+                                (scale.at(*value), y + bar_px - 1.0),
                                 style.color,
                             )?;
+                            if let Some(decimals) = self.decimals {
+                                let at = (scale.at(*value) + 4.0, y + bar_px / 2.0);
+                                let label = format!("{value:.decimals$}");
+                                text(area, at, &label, theme::TICK_PX, theme::INK, Anchor::Start)?;
+                            }
                         }
                     }
                 }
@@ -157,6 +172,7 @@ mod tests {
                 ("a.png".into(), vec![Some(3.0)]),
                 ("b.png".into(), vec![None]),
             ],
+            decimals: Some(1),
         };
         assert_eq!(chart.svg().unwrap(), chart.svg().unwrap());
         assert!(chart.svg().unwrap().contains("L1 miss rate, %"));

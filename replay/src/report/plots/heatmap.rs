@@ -33,7 +33,6 @@ pub struct HeatMap {
     pub high: Option<f64>,
 }
 
-const CELL_PX: u32 = 5;
 const TOP_PX: f64 = 66.0;
 const GAP_PX: f64 = 18.0;
 const BAR_PX: f64 = 14.0;
@@ -139,9 +138,7 @@ impl HeatMap {
 
 /// Small grids get larger cells.
 fn cell_px(tiles: [u32; 2]) -> u32 {
-    (300 / tiles[0].max(tiles[1]).max(1))
-        .clamp(1, 24)
-        .max(if tiles[0] <= 80 { CELL_PX } else { 1 })
+    (240 / tiles[0].max(tiles[1]).max(1)).clamp(1, 24)
 }
 
 fn frame(area: &Area, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> Result<(), String> {

@@ -1,8 +1,12 @@
-//! Line and scatter charts; a series' name stands at its last point, moved apart where they meet.
+//! Line and scatter charts. A line's name stands at its last point, moved apart where lines meet;
+//! clouds of points are named in a row under the heading.
 
-use super::{Anchor, PlotError, Scale, SeriesStyle, draw, heading, horizontal_grid, stroke, text};
+use super::{
+    Anchor, LegendEntry, PlotError, Scale, SeriesStyle, Symbol, dot, draw, heading,
+    horizontal_grid, legend, legend_width_px, stroke, text,
+};
 use crate::report::theme;
-use plotters::prelude::{Circle, Color};
+use plotters::prelude::Color;
 
 /// How a series' points are joined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +22,12 @@ pub enum Mark {
     Dots,
     /// Hollow dots only, for published values.
     Rings,
+}
+
+impl Mark {
+    fn is_cloud(self) -> bool {
+        matches!(self, Self::Dots | Self::Rings)
+    }
 }
 
 /// One series.
@@ -81,7 +91,7 @@ pub struct EndLabel {
 }
 
 const LEFT_PX: f64 = 58.0;
-const TOP_PX: f64 = 54.0;
+const TOP_PX: f64 = 72.0;
 const PLOT_PX: (f64, f64) = (430.0, 260.0);
 const LABEL_GAP_PX: f64 = 15.0;
 
@@ -121,10 +131,12 @@ impl LineChart {
         let bottom = TOP_PX + PLOT_PX.1;
         let right = LEFT_PX + PLOT_PX.0;
         let width = (right + 24.0 + label_width + 8.0)
-            .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0);
+            .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0)
+            .max(LEFT_PX + legend_width_px(&self.legend()));
         let height = bottom + 44.0;
         draw(&self.title, (width.ceil() as u32, height as u32), |area| {
             heading(area, &self.title, &self.y.label)?;
+            legend(area, (LEFT_PX, 54.0), &self.legend())?;
             horizontal_grid(area, &layout.y, &layout.y_ticks, (LEFT_PX, right), None)?;
             stroke(area, &[(LEFT_PX, bottom), (right, bottom)], theme::AXIS, 1)?;
             for (value, label) in &layout.x_ticks {
@@ -182,7 +194,7 @@ impl LineChart {
         let named: Vec<(&LineSeries, (f64, f64))> = self
             .series
             .iter()
-            .filter(|s| !s.style.name.is_empty())
+            .filter(|s| !s.style.name.is_empty() && !s.mark.is_cloud())
             .filter_map(|s| {
                 let end = s
                     .points
@@ -203,6 +215,22 @@ impl LineChart {
                 color: series.style.color,
                 x_px: LEFT_PX + PLOT_PX.0 + 22.0,
                 y_px,
+            })
+            .collect()
+    }
+
+    fn legend(&self) -> Vec<LegendEntry<'_>> {
+        self.series
+            .iter()
+            .filter(|s| s.mark.is_cloud() && !s.style.name.is_empty())
+            .map(|s| LegendEntry {
+                name: &s.style.name,
+                color: s.style.color,
+                symbol: if s.mark == Mark::Rings {
+                    Symbol::Ring
+                } else {
+                    Symbol::Dot
+                },
             })
             .collect()
     }
@@ -245,16 +273,12 @@ fn paint(area: &super::Area, series: &LineSeries, layout: &Layout) -> Result<(),
         Mark::ThinLine => stroke(area, &points, series.style.color, 1)?,
         Mark::Dots | Mark::Rings => {}
     }
-    let dot = match series.mark {
+    let symbol = match series.mark {
         Mark::LineAndDots | Mark::Dots => series.style.color.filled(),
         Mark::Rings => series.style.color.stroke_width(theme::LINE_PX),
         Mark::Line | Mark::ThinLine => return Ok(()),
     };
-    for &(x, y) in &points {
-        area.draw(&Circle::new((x.round() as i32, y.round() as i32), 4, dot))
-            .map_err(|e| e.to_string())?;
-    }
-    Ok(())
+    points.iter().try_for_each(|&at| dot(area, at, symbol))
 }
 
 /// The scale of an axis and its ticks.

@@ -13,7 +13,8 @@ use plotters::backend::SVGBackend;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::prelude::{
-    Color, IntoDrawingArea, IntoFont, IntoTextStyle, PathElement, RGBColor, Rectangle,
+    Circle, Color, IntoDrawingArea, IntoFont, IntoTextStyle, PathElement, RGBColor, Rectangle,
+    ShapeStyle,
 };
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -236,6 +237,68 @@ pub(crate) fn heading(area: &Area, title: &str, value_label: &str) -> Result<(),
         theme::MUTED,
         Anchor::Start,
     )
+}
+
+/// One name in a row under a heading.
+pub(crate) struct LegendEntry<'a> {
+    pub name: &'a str,
+    pub color: RGBColor,
+    pub symbol: Symbol,
+}
+
+/// What stands before a name in a legend.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Symbol {
+    Box,
+    Stroke,
+    Dot,
+    Ring,
+}
+
+const LEGEND_SYMBOL_PX: f64 = 17.0;
+const LEGEND_GAP_PX: f64 = 17.0;
+
+/// Width of a legend row.
+pub(crate) fn legend_width_px(entries: &[LegendEntry]) -> f64 {
+    entries
+        .iter()
+        .map(|e| LEGEND_SYMBOL_PX + theme::text_width_px(e.name, theme::LABEL_PX) + LEGEND_GAP_PX)
+        .sum()
+}
+
+/// Writes names in a row: bars and clouds of points have no end to write a name at.
+pub(crate) fn legend(
+    area: &Area,
+    (x, y): (f64, f64),
+    entries: &[LegendEntry],
+) -> Result<(), String> {
+    let mut x = x;
+    for entry in entries {
+        let color = entry.color;
+        match entry.symbol {
+            Symbol::Box => fill(area, (x, y - 5.0), (x + 12.0, y + 5.0), color)?,
+            Symbol::Stroke => stroke(area, &[(x, y), (x + 12.0, y)], color, theme::LINE_PX)?,
+            Symbol::Dot => dot(area, (x + 6.0, y), color.filled())?,
+            Symbol::Ring => dot(area, (x + 6.0, y), color.stroke_width(1))?,
+        }
+        let at = (x + LEGEND_SYMBOL_PX, y);
+        text(
+            area,
+            at,
+            entry.name,
+            theme::LABEL_PX,
+            theme::INK,
+            Anchor::Start,
+        )?;
+        x += LEGEND_SYMBOL_PX + theme::text_width_px(entry.name, theme::LABEL_PX) + LEGEND_GAP_PX;
+    }
+    Ok(())
+}
+
+/// Draws a point of a scatter chart.
+pub(crate) fn dot(area: &Area, (x, y): (f64, f64), style: ShapeStyle) -> Result<(), String> {
+    area.draw(&Circle::new(pixel(x, y), 4, style))
+        .map_err(|e| e.to_string())
 }
 
 /// Breaks a label at spaces, hyphens or slashes into lines no wider than `width_px`.

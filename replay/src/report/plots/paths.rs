@@ -1,8 +1,8 @@
 //! A tile order as its path over both eyes' tiles (the Z2 paper's Figs. 2 and 3).
 
-use super::{Anchor, Area, PlotError, draw, fill, heatmap, stroke, text};
+use super::heatmap::{HeatMap, Panel};
+use super::{Anchor, Area, PlotError, draw, fill, stroke, text};
 use crate::report::theme;
-use plotters::style::RGBColor;
 
 /// A stop of the path: the eye (0 left, 1 right), column and row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +34,8 @@ const TOP_PX: f64 = 62.0;
 const GAP_PX: f64 = 26.0;
 
 impl PathPlot {
-    /// The path as SVG: numbered tiles and a line for small grids; for large ones the tiles are
-    /// coloured from first (dark) to last (bright).
+    /// The path as SVG: a line through numbered tiles. For grids that are too fine to number see
+    /// [`PathPlot::steps`].
     ///
     /// # Errors
     /// A stop outside the grid.
@@ -51,8 +51,8 @@ impl PathPlot {
                 problem: format!("{bad:?} is outside of 2 x {columns}x{rows} tiles"),
             });
         }
-        let cell = (168.0 / f64::from(columns.max(rows).max(1)))
-            .clamp(3.0, 30.0)
+        let cell = (240.0 / f64::from(columns.max(rows).max(1)))
+            .clamp(8.0, 30.0)
             .floor();
         let (w, h) = (cell * f64::from(columns), cell * f64::from(rows));
         let left = |eye: u32| 8.0 + f64::from(eye) * (w + GAP_PX);
@@ -60,12 +60,6 @@ impl PathPlot {
             .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0)
             .max(theme::text_width_px(&self.note, theme::LABEL_PX) + 16.0);
         let size = (width.ceil() as u32, (TOP_PX + h + 10.0) as u32);
-        let centre = |s: &Stop| {
-            (
-                left(s.eye) + cell * (f64::from(s.x) + 0.5),
-                TOP_PX + cell * (f64::from(s.y) + 0.5),
-            )
-        };
         draw(&self.title, size, |area| {
             super::heading(area, &self.title, &self.note)?;
             for (eye, name) in [(0, "left eye"), (1, "right eye")] {
@@ -79,25 +73,47 @@ impl PathPlot {
                     Anchor::Middle,
                 )?;
             }
-            if cell >= 14.0 {
-                self.numbered(area, cell, &left, &centre)
-            } else {
-                self.colored(area, cell, &left)
-            }
+            self.numbered(area, cell, &left)
         })
     }
 
-    fn numbered(
-        &self,
-        area: &Area,
-        cell: f64,
-        left: &impl Fn(u32) -> f64,
-        centre: &impl Fn(&Stop) -> (f64, f64),
-    ) -> Result<(), String> {
+    /// Each tile's step as a heat map, for grids of any size.
+    #[must_use]
+    pub fn steps(&self) -> HeatMap {
         let [columns, rows] = self.tiles;
+        let mut panels = ["left eye", "right eye"].map(|name| Panel {
+            name: name.to_owned(),
+            tiles: self.tiles,
+            values: vec![0.0; columns as usize * rows as usize],
+        });
+        for (step, stop) in self.numbering() {
+            let cell = panels
+                .get_mut(stop.eye as usize)
+                .and_then(|p| p.values.get_mut((stop.y * columns + stop.x) as usize));
+            if let Some(cell) = cell {
+                *cell = step as f64;
+            }
+        }
+        HeatMap {
+            title: self.title.clone(),
+            value_label: format!("step, counted in tiles; {}", self.note),
+            panels: panels.into(),
+            high: None,
+        }
+    }
+
+    fn numbered(&self, area: &Area, cell: f64, left: &impl Fn(u32) -> f64) -> Result<(), String> {
+        let [columns, rows] = self.tiles;
+        let centre = |s: &Stop| {
+            (
+                left(s.eye) + cell * (f64::from(s.x) + 0.5),
+                TOP_PX + cell * (f64::from(s.y) + 0.5),
+            )
+        };
         for eye in 0..2 {
+            let (x0, x1) = (left(eye), left(eye) + cell * f64::from(columns));
             for i in 0..=columns {
-                let x = left(eye) + cell * f64::from(i);
+                let x = x0 + cell * f64::from(i);
                 stroke(
                     area,
                     &[(x, TOP_PX), (x, TOP_PX + cell * f64::from(rows))],
@@ -107,12 +123,7 @@ impl PathPlot {
             }
             for i in 0..=rows {
                 let y = TOP_PX + cell * f64::from(i);
-                stroke(
-                    area,
-                    &[(left(eye), y), (left(eye) + cell * f64::from(columns), y)],
-                    theme::GRID,
-                    1,
-                )?;
+                stroke(area, &[(x0, y), (x1, y)], theme::GRID, 1)?;
             }
         }
         // Within an eye the stops of that eye are joined; a line between the eyes at every other
@@ -122,40 +133,27 @@ impl PathPlot {
                 .stops
                 .iter()
                 .filter(|s| s.eye == eye)
-                .map(|s| {
-                    let (x, y) = centre(s);
-                    (x, y + cell * 0.22)
-                })
+                .map(centre)
                 .collect();
             stroke(
                 area,
                 &points,
-                theme::SERIES[if eye == 0 { 2 } else { 4 }],
+                theme::SERIES[if eye == 0 { 1 } else { 0 }],
                 theme::LINE_PX,
             )?;
         }
         for (step, stop) in self.numbering() {
             let (x, y) = centre(stop);
+            let half = theme::text_width_px(&step.to_string(), theme::TICK_PX) / 2.0 + 1.0;
+            fill(area, (x - half, y - 6.0), (x + half, y + 6.0), theme::PAPER)?;
             text(
                 area,
-                (x, y - cell * 0.18),
+                centre(stop),
                 &step.to_string(),
-                theme::TICK_PX - 1,
+                theme::TICK_PX,
                 theme::INK,
                 Anchor::Middle,
             )?;
-        }
-        Ok(())
-    }
-
-    fn colored(&self, area: &Area, cell: f64, left: &impl Fn(u32) -> f64) -> Result<(), String> {
-        let numbering = self.numbering();
-        let last = numbering.last().map_or(1, |(step, _)| *step).max(2) - 1;
-        for (step, stop) in numbering {
-            let color: RGBColor = heatmap::color((step - 1) as f64 / last as f64);
-            let x = left(stop.eye) + cell * f64::from(stop.x);
-            let y = TOP_PX + cell * f64::from(stop.y);
-            fill(area, (x, y), (x + cell, y + cell), color)?;
         }
         Ok(())
     }
@@ -199,6 +197,13 @@ mod tests {
         let plot = plot();
         let steps: Vec<usize> = plot.numbering().iter().map(|(s, _)| *s).collect();
         assert_eq!(steps, [1, 1, 2, 2]);
+    }
+
+    #[test]
+    fn the_map_of_steps_numbers_every_tile() {
+        let map = plot().steps();
+        assert_eq!(map.panels[0].values, [1.0, 2.0]);
+        assert_eq!(map.panels[1].values, [1.0, 2.0]);
     }
 
     #[test]

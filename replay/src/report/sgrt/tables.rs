@@ -63,9 +63,11 @@ pub fn performance(entries: &[Entry]) -> Table {
         Column::text("reused"),
         Column::number("reuse", "%"),
         Column::number("performance", "ratio"),
+        Column::number("units alone", "ratio"),
         Column::published("paper", "ratio"),
         Column::number("energy", "ratio"),
         Column::published("paper", "ratio"),
+        Column::number("primary steps", "%"),
         Column::number("unit cycles saved", "%"),
         Column::number("of the right eye's", "%"),
         Column::number("core cycles added", "%"),
@@ -77,9 +79,11 @@ pub fn performance(entries: &[Entry]) -> Table {
             reuse_name(report.config.reuse).to_owned(),
             format!("{:.2}", o.reuse_pct),
             format!("{:.2}", o.relative_performance),
+            format!("{:.2}", o.tni_relative_performance),
             or_dash(paper.map(|p| p.relative_performance)),
             format!("{:.2}", o.relative_energy),
             or_dash(paper.map(|p| p.relative_energy)),
+            format!("{:.1}", o.primary_steps_pct),
             format!("{:.1}", o.tni_reduction_pct),
             format!("{:.1}", o.right_tni_reduction_pct),
             format!("{:.1}", o.srp_overhead_pct),
@@ -232,7 +236,15 @@ pub fn energy(entries: &[Entry]) -> Table {
             (rule, &o.energy),
         ] {
             let mut row = vec![scene_name(&entry.report), name];
-            let parts = [e.tni, e.srp, e.caches, e.sram, e.dram, e.static_, e.total()];
+            let parts = [
+                e.tni_pj,
+                e.srp_pj,
+                e.caches_pj,
+                e.sram_pj,
+                e.dram_pj,
+                e.static_pj,
+                e.total(),
+            ];
             row.extend(parts.map(|p| format!("{:.1}", 100.0 * p / whole)));
             table.push(row);
         }
@@ -318,6 +330,8 @@ pub fn csv(entries: &[Entry]) -> String {
         "position_over_1px_pct",
         "position_over_2px_pct",
         "relative_performance",
+        "tni_relative_performance",
+        "primary_steps_pct",
         "paper_relative_performance",
         "relative_energy",
         "paper_relative_energy",
@@ -355,6 +369,8 @@ pub fn csv(entries: &[Entry]) -> String {
                     .value(o.position_over_1px_pct)
                     .value(o.position_over_2px_pct)
                     .value(o.relative_performance)
+                    .value(o.tni_relative_performance)
+                    .value(o.primary_steps_pct)
                     .maybe(paper.map(|p| p.relative_performance))
                     .value(o.relative_energy)
                     .maybe(paper.map(|p| p.relative_energy))

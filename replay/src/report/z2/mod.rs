@@ -2,6 +2,7 @@
 //!
 //! [`model`] turns replay results into rows; tables, plots and the page only print those rows.
 
+pub mod experiment;
 pub mod model;
 pub mod page;
 pub mod plots;

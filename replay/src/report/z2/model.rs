@@ -1,8 +1,9 @@
 //! The rows of the experiment, their averages and their checks, as plain data (`replay.paper/1`).
 
 use crate::config::{OrderKind, RunConfig};
-use crate::paper::{closed_form_utilization, z2_row, z2_table};
+use crate::paper::{z2_row, z2_table};
 use crate::result::{Part, RunResult, TileMap, TraceId};
+use crate::tmu::closed_form as closed_form_utilization;
 use formats::textrace::TraceMeta;
 use serde::{Deserialize, Serialize};
 
@@ -178,8 +179,8 @@ pub struct Detail {
 pub struct PaperReport {
     /// `replay.paper/1`.
     pub schema: String,
-    /// Version of this program.
-    pub version: String,
+    /// Program and version.
+    pub tool: String,
     /// Configuration of the first run; caches and order vary as the rows say.
     pub config: RunConfig,
     /// Traces.
@@ -203,7 +204,7 @@ impl PaperReport {
     pub fn new(traces: Vec<TraceInfo>, base: RunConfig, runs: &[Run], functional: &[Run]) -> Self {
         let mut report = Self {
             schema: PAPER_SCHEMA.to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            tool: concat!("replay ", env!("CARGO_PKG_VERSION")).to_owned(),
             config: base,
             rows: runs
                 .iter()
@@ -355,7 +356,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / count as f64)
 }
 
-/// Means a scene, then over all scenes, for every order but the baseline.
+/// Means a scene, then over all scenes if there are several, for every order but the baseline.
 fn averages(report: &PaperReport) -> Vec<Average> {
     let paper: Vec<(&str, OrderKind, Figures)> = z2_table()
         .iter()
@@ -390,7 +391,8 @@ fn averages(report: &PaperReport) -> Vec<Average> {
         .into_iter()
         .filter(|o| *o != OrderKind::Morton)
         .collect();
-    let scenes = report.traces.iter().map(Some).chain(std::iter::once(None));
+    let overall = (report.traces.len() > 1).then_some(None);
+    let scenes = report.traces.iter().map(Some).chain(overall);
     scenes
         .flat_map(|scene| {
             orders

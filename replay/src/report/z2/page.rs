@@ -1,1 +1,361 @@
-//! Sections.
+//! The experiment as a page.
+
+use super::model::{Detail, PaperReport, TraceInfo};
+use super::plots::{self, TileMeasure};
+use super::tables::{self, order_title};
+use crate::config::{Mode, OrderKind};
+use crate::report::html::{self, Section, figures, folded};
+use crate::report::picture::Picture;
+use crate::report::plots::PlotError;
+use maud::{Markup, html};
+
+/// Textures in the charts and tables by texture.
+const BUSIEST_TEXTURES: usize = 20;
+/// Grid of the example paths, as in the paper's Fig. 3 (32 tiles).
+const EXAMPLE_TILES: [u32; 2] = [8, 4];
+
+/// The whole page. `pictures` are both eyes' images by trace label.
+///
+/// # Errors
+/// A plot that cannot be drawn (a figure that is not finite).
+pub fn page(report: &PaperReport, pictures: &[Picture]) -> Result<String, PlotError> {
+    let mut sections = vec![Section::new("What was run", runs(report))];
+    if !pictures.is_empty() {
+        sections.push(Section::new("Pictures", scenes(pictures)));
+    }
+    sections.push(Section::new(
+        "Miss rates, utilisation and traffic (Table 2)",
+        table_2(report),
+    ));
+    sections.push(Section::new(
+        "Averages",
+        tables::averages(&report.averages).markup(),
+    ));
+    sections.push(Section::new(
+        "External bandwidth (Fig. 5)",
+        bandwidth(report)?,
+    ));
+    sections.push(Section::new("Charts of Table 2", rates(report)?));
+    if report.closed_form.rows > 0 {
+        sections.push(Section::new(
+            "TMU utilisation and the paper's surface",
+            utilisation(report)?,
+        ));
+    }
+    if report.rows.iter().any(|r| r.functional.is_some()) {
+        sections.push(Section::new("Functional against timed mode", modes(report)));
+    }
+    sections.push(Section::new("Bounds and checks", bounds(report)));
+    sections.push(Section::new("Tile orders", orders(report)?));
+    sections.push(Section::new("Heat maps by tile", heat_maps(report)?));
+    sections.push(Section::new("By mip level", levels(report)?));
+    sections.push(Section::new("By texture", textures(report)?));
+    sections.push(Section::new("Configuration", configuration(report)));
+    let lead = html! {
+        p {
+            "Stereo frames replayed through the caches and the texture unit of the Z\u{b2} paper's machine ("
+            (report.config.cores) " cores, " (report.config.line_bytes) "-byte lines) in "
+            (report.orders().len()) " tile orders, with its published figures beside ours. "
+            "The same numbers are in the JSON and CSV files next to this page."
+        }
+        (in_short(report))
+    };
+    Ok(html::page(
+        "Parallax: tile orders for stereo rendering",
+        &lead,
+        &sections,
+    ))
+}
+
+/// The means over everything, in words.
+fn in_short(report: &PaperReport) -> Markup {
+    let Some(last) = report.averages.last() else {
+        return html! {};
+    };
+    let means = report.averages.iter().filter(|a| a.scene == last.scene);
+    html! {
+        ul {
+            @for mean in means {
+                li {
+                    (order_title(mean.order)) " against Morton, mean of " (last.scene) ": external traffic "
+                    strong { (format!("{:+.1} %", -mean.reduction_pct)) }
+                    @if let Some(ratio) = mean.tmu_ratio { ", texture-unit utilisation " strong { "\u{d7}" (format!("{ratio:.3}")) } }
+                    @if let Some(paper) = mean.paper_reduction_pct {
+                        " (paper: " (format!("{:+.1} %", -paper))
+                        @if let Some(ratio) = mean.paper_tmu_ratio { ", \u{d7}" (format!("{ratio:.3}")) }
+                        ")"
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn runs(report: &PaperReport) -> Markup {
+    html! {
+        @for info in &report.traces {
+            h3 { (info.label) }
+            dl {
+                dt { "scene" } dd { (info.trace.scene) ", " (thousands(info.meta.scene_triangles)) " triangles, camera " (info.meta.camera) }
+                @if let Some(twin) = &info.twin { dt { "stands for" } dd { (twin) " of the paper" } }
+                dt { "display" } dd {
+                    (info.meta.hmd.name) ", " (info.meta.hmd.eye_size_px[0]) "\u{d7}" (info.meta.hmd.eye_size_px[1]) " px an eye, "
+                    (fov(info)) ", " (format!("{:.0}", info.meta.hmd.ipd_m * 1000.0)) " mm between the eyes (" (info.meta.hmd.source) ")"
+                }
+                dt { "trace" } dd {
+                    "checksum " (info.trace.checksum) ", " (info.frames) @if info.frames == 1 { " frame" } @else { " frames" } ", "
+                    (thousands(info.quads)) " quads, " (thousands(info.footprints)) " footprints, "
+                    (info.textures) " textures, " (info.tiles[0]) "\u{d7}" (info.tiles[1]) " tiles an eye"
+                }
+                dt { "captured by" } dd { (info.meta.tool) ", " (info.meta.backend) ", " (info.meta.driver) ", seed " (info.meta.seed) }
+                dt { "command" } dd { code { (info.meta.command_line.join(" ")) } }
+            }
+        }
+    }
+}
+
+/// Left and right half-angles of the left eye, and up and down.
+fn fov(info: &TraceInfo) -> String {
+    let degrees = |tangent: f32| f64::from(tangent).atan().to_degrees();
+    let fov = &info.meta.hmd.fov[0];
+    format!(
+        "{:.0}\u{b0} \u{d7} {:.0}\u{b0}",
+        degrees(fov.left) + degrees(fov.right),
+        degrees(fov.up) + degrees(fov.down)
+    )
+}
+
+fn thousands(number: u64) -> String {
+    crate::report::theme::group_thousands(&number.to_string())
+}
+
+fn scenes(pictures: &[Picture]) -> Markup {
+    html! {
+        @for picture in pictures {
+            figure {
+                img src=(picture.data_uri()) alt={ "both eyes of " (picture.label) }
+                    width=(picture.size_px[0]) height=(picture.size_px[1]);
+                figcaption { (picture.label) ", left and right eye" }
+            }
+        }
+    }
+}
+
+fn table_2(report: &PaperReport) -> Markup {
+    html! {
+        (tables::table_2(report).markup())
+        p.note {
+            "L1 miss: footprints (one bilinear fetch of one lane) with any missing line over footprints. "
+            "L2 miss: missing line look-ups over line look-ups. External: L2 line misses times the line size; MB = 10\u{2076} bytes. "
+            "Bound: the traffic of an infinite cache. TMU \u{2212} fit: simulated utilisation minus the closed form of the paper's table at our miss rates. "
+            "The paper's saving is computed from its two miss rates."
+        }
+    }
+}
+
+fn bandwidth(report: &PaperReport) -> Result<Markup, PlotError> {
+    let charts = report
+        .traces
+        .iter()
+        .map(|info| Ok((plots::bandwidth(report, &info.label).svg()?, String::new())))
+        .collect::<Result<Vec<_>, PlotError>>()?;
+    Ok(html! {
+        (figures(&charts))
+        p.note { "The paper's text gives no absolute traffic; a mark is its ratio to Morton times our Morton, for scenes that stand for one of its own." }
+    })
+}
+
+fn rates(report: &PaperReport) -> Result<Markup, PlotError> {
+    let mut body = Vec::new();
+    for info in &report.traces {
+        let charts = plots::rates(report, &info.label)
+            .iter()
+            .map(|chart| Ok((chart.svg()?, String::new())))
+            .collect::<Result<Vec<_>, PlotError>>()?;
+        body.push(figures(&charts));
+    }
+    Ok(html! { @for row in body { (row) } })
+}
+
+fn utilisation(report: &PaperReport) -> Result<Markup, PlotError> {
+    let mut charts = vec![(plots::surface(report)?, String::new())];
+    if let Some(chart) = plots::closed_form(report) {
+        charts.push((chart.svg()?, String::new()));
+    }
+    let d = &report.closed_form;
+    Ok(html! {
+        p {
+            "Mean absolute deviation from the closed form " strong { (format!("{:.2}", d.mean_absolute_points)) " points" }
+            ", largest " (format!("{:.2}", d.largest_points)) " points, over " (d.rows) " rows."
+        }
+        (figures(&charts))
+    })
+}
+
+fn modes(report: &PaperReport) -> Markup {
+    html! {
+        p { "Functional mode knows no latencies: a miss fills at once. The difference shows what timing does to the order in which the cores' accesses meet in the L2." }
+        (tables::modes(&report.rows).markup())
+    }
+}
+
+fn bounds(report: &PaperReport) -> Markup {
+    html! {
+        (tables::bounds(report).markup())
+        h3 { "Conservation" }
+        p { "Every order replays the same multiset of accesses, by an order-independent hash:" }
+        ul {
+            @for c in &report.conservation {
+                li {
+                    (c.scene) ": "
+                    @if c.differing.is_empty() { (c.runs) " runs agree (" code { (c.access_hash) } ")" }
+                    @else { strong { "differs in " (c.differing.join(", ")) } }
+                }
+            }
+        }
+    }
+}
+
+fn orders(report: &PaperReport) -> Result<Markup, PlotError> {
+    let grid = report.traces.first().map_or(EXAMPLE_TILES, |t| t.tiles);
+    let (mut examples, mut maps) = (Vec::new(), Vec::new());
+    for order in report.orders() {
+        let seed = report.config.seed;
+        examples.push((
+            plots::path(order, seed, EXAMPLE_TILES).svg()?,
+            String::new(),
+        ));
+        maps.push((plots::path(order, seed, grid).steps().svg()?, String::new()));
+    }
+    Ok(html! {
+        p { "On 32 tiles an eye, as in the paper's Fig. 3; the numbers are steps." }
+        (figures(&examples))
+        p { "On the grid of the traces, " (grid[0]) "\u{d7}" (grid[1]) " tiles an eye:" }
+        (figures(&maps))
+    })
+}
+
+fn of_scene<'a>(report: &'a PaperReport, info: &TraceInfo) -> Vec<&'a Detail> {
+    report
+        .details
+        .iter()
+        .filter(|d| d.scene == info.label)
+        .collect()
+}
+
+fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
+    let mut body = Vec::new();
+    for info in &report.traces {
+        let details = of_scene(report, info);
+        let mut charts = Vec::new();
+        for (measure, depends_on_order) in TileMeasure::ALL {
+            let mut maps: Vec<_> = details
+                .iter()
+                .filter(|d| {
+                    d.order == OrderKind::Morton
+                        || (depends_on_order && d.order == OrderKind::Z2Sta)
+                })
+                .filter_map(|d| plots::heat_map(info, d, measure))
+                .collect();
+            // Orders are compared on one scale.
+            let high = maps.iter().map(|m| m.largest()).fold(0.0, f64::max);
+            for map in &mut maps {
+                map.high = Some(high);
+                charts.push((map.svg()?, String::new()));
+            }
+        }
+        if let (Some(first), false) = (details.first(), charts.is_empty()) {
+            let caches = tables::caches_title((first.l1_kib, first.l2_kib));
+            body.push(html! { h3 { (info.label) ", L1/L2 " (caches) " KiB" } (figures(&charts)) });
+        }
+    }
+    Ok(html! { @for scene in body { (scene) } })
+}
+
+fn levels(report: &PaperReport) -> Result<Markup, PlotError> {
+    let mut body = Vec::new();
+    for info in &report.traces {
+        let details = of_scene(report, info);
+        let charts = plots::by_level(&details)
+            .iter()
+            .map(|c| Ok((c.svg()?, String::new())))
+            .collect::<Result<Vec<_>, PlotError>>()?;
+        let table = tables::parts(&details, "mip level", |d| &d.by_level, usize::MAX);
+        body.push(html! { h3 { (info.label) } (figures(&charts)) details { summary { "table" } (table.markup()) } });
+    }
+    Ok(html! { @for scene in body { (scene) } })
+}
+
+fn textures(report: &PaperReport) -> Result<Markup, PlotError> {
+    let mut body = Vec::new();
+    for info in &report.traces {
+        let details: Vec<&Detail> = of_scene(report, info);
+        let charts = plots::by_texture(&details, BUSIEST_TEXTURES)
+            .iter()
+            .map(|c| Ok((c.svg()?, String::new())))
+            .collect::<Result<Vec<_>, PlotError>>()?;
+        let table = tables::parts(&details, "texture", |d| &d.by_texture, BUSIEST_TEXTURES);
+        let all = details.first().map_or(0, |d| d.by_texture.len());
+        body.push(html! {
+            h3 { (info.label) }
+            @if all > BUSIEST_TEXTURES { p.note { "The " (BUSIEST_TEXTURES) " of " (all) " textures with the most external traffic; all are in the JSON." } }
+            (figures(&charts)) details { summary { "table" } (table.markup()) }
+        });
+    }
+    Ok(html! { @for scene in body { (scene) } })
+}
+
+fn configuration(report: &PaperReport) -> Markup {
+    let text = toml::to_string(&report.config).unwrap_or_default();
+    let orders: Vec<&str> = report.orders().into_iter().map(order_title).collect();
+    let caches: Vec<String> = report
+        .caches_kib()
+        .into_iter()
+        .map(tables::caches_title)
+        .collect();
+    let mode = match report.config.mode {
+        Mode::Timed => "timed",
+        Mode::Functional => "functional",
+    };
+    html! {
+        p {
+            "Mode " (mode) "; varied: orders " (orders.join(", ")) "; L1/L2 " (caches.join(", ")) " KiB. "
+            "Everything else as below. Written by " (report.tool) "."
+        }
+        (folded("full configuration (TOML)", &text))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::report;
+    use super::*;
+
+    #[test]
+    fn the_page_holds_every_part_and_is_the_same_every_time() {
+        let report = report();
+        let text = page(&report, &[]).unwrap();
+        assert_eq!(text, page(&report, &[]).unwrap());
+        for part in [
+            "Table 2",
+            "Fig. 5",
+            "paper's surface",
+            "Functional against timed",
+            "Bounds and checks",
+            "Tile orders",
+            "Heat maps by tile",
+            "By texture",
+            "By mip level",
+            "line_bytes = 16",
+            "crytek-sponza",
+            "llvmpipe",
+        ] {
+            assert!(text.contains(part), "{part}");
+        }
+        assert!(
+            !text.contains("http://")
+                || text.matches("http://").count()
+                    == text.matches("http://www.w3.org/2000/svg").count()
+        );
+    }
+}

@@ -4,7 +4,7 @@ use super::model::{Detail, PaperReport, Row, TraceInfo};
 use super::tables::{busiest, caches_title, l1_miss_pct, l2_miss_pct, order_title};
 use crate::config::OrderKind;
 use crate::order::{View, WorkItem, by_kind};
-use crate::paper::{closed_form_utilization, z2_table};
+use crate::paper::z2_table;
 use crate::report::plots::bars::{BarChart, BarGroup};
 use crate::report::plots::contours::{ContourChart, PointSeries};
 use crate::report::plots::hbars::HBarChart;
@@ -14,6 +14,7 @@ use crate::report::plots::paths::{PathPlot, Stop};
 use crate::report::plots::{PlotError, SeriesStyle};
 use crate::report::theme;
 use crate::result::{Part, TileMap};
+use crate::tmu::closed_form as closed_form_utilization;
 
 fn style(order: OrderKind) -> SeriesStyle {
     SeriesStyle {
@@ -273,6 +274,7 @@ pub fn by_texture(details: &[&Detail], most: usize) -> Vec<HBarChart> {
         return Vec::new();
     };
     let chart = |title: &str, value_label: &str, value: &dyn Fn(&Part) -> Option<f64>| HBarChart {
+        decimals: None,
         title: format!("{}: {title}", first.scene),
         value_label: value_label.to_owned(),
         series: details.iter().map(|d| style(d.order)).collect(),

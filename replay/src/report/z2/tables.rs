@@ -45,14 +45,14 @@ pub fn table_2(report: &PaperReport) -> Table {
         Column::number("TMU", "%"),
         Column::number("TMU", "\u{d7} Morton"),
         Column::number("external", "MB/frame"),
-        Column::number("saved", "% of Morton"),
+        Column::number("saved", "%"),
         Column::number("bound", "MB/frame"),
         Column::number("TMU \u{2212} fit", "points"),
         Column::published("paper L1", "%"),
         Column::published("paper L2", "%"),
         Column::published("paper TMU", "%"),
         Column::published("paper TMU", "\u{d7} Morton"),
-        Column::published("paper saved", "% of Morton"),
+        Column::published("paper saved", "%"),
     ]);
     let mut group = None;
     for row in &report.rows {
@@ -90,9 +90,9 @@ pub fn averages(averages: &[Average]) -> Table {
     let mut table = Table::new(vec![
         Column::text("mean over cache sizes"),
         Column::text("order"),
-        Column::number("saved", "% of Morton"),
+        Column::number("saved", "%"),
         Column::number("TMU", "\u{d7} Morton"),
-        Column::published("paper saved", "% of Morton"),
+        Column::published("paper saved", "%"),
         Column::published("paper TMU", "\u{d7} Morton"),
     ]);
     let mut scene = None;
@@ -147,8 +147,46 @@ pub fn modes(rows: &[Row]) -> Table {
             number(Some(functional.l2_miss_pct), 2),
             number(Some(row.external_mb_per_frame), 2),
             number(Some(functional.external_mb_per_frame), 2),
-            number(Some(functional.external_difference_pct), 1),
+            number(Some(functional.external_difference_pct), 2),
         ]);
+    }
+    table
+}
+
+/// External traffic over the infinite cache's, for each order side by side.
+#[must_use]
+pub fn bounds(report: &PaperReport) -> Table {
+    let orders = report.orders();
+    let mut columns = vec![
+        Column::text("scene"),
+        Column::number("L1/L2", "KiB"),
+        Column::number("bound", "MB/frame"),
+    ];
+    columns.extend(
+        orders
+            .iter()
+            .map(|o| Column::number(order_title(*o), "\u{d7} bound")),
+    );
+    let mut table = Table::new(columns);
+    for info in &report.traces {
+        table.begin_group();
+        for caches in report.caches_kib() {
+            let rows: Vec<Option<&Row>> = orders
+                .iter()
+                .map(|o| report.row(&info.label, caches, *o))
+                .collect();
+            let Some(bound) = rows.iter().flatten().next().map(|r| r.bound_mb_per_frame) else {
+                continue;
+            };
+            let mut cells = vec![
+                info.label.clone(),
+                caches_title(caches),
+                number(Some(bound), 2),
+            ];
+            let over = |r: &Row| (bound > 0.0).then(|| r.external_mb_per_frame / bound);
+            cells.extend(rows.iter().map(|r| number(r.and_then(over), 2)));
+            table.push(cells);
+        }
     }
     table
 }

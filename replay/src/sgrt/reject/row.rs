@@ -24,7 +24,7 @@ pub fn spans(frame: &Frame, arrived: &Reprojection) -> Vec<f32> {
         let b = &arrived.projected[next];
         let (near, far) = (a.depth.min(b.depth), a.depth.max(b.depth));
         let row = a.at_px[1];
-        if far > near * (1.0 + SAME_SURFACE_SHARE) || !(row >= 0.0) {
+        if far > near * (1.0 + SAME_SURFACE_SHARE) || row.is_nan() || row < 0.0 {
             continue;
         }
         let row = row as usize;

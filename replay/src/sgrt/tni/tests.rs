@@ -102,10 +102,10 @@ fn twin(rays: &[TwinRay], config: &SgrtConfig) -> (u64, BatchWork, Misses) {
             } else if !slot.test_next && slot.done < slot.ray.steps && trv > 0 {
                 trv -= 1;
                 slot.done += 1;
-                slot.test_next = slot.done % slot.ray.steps_per_test == 0;
+                slot.test_next = slot.done.is_multiple_of(slot.ray.steps_per_test);
                 slot.ready = cycle + u64::from(tni.trv_depth_cycles);
                 work.by_class[0].steps += 1;
-                if slot.done % slot.ray.miss_every == 0 {
+                if slot.done.is_multiple_of(slot.ray.miss_every) {
                     slot.ready += l2;
                     misses.l1 += 1.0;
                 }
@@ -120,6 +120,7 @@ fn twin(rays: &[TwinRay], config: &SgrtConfig) -> (u64, BatchWork, Misses) {
 fn the_throughput_model_stays_close_to_a_cycle_by_cycle_unit() {
     let mut config = SgrtConfig::default();
     config.tni.units = 1;
+    config.tni.trv_pipelines = 4;
     let rays = |n: u32, steps_per_test, miss_every| -> Vec<TwinRay> {
         let ray = |i: u32| TwinRay {
             steps: 12 + i * 7 % 33,

@@ -1,5 +1,7 @@
 //! Capture through lavapipe, Mesa's Vulkan driver on llvmpipe.
 
+#[cfg(test)]
+mod counter;
 mod device;
 mod pipelines;
 mod targets;

@@ -10,6 +10,19 @@ pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrg
 /// Format of depth and shadow maps.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
+#[cfg(test)]
+const ADDITIVE: wgpu::BlendState = {
+    let add = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::BlendState {
+        color: add,
+        alpha: add,
+    }
+};
+
 /// What a pipeline does with a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
@@ -25,6 +38,12 @@ pub enum Role {
     Shadow,
     /// Depth of an alpha-masked shadow caster.
     ShadowMasked,
+    /// Fragments of an opaque draw, added up.
+    #[cfg(test)]
+    Count,
+    /// Fragments of a blended draw, added up.
+    #[cfg(test)]
+    CountBlended,
 }
 
 /// What distinguishes pipelines.
@@ -151,10 +170,24 @@ impl Pipelines {
             Role::MaskedRecord => Some("fragment_masked_record"),
             Role::Shadow => None,
             Role::ShadowMasked => Some("fragment_shadow"),
+            #[cfg(test)]
+            Role::Count | Role::CountBlended => Some("fragment_count"),
+        };
+        let (format, blend) = match key.role {
+            Role::Blended => (COLOR_FORMAT, Some(wgpu::BlendState::ALPHA_BLENDING)),
+            #[cfg(test)]
+            Role::Count | Role::CountBlended => (wgpu::TextureFormat::R16Float, Some(ADDITIVE)),
+            _ => (COLOR_FORMAT, None),
+        };
+        let read_only = match key.role {
+            Role::Blended | Role::MaskedRecord => true,
+            #[cfg(test)]
+            Role::CountBlended => true,
+            _ => false,
         };
         let color = [Some(wgpu::ColorTargetState {
-            format: COLOR_FORMAT,
-            blend: (key.role == Role::Blended).then_some(wgpu::BlendState::ALPHA_BLENDING),
+            format,
+            blend,
             write_mask: if key.role == Role::MaskedRecord {
                 wgpu::ColorWrites::empty()
             } else {
@@ -187,10 +220,7 @@ impl Pipelines {
                 },
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: DEPTH_FORMAT,
-                    depth_write_enabled: Some(!matches!(
-                        key.role,
-                        Role::Blended | Role::MaskedRecord
-                    )),
+                    depth_write_enabled: Some(!read_only),
                     depth_compare: Some(wgpu::CompareFunction::Less),
                     stencil: wgpu::StencilState::default(),
                     bias: if shadow {

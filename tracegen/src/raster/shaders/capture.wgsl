@@ -499,6 +499,12 @@ fn fragment_background(in: Background) -> @location(0) vec4<f32> {
     return vec4(tone_map(0.75 * radiance), 1.0);
 }
 
+// Fragments per pixel by additive blending (a check of the records).
+@fragment @early_depth_test(force)
+fn fragment_count() -> @location(0) vec4<f32> {
+    return vec4(1.0);
+}
+
 // Alpha-masked casters.
 @fragment
 fn fragment_shadow(in: Fragment) {

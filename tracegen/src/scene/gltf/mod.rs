@@ -97,6 +97,25 @@ fn parse(origin: &Origin, bytes: &[u8]) -> Result<(gltf::Document, Option<Vec<u8
 }
 
 fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
+    // The crate's own check of positions looks these accessors up before checking the index.
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            let accessors = primitive.attributes.values();
+            if let Some(bad) = accessors
+                .map(accessors::at)
+                .find(|&a| a >= root.accessors.len())
+            {
+                return Err(origin.invalid(
+                    format!("meshes[{m}].primitives[{p}].attributes"),
+                    format!(
+                        "one of {} accessors: an index inside its table",
+                        root.accessors.len()
+                    ),
+                    bad.to_string(),
+                ));
+            }
+        }
+    }
     let mut first: Option<(String, Fault)> = None;
     root.validate(root, JsonPath::new, &mut |path, fault| {
         let path = path().to_string();

@@ -277,3 +277,6 @@ fn request(path: &str, usage: Usage, origin: &Origin, material: &str) -> Request
         place: format!("{}: material '{material}'", origin.file.display()),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -197,3 +197,6 @@ pub fn frame_views(
         })
         .collect())
 }
+
+#[cfg(test)]
+mod tests;

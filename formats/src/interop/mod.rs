@@ -1,0 +1,154 @@
+//! Plain texel accesses for other simulators: Dinero's din, CSV, JSON Lines.
+//!
+//! What comes out for a record is what replay counts for it, in the order of
+//! [`crate::footprint`]. The order of tiles and primitives is the caller's.
+
+mod csv;
+mod din;
+mod jsonl;
+
+pub use csv::CsvWriter;
+pub use din::{DinAccess, DinWriter, read_din};
+pub use jsonl::{JsonlWriter, record_to_json};
+
+use crate::footprint::{SamplingOptions, record_footprints};
+use crate::layout::Layout;
+use crate::textrace::{QuadRecord, Tables};
+use serde::{Deserialize, Serialize};
+use std::io;
+
+/// What counts as one access.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Granularity {
+    /// Every distinct texel of a footprint, at the address of its block.
+    Texel,
+    /// Every distinct cache line of a footprint, at its first byte: what an L1 looks up.
+    #[default]
+    Line,
+}
+
+/// Where a record comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// Index of the pass.
+    pub pass: u32,
+    /// Tile of the pass.
+    pub tile: u32,
+    /// Index of the draw.
+    pub draw: u32,
+    /// Global primitive number.
+    pub primitive: u32,
+}
+
+/// One read of texture memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Access {
+    /// Byte address.
+    pub address: u64,
+    /// Index of the pass.
+    pub pass: u32,
+    /// Tile of the pass.
+    pub tile: u32,
+    /// Index of the draw.
+    pub draw: u32,
+    /// Global primitive number.
+    pub primitive: u32,
+    /// Column of the pixel in its tile.
+    pub pixel_x: u8,
+    /// Row of the pixel in its tile.
+    pub pixel_y: u8,
+    /// Index into the texture table.
+    pub texture: u32,
+    /// Array layer.
+    pub layer: u16,
+    /// Mip level.
+    pub level: u8,
+    /// Texel column; with line granularity that of the first texel of the line.
+    pub x: u32,
+    /// Texel row.
+    pub y: u32,
+}
+
+/// Turns records into accesses.
+#[derive(Clone, Copy, Debug)]
+pub struct Expander<'a> {
+    /// Tables of the trace.
+    pub tables: &'a Tables,
+    /// Where texels lie.
+    pub layout: &'a Layout,
+    /// Filter and level of detail.
+    pub sampling: SamplingOptions,
+    /// Texels or lines.
+    pub granularity: Granularity,
+    /// Line size, a power of two.
+    pub line_bytes: u32,
+}
+
+impl Expander<'_> {
+    /// Calls `visit` for each access of a record. Stops at the first error.
+    ///
+    /// # Errors
+    /// Those of `visit`.
+    pub fn expand(
+        &self,
+        origin: Origin,
+        record: &QuadRecord,
+        mut visit: impl FnMut(&Access) -> io::Result<()>,
+    ) -> io::Result<()> {
+        let mut outcome = Ok(());
+        let sampling = &self.sampling;
+        record_footprints(
+            self.tables,
+            origin.draw,
+            record,
+            sampling,
+            |sample, footprint| {
+                let mut lines = [u64::MAX; 4];
+                for (index, texel) in footprint.texels().enumerate() {
+                    let (layer, level) = (footprint.layer, footprint.level);
+                    let at = self
+                        .layout
+                        .address(sample.texture, layer.into(), level.into(), texel);
+                    let Some(mut address) = at.filter(|_| outcome.is_ok()) else {
+                        return;
+                    };
+                    if self.granularity == Granularity::Line {
+                        address -= address % u64::from(self.line_bytes.max(1));
+                        if lines.contains(&address) {
+                            continue;
+                        }
+                        lines[index] = address;
+                    }
+                    outcome = visit(&Access {
+                        address,
+                        pass: origin.pass,
+                        tile: origin.tile,
+                        draw: origin.draw,
+                        primitive: origin.primitive,
+                        pixel_x: record.x * 2 + footprint.lane % 2,
+                        pixel_y: record.y * 2 + footprint.lane / 2,
+                        texture: sample.texture,
+                        layer,
+                        level,
+                        x: texel[0],
+                        y: texel[1],
+                    });
+                }
+            },
+        );
+        outcome
+    }
+}
+
+/// Something that accesses are written to.
+pub trait AccessSink {
+    /// Writes one access.
+    ///
+    /// # Errors
+    /// Those of the writer below.
+    fn write(&mut self, access: &Access) -> io::Result<()>;
+}
+
+#[cfg(test)]
+mod tests;

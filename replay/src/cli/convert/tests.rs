@@ -1,0 +1,119 @@
+use super::*;
+use crate::cli::testing::{file_of, lines};
+use crate::config::{Mode, OrderKind};
+use crate::engine::synthetic::Synthetic;
+use crate::engine::{MemoryTrace, replay};
+use clap::Parser;
+use formats::interop::read_din;
+use std::collections::HashSet;
+
+#[derive(Parser)]
+struct Line {
+    #[command(flatten)]
+    args: ConvertArgs,
+}
+
+fn parse(arguments: &[&str]) -> ConvertArgs {
+    let fixed = ["convert", "x.textrace"];
+    Line::try_parse_from(fixed.iter().chain(arguments))
+        .unwrap()
+        .args
+}
+
+fn small() -> MemoryTrace {
+    Synthetic {
+        size_px: [72, 56],
+        layers: 2,
+        ..Synthetic::default()
+    }
+    .generate()
+}
+
+fn din(trace: &Textrace, config: &RunConfig, granularity: &str) -> Vec<u64> {
+    let args = parse(&["--to", "din", "--granularity", granularity]);
+    let mut text = Vec::new();
+    write_accesses(trace, config, &args, &mut text).unwrap();
+    read_din(text.as_slice())
+        .map(|access| access.unwrap().address)
+        .collect()
+}
+
+#[test]
+fn din_holds_the_look_ups_that_run_counts() {
+    let memory = small();
+    let file = file_of(&memory);
+    let trace = Textrace::open(file.path()).unwrap();
+    for order in [OrderKind::Morton, OrderKind::Z2Sta, OrderKind::Z2StaMerge] {
+        for line_bytes in [16, 64] {
+            let config = RunConfig {
+                mode: Mode::Functional,
+                order,
+                line_bytes,
+                ..RunConfig::default()
+            };
+            let result = replay(&trace, &config).unwrap();
+            let addresses = din(&trace, &config, "line");
+            assert_eq!(addresses.len() as u64, result.l1.counters.line_lookups);
+            let distinct: HashSet<u64> = addresses.iter().copied().collect();
+            assert_eq!(distinct.len() as u64, result.unique_lines);
+            let line = |address: u64| address - address % u64::from(line_bytes);
+            let of_texels: HashSet<u64> = din(&trace, &config, "texel")
+                .into_iter()
+                .map(line)
+                .collect();
+            assert_eq!(of_texels, distinct);
+        }
+    }
+}
+
+#[test]
+fn every_order_writes_the_same_accesses() {
+    let file = file_of(&small());
+    let trace = Textrace::open(file.path()).unwrap();
+    let sorted = |order| {
+        let config = RunConfig {
+            order,
+            ..RunConfig::default()
+        };
+        let mut addresses = din(&trace, &config, "line");
+        addresses.sort_unstable();
+        addresses
+    };
+    let reference = sorted(OrderKind::Scanline);
+    assert!(!reference.is_empty());
+    for order in OrderKind::ALL {
+        assert!(sorted(order) == reference, "{}", order.name());
+    }
+}
+
+#[test]
+fn csv_and_json_lines_have_a_line_an_access() {
+    let file = file_of(&small());
+    let trace = Textrace::open(file.path()).unwrap();
+    let config = RunConfig::default();
+    let accesses = din(&trace, &config, "line").len();
+    for (target, header) in [("csv", 1), ("jsonl", 0)] {
+        let mut text = Vec::new();
+        write_accesses(&trace, &config, &parse(&["--to", target]), &mut text).unwrap();
+        assert_eq!(lines(&text).len(), accesses + header, "{target}");
+    }
+}
+
+#[test]
+fn encoding_back_and_forth_restores_the_file() {
+    let file = file_of(&small());
+    let folder = tempfile::tempdir().unwrap();
+    let convert = |from: &std::path::Path, name: &str, encoding: &str| {
+        let to = folder.path().join(name);
+        let output = to.display().to_string();
+        let mut args = parse(&["--to", "textrace", "--encoding", encoding, "-o", &output]);
+        args.trace = from.to_owned();
+        run(&args).unwrap();
+        to
+    };
+    let raw = convert(file.path(), "raw", "raw");
+    let delta = convert(&raw, "delta", "delta");
+    let bytes = |path: &std::path::Path| std::fs::read(path).unwrap();
+    assert!(bytes(&raw).len() > bytes(&delta).len());
+    assert_eq!(bytes(&delta), bytes(file.path()));
+}

@@ -1,0 +1,90 @@
+//! `replay paper`: the Z2 paper's experiment as a table.
+
+use super::experiment_args::{ExperimentArgs, check_conservation, write_page};
+use crate::report::files::write_atomically;
+use crate::report::z2::model::PaperReport;
+use crate::report::z2::tables;
+use anyhow::Result;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `replay paper`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  replay paper crytek.textrace
+  replay paper *.textrace --orders all --csv table.csv
+  replay paper mine.textrace --as crytek-sponza --html out/report.html
+  replay paper a.textrace --block-order morton --json")]
+pub struct Args {
+    #[command(flatten)]
+    experiment: ExperimentArgs,
+    /// Also replay in functional mode and show the difference
+    #[arg(long)]
+    functional: bool,
+    /// Print one JSON object (schema replay.paper/1)
+    #[arg(long)]
+    json: bool,
+    /// Also write the rows as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Also write the report page, with JSON and CSV beside it
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+}
+
+/// Runs the subcommand; exit code 1 when the orders replayed different accesses.
+///
+/// # Errors
+/// Wrong arguments, an unreadable trace, an output that cannot be written.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let report = args
+        .experiment
+        .run(args.functional || args.html.is_some(), args.html.is_some())?;
+    if let Some(path) = &args.csv {
+        write_atomically(path, tables::csv(&report).as_bytes())?;
+    }
+    if let Some(path) = &args.html {
+        write_page(&report, &args.experiment.pictures(&report)?, path)?;
+    }
+    super::print(&if args.json {
+        serde_json::to_string(&report)?
+    } else {
+        text(&report)
+    })?;
+    if let Err(problem) = check_conservation(&report) {
+        anstream::eprintln!("error: {problem}");
+        return Ok(ExitCode::FAILURE);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The tables for a terminal.
+#[must_use]
+pub fn text(report: &PaperReport) -> String {
+    let mut text = tables::table_2(report).text();
+    let _ = write!(text, "\n{}", tables::averages(&report.averages).text());
+    if report.rows.iter().any(|r| r.functional.is_some()) {
+        let _ = write!(text, "\n{}", tables::modes(&report.rows).text());
+    }
+    let fit = &report.closed_form;
+    if fit.rows > 0 {
+        let _ = write!(
+            text,
+            "\nTMU utilisation against the paper's surface: mean absolute deviation {:.2} points, largest {:.2}, over {} rows\n",
+            fit.mean_absolute_points, fit.largest_points, fit.rows
+        );
+    }
+    for c in report
+        .conservation
+        .iter()
+        .filter(|c| c.differing.is_empty())
+    {
+        let _ = writeln!(
+            text,
+            "{}: {} runs replayed the same accesses ({})",
+            c.scene, c.runs, c.access_hash
+        );
+    }
+    text
+}

@@ -1,0 +1,35 @@
+//! `replay report`: the Z2 paper's experiment as a page.
+
+use super::experiment_args::{ExperimentArgs, check_conservation, write_page};
+use anyhow::Result;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `replay report`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  replay report crytek.textrace -o out/report.html
+  replay report crytek.textrace --image crytek-sponza=crytek.png -o out/report.html
+  replay report *.textrace --orders all -o out/report.html")]
+pub struct Args {
+    #[command(flatten)]
+    experiment: ExperimentArgs,
+    /// The page; JSON and CSV with the same numbers are written beside it
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Runs the subcommand; exit code 1 when the orders replayed different accesses.
+///
+/// # Errors
+/// Wrong arguments, an unreadable trace, an output that cannot be written.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let report = args.experiment.run(true, true)?;
+    write_page(&report, &args.experiment.pictures(&report)?, &args.output)?;
+    super::print(&args.output.display().to_string())?;
+    if let Err(problem) = check_conservation(&report) {
+        anstream::eprintln!("error: {problem}");
+        return Ok(ExitCode::FAILURE);
+    }
+    Ok(ExitCode::SUCCESS)
+}

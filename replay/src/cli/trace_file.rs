@@ -1,0 +1,110 @@
+//! Opening whichever kind of trace a path names.
+
+use anyhow::Result;
+use formats::container::{Container, Kind};
+use formats::raytrace::Raytrace;
+use formats::textrace::{Pass, Textrace};
+use std::path::Path;
+
+/// An opened trace.
+pub enum TraceFile {
+    /// Texture addresses.
+    Texture(Box<Textrace>),
+    /// Rays.
+    Ray(Box<Raytrace>),
+}
+
+impl TraceFile {
+    /// Opens a trace of either kind and checks its tables and index.
+    ///
+    /// # Errors
+    /// The file cannot be read or is damaged.
+    pub fn open(path: &Path) -> formats::Result<Self> {
+        // Reading the header twice is cheap: the file is mapped.
+        Ok(match Container::open(path)?.kind() {
+            Kind::Textrace => Self::Texture(Box::new(Textrace::open(path)?)),
+            Kind::Raytrace => Self::Ray(Box::new(Raytrace::open(path)?)),
+        })
+    }
+
+    /// The container of either kind.
+    pub fn container(&self) -> &Container {
+        match self {
+            Self::Texture(trace) => trace.container(),
+            Self::Ray(trace) => trace.container(),
+        }
+    }
+}
+
+/// Pass and tile numbers of a trace, in file order.
+pub fn tiles(passes: &[Pass]) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+    passes
+        .iter()
+        .enumerate()
+        .flat_map(|(pass, info)| (0..info.tile_count() as usize).map(move |tile| (pass, tile)))
+}
+
+/// A range of numbers as given on the command line: `7`, `3..8`, `5..` or `..8`; the end is not
+/// part of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NumberRange {
+    first: usize,
+    end: usize,
+}
+
+impl NumberRange {
+    /// True if `number` is in the range.
+    pub fn contains(self, number: usize) -> bool {
+        (self.first..self.end).contains(&number)
+    }
+
+    /// First number, for checks against what there is.
+    pub fn first(self) -> usize {
+        self.first
+    }
+}
+
+impl std::str::FromStr for NumberRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let bad = || format!("expected a number or a range such as 3..8, found {text:?}");
+        let number = |text: &str| text.parse::<usize>().map_err(|_| bad());
+        let (first, end) = match text.split_once("..") {
+            None => {
+                let only = number(text)?;
+                (only, only.checked_add(1).ok_or_else(bad)?)
+            }
+            Some((first, end)) => (
+                if first.is_empty() { 0 } else { number(first)? },
+                if end.is_empty() {
+                    usize::MAX
+                } else {
+                    number(end)?
+                },
+            ),
+        };
+        if first < end {
+            Ok(Self { first, end })
+        } else {
+            Err(bad())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_leave_out_their_end() {
+        let range = |text: &str| text.parse::<NumberRange>();
+        assert_eq!(range("7"), Ok(NumberRange { first: 7, end: 8 }));
+        assert!(range("3..8").is_ok_and(|r| r.contains(7) && !r.contains(8)));
+        assert!(range("..2").is_ok_and(|r| r.contains(0)));
+        assert!(range("5..").is_ok_and(|r| r.contains(5000)));
+        for bad in ["", "x", "8..3", "3..3", "-1"] {
+            assert!(range(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Rendered pictures that a page carries with it.
+
+use super::plots::data_uri::base64;
+use anyhow::Context;
+use image::ImageReader;
+use image::codecs::jpeg::JpegEncoder;
+use std::path::Path;
+
+/// A picture of both eyes, re-encoded small enough for a page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Label of the trace that it belongs to.
+    pub label: String,
+    /// Width and height in pixels.
+    pub size_px: [u32; 2],
+    jpeg: Vec<u8>,
+}
+
+/// Wider pictures are scaled down to this width.
+const WIDEST_PX: u32 = 1200;
+const JPEG_QUALITY: u8 = 85;
+
+impl Picture {
+    /// Reads a PNG or JPEG file.
+    ///
+    /// # Errors
+    /// The file is missing or is no picture; the message names it.
+    pub fn open(label: &str, path: &Path) -> anyhow::Result<Self> {
+        let picture = ImageReader::open(path)
+            .and_then(ImageReader::with_guessed_format)
+            .with_context(|| format!("{}: cannot read", path.display()))?
+            .decode()
+            .with_context(|| format!("{}: not a picture", path.display()))?
+            .to_rgb8();
+        let (width, height) = picture.dimensions();
+        anyhow::ensure!(
+            width > 0 && height > 0,
+            "{}: the picture is empty",
+            path.display()
+        );
+        let picture = if width > WIDEST_PX {
+            let scaled =
+                (u64::from(height) * u64::from(WIDEST_PX) / u64::from(width)).max(1) as u32;
+            image::imageops::resize(
+                &picture,
+                WIDEST_PX,
+                scaled,
+                image::imageops::FilterType::Triangle,
+            )
+        } else {
+            picture
+        };
+        let mut jpeg = Vec::new();
+        JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY)
+            .encode_image(&picture)
+            .with_context(|| format!("{}: cannot encode", path.display()))?;
+        Ok(Self {
+            label: label.to_owned(),
+            size_px: [picture.width(), picture.height()],
+            jpeg,
+        })
+    }
+
+    /// The picture as a `data:` address.
+    #[must_use]
+    pub fn data_uri(&self) -> String {
+        format!("data:image/jpeg;base64,{}", base64(&self.jpeg))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wide_picture_is_scaled_down_and_keeps_its_shape() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("both.png");
+        image::RgbImage::new(1920, 1080).save(&path).unwrap();
+        let picture = Picture::open("atrium", &path).unwrap();
+        assert_eq!(picture.size_px, [1200, 675]);
+        assert!(
+            picture
+                .data_uri()
+                .starts_with("data:image/jpeg;base64,/9j/")
+        );
+    }
+
+    #[test]
+    fn a_file_that_is_no_picture_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.png");
+        std::fs::write(&path, "no").unwrap();
+        assert!(
+            Picture::open("x", &path)
+                .unwrap_err()
+                .to_string()
+                .contains("x.png: not a picture")
+        );
+    }
+}

@@ -1,0 +1,457 @@
+//! The capture through lavapipe against the reference.
+
+use super::compare::{Agreement, compare, lanes};
+use super::reference;
+use crate::raster::backend::{CaptureBackend, View};
+use crate::raster::capture::CaptureJob;
+use crate::raster::cull;
+use crate::raster::draws::{DrawCall, DrawList};
+use crate::raster::lavapipe::Lavapipe;
+use crate::raster::lighting::Lighting;
+use crate::scene::textures::TextureSet;
+use crate::scene::{
+    AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd,
+};
+use formats::textrace::{Tables, Textrace, TextraceWriter, Tile, TraceMeta};
+use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
+use formats::view::{FrameViews, Hmd};
+use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
+use std::sync::Arc;
+
+const SIZE_PX: [u32; 2] = [200, 136];
+const BUDGET: u64 = 128 << 20;
+
+struct Captured {
+    trace: Vec<u8>,
+    tables: Tables,
+    /// Tiles by pass.
+    tiles: Vec<Vec<Tile>>,
+    pictures_match: bool,
+    killed: u64,
+}
+
+fn display(size_px: [u32; 2]) -> Hmd {
+    let mut hmd = hmd::preset("symmetric-100").unwrap();
+    hmd.eye_size_px = size_px;
+    hmd.fov = [hmd::symmetric(100.0, size_px); 2];
+    hmd
+}
+
+fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
+    cameras::frame_views(&scene.cameras[0], &display(size_px), 1)
+        .unwrap()
+        .remove(0)
+}
+
+fn job<'a>(scene: &Scene, draws: &'a DrawList, size_px: [u32; 2]) -> CaptureJob<'a> {
+    CaptureJob {
+        draws,
+        lighting: Lighting::new(scene),
+        bounds: scene.bounds().unwrap_or_default(),
+        shadow_range_m: [0.1, 40.0],
+        size_px,
+        parts: 1,
+    }
+}
+
+/// Captures one stereo frame; fails, naming the packages, where there is no lavapipe.
+fn capture(scene: &Scene, size_px: [u32; 2], cascades: u32, budget: u64) -> Captured {
+    let draws = DrawList::new(scene, cascades).unwrap();
+    let set = TextureSet::compress(scene).unwrap();
+    let mut backend =
+        Lavapipe::new(scene, &draws, &set, size_px, budget).unwrap_or_else(|e| panic!("{e}"));
+    let views = views(scene, size_px);
+    let textures = draws.textures(&set);
+    let (samplers, draw_table) = draws.tables(scene, &set, &textures);
+    let tables = Tables {
+        meta: TraceMeta {
+            tool: "test".into(),
+            command_line: Vec::new(),
+            scene: "test".into(),
+            scene_triangles: scene.triangle_count(),
+            camera: "test".into(),
+            backend: "lavapipe".into(),
+            driver: backend.driver().into(),
+            seed: 0,
+            hmd: display(size_px),
+            frames: vec![views.clone()],
+        },
+        textures,
+        samplers,
+        draws: draw_table,
+        passes: CaptureJob::passes(size_px, 1),
+    };
+    let mut job = job(scene, &draws, size_px);
+    let (plain, _) = job.plain_frame(&mut backend, &views).unwrap();
+    let mut writer = TextraceWriter::in_memory(&tables).unwrap();
+    let (pictures, counts, _) = job
+        .capture_frame(&mut backend, &views, 0, &tables, &mut writer)
+        .unwrap_or_else(|e| panic!("{e}"));
+    let trace = writer.into_bytes().unwrap();
+    let reader = Textrace::from_bytes(trace.clone()).unwrap();
+    let tiles = (0..2)
+        .map(|pass| {
+            (0..tables.passes[pass].tile_count() as usize)
+                .map(|index| {
+                    let mut tile = Tile::default();
+                    reader.decode_tile(pass, index, &mut tile).unwrap();
+                    tile
+                })
+                .collect()
+        })
+        .collect();
+    Captured {
+        trace,
+        tables,
+        tiles,
+        pictures_match: plain == pictures,
+        killed: counts.masked_lanes_killed,
+    }
+}
+
+/// Agreement of one eye's pass with the reference.
+fn agreement(
+    scene: &Scene,
+    captured: &Captured,
+    pass: usize,
+    alpha: &dyn Fn(&DrawCall, DVec2) -> bool,
+) -> Agreement {
+    let draws = DrawList::new(scene, 0).unwrap();
+    let size_px = captured.tables.passes[pass].size_px;
+    let lighting = Lighting::new(scene);
+    let view = View {
+        eye: views(scene, size_px).eyes[pass],
+        lighting: &lighting,
+        visible: &[],
+    };
+    let fragments = reference::render(scene, &draws, &view, size_px, alpha);
+    let columns = captured.tables.passes[pass].tiles[0];
+    let tiles = (0..)
+        .zip(&captured.tiles[pass])
+        .map(|(i, tile)| ([i % columns, i / columns], tile));
+    let lanes = lanes(&captured.tables.draws, tiles).unwrap();
+    compare(&fragments, &lanes)
+}
+
+/// Deterministic numbers in 0..1.
+fn random(seed: u32) -> impl FnMut() -> f32 {
+    let mut state = u64::from(seed) * 2 + 1;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1 << 24) as f32
+    }
+}
+
+/// An image of 4x4-texel cells, which BC1 holds exactly; `opaque` decides each cell's alpha.
+fn cells(cells: u32, opaque: impl Fn(u32, u32) -> bool) -> Image {
+    let edge = cells * 4;
+    let rgba: Vec<u8> = (0..edge * edge)
+        .flat_map(|i| {
+            let (x, y) = (i % edge / 4, i / edge / 4);
+            if opaque(x, y) {
+                [200, 160, 80, 255]
+            } else {
+                [0, 0, 0, 0]
+            }
+        })
+        .collect();
+    Image {
+        name: "cells".into(),
+        size: [edge; 2],
+        rgba: Arc::from(rgba),
+        color_space: ColorSpace::Srgb,
+    }
+}
+
+/// Triangles of random size, place and slant in front of the camera, some across the near plane.
+fn triangles(count: usize, seed: u32, material: usize) -> Mesh {
+    let mut next = random(seed);
+    let mut mesh = Mesh {
+        name: "random".into(),
+        material,
+        ..Mesh::default()
+    };
+    for _ in 0..count {
+        let center = Vec3::new(next() * 8.0 - 4.0, next() * 6.0 - 3.0, -0.5 - next() * 8.0);
+        let size = 0.3 + next() * next() * 6.0;
+        for _ in 0..3 {
+            mesh.indices.push(mesh.positions.len() as u32);
+            mesh.positions
+                .push(center + size * (Vec3::new(next(), next(), next()) - 0.5));
+            mesh.normals.push(Vec3::Z);
+            mesh.tangents.push(Vec4::new(1.0, 0.0, 0.0, 1.0));
+            mesh.uv0
+                .push(Vec2::new(next() * 4.0 - 2.0, next() * 4.0 - 2.0));
+        }
+    }
+    mesh
+}
+
+fn scene(meshes: Vec<Mesh>, materials: Vec<Material>, images: Vec<Image>) -> Scene {
+    Scene {
+        name: "test".into(),
+        instances: (0..meshes.len())
+            .map(|mesh| Instance {
+                mesh,
+                transform: Affine3A::IDENTITY,
+            })
+            .collect(),
+        meshes,
+        materials,
+        images,
+        cameras: vec![Camera {
+            name: "test".into(),
+            eye: Vec3::ZERO,
+            target: Vec3::NEG_Z,
+            up: Vec3::Y,
+            vfov_deg: 60.0,
+            near: 0.1,
+            far: 50.0,
+        }],
+        ..Scene::default()
+    }
+}
+
+fn textured(alpha: AlphaMode, double_sided: bool) -> Material {
+    let sampler = Sampler {
+        mag: Filter::Nearest,
+        min: Filter::Nearest,
+        mip: MipFilter::None,
+        ..Sampler::TRILINEAR_REPEAT
+    };
+    Material {
+        name: format!("{alpha:?}"),
+        base_color_texture: Some(TextureRef {
+            sampler,
+            ..TextureRef::new(0)
+        }),
+        alpha,
+        double_sided,
+        ..Material::default()
+    }
+}
+
+fn checker() -> Image {
+    cells(8, |x, y| (x * 5 + y * 3) % 7 < 4)
+}
+
+/// The alpha test on [`checker`] with nearest filtering.
+fn checker_passes(_: &DrawCall, uv: DVec2) -> bool {
+    let cell = uv.rem_euclid(DVec2::ONE) * 8.0;
+    (cell.x as u32 * 5 + cell.y as u32 * 3) % 7 < 4
+}
+
+#[test]
+fn coverage_depth_order_coordinates_and_levels_of_random_triangles_agree_with_the_reference() {
+    let meshes = vec![
+        triangles(150, 1, 0),
+        triangles(80, 2, 1),
+        triangles(60, 3, 2),
+    ];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Opaque, false),
+        textured(AlphaMode::Blend, true),
+    ];
+    let mut scene = scene(meshes, materials, vec![checker()]);
+    // A mirrored instance turns the winding of the single-sided mesh round.
+    scene.instances.push(Instance {
+        mesh: 1,
+        transform: Affine3A::from_scale_rotation_translation(
+            Vec3::new(-1.0, 1.2, 0.8),
+            glam::Quat::from_rotation_z(0.4),
+            Vec3::new(0.3, -0.2, -0.5),
+        ),
+    });
+    let captured = capture(&scene, SIZE_PX, 0, BUDGET);
+    for pass in 0..2 {
+        let a = agreement(&scene, &captured, pass, &|_, _| true);
+        println!("pass {pass}: {a:?}, IoU {:.6}", a.coverage_iou());
+        assert!(a.both > 20_000, "{a:?}");
+        assert!(a.coverage_iou() >= 0.999, "{a:?}");
+        assert!(
+            a.max_uv_error_texels < 0.05 && a.mean_uv_error_texels < 0.002,
+            "{a:?}"
+        );
+        assert!((a.level_differs as f64) < 0.001 * a.both as f64, "{a:?}");
+    }
+    assert!(captured.pictures_match);
+}
+
+#[test]
+fn masked_draws_keep_exactly_the_lanes_that_an_in_order_gpu_keeps() {
+    // Masked draws among opaque ones, with heavy overlap inside each draw.
+    let meshes = vec![
+        triangles(40, 11, 0),
+        triangles(500, 12, 1),
+        triangles(20, 13, 0),
+        triangles(500, 14, 1),
+    ];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Mask(0.5), true),
+    ];
+    let scene = scene(meshes, materials, vec![checker()]);
+    let captured = capture(&scene, SIZE_PX, 0, BUDGET);
+    assert!(
+        captured.killed > 10_000,
+        "the scene must exercise the replay, killed {}",
+        captured.killed
+    );
+    for pass in 0..2 {
+        let a = agreement(&scene, &captured, pass, &checker_passes);
+        println!("pass {pass}: {a:?}, IoU {:.6}", a.coverage_iou());
+        assert!(a.coverage_iou() >= 0.999, "{a:?}");
+    }
+    assert!(captured.pictures_match);
+}
+
+#[test]
+fn a_small_record_budget_gives_the_same_trace() {
+    let meshes = vec![triangles(150, 21, 0), triangles(150, 22, 1)];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Mask(0.5), true),
+    ];
+    let scene = scene(meshes, materials, vec![checker()]);
+    let whole = capture(&scene, SIZE_PX, 2, BUDGET);
+    for budget in [300 << 10, 64 << 10] {
+        let parts = capture(&scene, SIZE_PX, 2, budget);
+        assert!(
+            parts.trace == whole.trace,
+            "budget {budget} changed the trace"
+        );
+        assert!(parts.pictures_match);
+    }
+}
+
+#[test]
+fn a_budget_below_one_tile_is_refused() {
+    let scene = scene(
+        vec![triangles(400, 31, 0)],
+        vec![textured(AlphaMode::Blend, true)],
+        vec![checker()],
+    );
+    let draws = DrawList::new(&scene, 0).unwrap();
+    let set = TextureSet::compress(&scene).unwrap();
+    let mut backend =
+        Lavapipe::new(&scene, &draws, &set, SIZE_PX, 4096).unwrap_or_else(|e| panic!("{e}"));
+    let lighting = Lighting::new(&scene);
+    let mut view = View {
+        eye: views(&scene, SIZE_PX).eyes[0],
+        lighting: &lighting,
+        visible: &[],
+    };
+    let visible = cull::visible_draws(&draws, view.clip_from_world());
+    view.visible = &visible;
+    let refused = crate::raster::regions::capture_view(
+        &mut backend,
+        &draws,
+        &view,
+        SIZE_PX,
+        1,
+        &mut |_, _| Ok(()),
+    );
+    let message = refused.unwrap_err().to_string();
+    assert!(
+        message.contains("alone needs") && message.contains("--record-budget"),
+        "{message}"
+    );
+}
+
+#[test]
+fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
+    let meshes = vec![triangles(200, 61, 0), triangles(100, 62, 1)];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Blend, true),
+    ];
+    let scene = scene(meshes, materials, vec![checker()]);
+    let captured = capture(&scene, SIZE_PX, 0, BUDGET);
+    let draws = DrawList::new(&scene, 0).unwrap();
+    let set = TextureSet::compress(&scene).unwrap();
+    let mut backend =
+        Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap_or_else(|e| panic!("{e}"));
+    let lighting = Lighting::new(&scene);
+    for pass in 0..2 {
+        let view = View {
+            eye: views(&scene, SIZE_PX).eyes[pass],
+            lighting: &lighting,
+            visible: &[],
+        };
+        let counted = backend.count_fragments(&draws, &view).unwrap();
+        let mut recorded = vec![0; counted.len()];
+        let columns = captured.tables.passes[pass].tiles[0];
+        let tiles = (0..)
+            .zip(&captured.tiles[pass])
+            .map(|(i, tile)| ([i % columns, i / columns], tile));
+        for (pixel, _) in lanes(&captured.tables.draws, tiles).unwrap().into_keys() {
+            recorded[(pixel[1] * SIZE_PX[0] + pixel[0]) as usize] += 1;
+        }
+        assert!(counted.iter().sum::<u32>() > 20_000);
+        assert_eq!(counted, recorded);
+    }
+}
+
+#[test]
+fn untextured_draws_record_their_quads_without_a_group() {
+    let scene = scene(
+        vec![triangles(50, 41, 0)],
+        vec![Material::default()],
+        Vec::new(),
+    );
+    let captured = capture(&scene, SIZE_PX, 0, BUDGET);
+    let records = || captured.tiles.iter().flatten().flat_map(|t| &t.records);
+    assert!(records().count() > 1000);
+    assert!(records().all(|r| r.group == formats::textrace::NO_GROUP));
+    assert!(agreement(&scene, &captured, 0, &|_, _| true).coverage_iou() >= 0.999);
+}
+
+#[test]
+fn every_lane_of_a_shadowed_draw_takes_at_most_one_cascade() {
+    let scene = scene(
+        vec![triangles(80, 51, 0)],
+        vec![textured(AlphaMode::Opaque, true)],
+        vec![checker()],
+    );
+    let captured = capture(&scene, SIZE_PX, 4, BUDGET);
+    let mut shadowed = 0;
+    for tile in captured.tiles.iter().flatten() {
+        for run in &tile.runs {
+            let records = &tile.records[run.first as usize..(run.first + run.count) as usize];
+            for quad in records.chunk_by(|a, b| (a.x, a.y) == (b.x, b.y)) {
+                let cascades: Vec<u8> = quad
+                    .iter()
+                    .filter(|r| r.group > 0)
+                    .map(|r| r.mask)
+                    .collect();
+                let lanes: u32 = cascades.iter().map(|m| m.count_ones()).sum();
+                let union = cascades.iter().fold(0, |all, m| all | m);
+                assert_eq!(lanes, union.count_ones());
+                // A clipped primitive may cover a quad in two parts.
+                let covered = quad
+                    .iter()
+                    .filter(|r| r.group == 0)
+                    .fold(0, |all, r| all | r.mask);
+                assert_eq!(union & !covered, 0);
+                shadowed += u64::from(union != 0);
+            }
+        }
+    }
+    assert!(shadowed > 5000, "{shadowed}");
+    assert!(captured.pictures_match);
+}
+
+#[test]
+fn a_built_in_scene_agrees_with_the_reference() {
+    let scene = crate::scene::load("atrium-plain").unwrap();
+    let captured = capture(&scene, [240, 272], 0, BUDGET);
+    let a = agreement(&scene, &captured, 1, &|_, _| true);
+    println!("atrium-plain: {a:?}, IoU {:.6}", a.coverage_iou());
+    assert!(a.both > 40_000, "{a:?}");
+    assert!(a.coverage_iou() >= 0.999, "{a:?}");
+    assert!(a.mean_uv_error_texels < 0.01, "{a:?}");
+    assert!((a.level_differs as f64) < 0.002 * a.both as f64, "{a:?}");
+}
