@@ -15,4 +15,7 @@ pub mod textrace;
 pub mod texture;
 pub mod view;
 
+#[cfg(test)]
+mod spec;
+
 pub use error::{FormatError, Result};

@@ -13,8 +13,10 @@ mod reader;
 pub mod tables;
 mod writer;
 
+pub use delta::PADDING_BYTES as DELTA_PADDING_BYTES;
 pub use index::INDEX_ENTRY_BYTES;
 pub use invariant::{TILE_QUADS, quad_morton};
+pub use raw::{RECORD_BYTES as RAW_RECORD_BYTES, RUN_BYTES as RAW_RUN_BYTES};
 pub use reader::{Textrace, TileStats};
 pub use writer::{EncodedTile, TextraceWriter, encode_tile, encode_tile_as};
 

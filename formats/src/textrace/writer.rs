@@ -23,6 +23,12 @@ impl EncodedTile {
     pub fn size_bytes(&self) -> usize {
         self.bytes.len()
     }
+
+    /// The encoded bytes.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
 }
 
 /// Encodes a tile in the default encoding. Pure, so that tiles can be encoded in parallel.

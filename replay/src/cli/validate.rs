@@ -47,9 +47,6 @@ pub fn run(args: &ValidateArgs) -> Result<ExitCode> {
 fn validate(path: &std::path::Path) -> formats::Result<String> {
     let trace = TraceFile::open(path)?;
     let container = trace.container();
-    for entry in container.directory() {
-        container.chunk(entry.tag)?;
-    }
     let (tile_count, items, what) = match &trace {
         TraceFile::Texture(trace) => {
             let tiles: Vec<_> = tiles(&trace.tables().passes).collect();
@@ -79,6 +76,10 @@ fn validate(path: &std::path::Path) -> formats::Result<String> {
             (tiles.len(), total(rays)?, "rays")
         }
     };
+    // Last, since a tile's own checksum says more closely where the damage is.
+    for entry in container.directory() {
+        container.chunk(entry.tag)?;
+    }
     Ok(format!(
         "{}: valid {} {}.{}, {} chunks, {tile_count} tiles, {items} {what}, {} bytes",
         container.file(),

@@ -19,7 +19,7 @@ pub enum SweepError {
         /// The point's settings.
         point: String,
         /// What went wrong.
-        source: ReplayError,
+        source: Box<ReplayError>,
     },
     /// The result could not be kept.
     #[error("{0:#}")]
@@ -52,10 +52,10 @@ pub fn run(
         let result = kept.map_or_else(
             || {
                 let result =
-                    replay(subject.source, &point.config).map_err(|source| SweepError::Replay {
+                    replay(subject.source, &point.config).map_err(|error| SweepError::Replay {
                         label: subject.label.clone(),
                         point: point.title(),
-                        source,
+                        source: Box::new(error),
                     })?;
                 computed.fetch_add(1, Ordering::Relaxed);
                 store

@@ -1,6 +1,7 @@
 //! Runs the experiment: every trace, cache configuration and order, points in parallel.
 
 use super::model::{PaperReport, Run, TraceInfo};
+use super::plots::MAPPED_ORDERS;
 use crate::config::{Mode, OrderKind, RunConfig};
 use crate::engine::{ReplayError, TileSource, replay};
 use crate::paper::z2_twin;
@@ -32,7 +33,7 @@ pub struct Plan {
     pub orders: Vec<OrderKind>,
     /// Also run every point in functional mode.
     pub functional: bool,
-    /// Keep per-tile maps of the first cache configuration.
+    /// Keep per-tile maps of the first cache configuration for the orders that are drawn.
     pub tile_maps: bool,
 }
 
@@ -45,7 +46,7 @@ pub struct ExperimentError {
     /// The order.
     pub order: &'static str,
     /// What went wrong.
-    pub source: ReplayError,
+    pub source: Box<ReplayError>,
 }
 
 impl Plan {
@@ -83,10 +84,10 @@ impl Plan {
                         config,
                         result,
                     })
-                    .map_err(|source| ExperimentError {
+                    .map_err(|error| ExperimentError {
+                        source: Box::new(error),
                         label: subjects[trace].label.clone(),
                         order: config.order.name(),
-                        source,
                     })
             })
             .collect::<Vec<_>>()
@@ -113,7 +114,7 @@ impl Plan {
                     };
                     config.l1.size_bytes = l1;
                     config.l2.size_bytes = l2;
-                    config.tile_maps = tile_maps && index == 0;
+                    config.tile_maps = tile_maps && index == 0 && MAPPED_ORDERS.contains(&order);
                     points.push((trace, config));
                 }
             }

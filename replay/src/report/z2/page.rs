@@ -1,9 +1,9 @@
 //! The experiment as a page.
 
 use super::model::{Detail, PaperReport, TraceInfo};
-use super::plots::{self, TileMeasure};
+use super::plots::{self, MAPPED_ORDERS, TileMeasure};
 use super::tables::{self, order_title};
-use crate::config::{Mode, OrderKind};
+use crate::config::Mode;
 use crate::report::html::{self, Section, figures, folded};
 use crate::report::picture::Picture;
 use crate::report::plots::PlotError;
@@ -131,11 +131,13 @@ fn thousands(number: u64) -> String {
 
 fn scenes(pictures: &[Picture]) -> Markup {
     html! {
-        @for picture in pictures {
-            figure {
-                img src=(picture.data_uri()) alt={ "both eyes of " (picture.label) }
-                    width=(picture.size_px[0]) height=(picture.size_px[1]);
-                figcaption { (picture.label) ", left and right eye" }
+        div.row {
+            @for picture in pictures {
+                figure.picture {
+                    img src=(picture.data_uri()) alt={ "both eyes of " (picture.label) }
+                        width=(picture.size_px[0]) height=(picture.size_px[1]);
+                    figcaption { (picture.label) ", left and right eye" }
+                }
             }
         }
     }
@@ -252,8 +254,7 @@ fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
             let mut maps: Vec<_> = details
                 .iter()
                 .filter(|d| {
-                    d.order == OrderKind::Morton
-                        || (depends_on_order && d.order == OrderKind::Z2Sta)
+                    MAPPED_ORDERS[..if depends_on_order { 2 } else { 1 }].contains(&d.order)
                 })
                 .filter_map(|d| plots::heat_map(info, d, measure))
                 .collect();

@@ -50,6 +50,10 @@ fn by_caches(
         })
         .collect();
     let marked = groups.iter().any(|g| g.marks.iter().any(Option::is_some));
+    let largest = groups
+        .iter()
+        .flat_map(|g| g.values.iter().flatten().copied())
+        .fold(0.0, f64::max);
     BarChart {
         title: format!("{scene}: {title}"),
         value_label: value_label.to_owned(),
@@ -58,7 +62,8 @@ fn by_caches(
         groups,
         mark_name: marked.then(|| mark_name.to_owned()),
         reference: None,
-        decimals: Some(1),
+        // Three digits tell neighbours apart.
+        decimals: Some(if largest < 10.0 { 2 } else { 1 }),
     }
 }
 
@@ -318,6 +323,9 @@ pub enum TileMeasure {
     /// Lines from memory.
     L2Misses,
 }
+
+/// Orders whose tile maps are drawn: the baseline and what the paper proposes.
+pub const MAPPED_ORDERS: [OrderKind; 2] = [OrderKind::Morton, OrderKind::Z2Sta];
 
 impl TileMeasure {
     /// Every measure, and whether it depends on the order.
