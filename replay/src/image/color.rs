@@ -16,7 +16,11 @@ pub fn linear_from_srgb(value: f32) -> f32 {
 /// sRGB encoding of a linear value, clamped to 0..1; not a number counts as 0.
 #[must_use]
 pub fn srgb_from_linear(value: f32) -> f32 {
-    let value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
+    let value = if value.is_nan() {
+        0.0
+    } else {
+        value.clamp(0.0, 1.0)
+    };
     if value > 0.003_130_8 {
         1.055 * value.powf(1.0 / 2.4) - 0.055
     } else {

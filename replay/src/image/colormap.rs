@@ -25,7 +25,11 @@ const MAGMA: [[u8; 3]; 17] = [
 #[must_use]
 pub fn magma(value: f32) -> [u8; 3] {
     let last = MAGMA.len() - 1;
-    let value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
+    let value = if value.is_nan() {
+        0.0
+    } else {
+        value.clamp(0.0, 1.0)
+    };
     let at = value * last as f32;
     let low = (at as usize).min(last - 1);
     let share = at - low as f32;

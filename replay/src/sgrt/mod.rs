@@ -33,4 +33,4 @@ pub(crate) mod synthetic;
 /// image stays well below a FLIP of 0.01 on every scene. Foliage needs `opaque`, since the trace
 /// cannot tell whether a re-tested cut-out lets the ray through; `triangles` reuses more than
 /// `triangle` on fine meshes, where the next pixel's triangle is often another one.
-pub const DEFAULT_RULE: &str = "depth=0.02+object+opaque+triangles";
+pub const DEFAULT_RULE: &str = "depth=0.02+row=0.02+object+opaque+triangles";
