@@ -55,7 +55,7 @@ fn made_up_tile(random: &mut Random, cell: f64) -> Tile {
     let mut tile = Tile::default();
     let cells = (16.0 / cell).ceil() as i32 + 1;
     let offset = [random.range(-cell, 0.0), random.range(-cell, 0.0)];
-    let mut primitive = random.range(0.0, 1000.0) as u32;
+    let first_primitive = random.range(0.0, 1000.0) as u32;
     for triangle in 0..cells * cells * 2 {
         let (column, row) = (triangle / 2 % cells, triangle / 2 / cells);
         let wobble = |r: &mut Random, n: f64| n * r.range(0.95, 1.05);
@@ -87,13 +87,12 @@ fn made_up_tile(random: &mut Random, cell: f64) -> Tile {
             of_run.sort_by_key(|r| quad_morton(r.x, r.y));
             let first = first as u32;
             tile.runs.push(PrimitiveRun {
-                primitive,
+                primitive: first_primitive + triangle as u32,
                 draw: 0,
                 first,
                 count,
             });
         }
-        primitive += 1;
     }
     tile
 }

@@ -59,7 +59,10 @@ fn documented_sizes_are_the_codes() {
         ("raw record", textrace::RAW_RECORD_BYTES),
         ("delta padding", textrace::DELTA_PADDING_BYTES),
         ("ray tile index entry", RAY_INDEX_ENTRY_BYTES),
-        ("ray triangle", crate::raytrace::tables::TRIANGLE_ENTRY_BYTES),
+        (
+            "ray triangle",
+            crate::raytrace::tables::TRIANGLE_ENTRY_BYTES,
+        ),
     ]);
     let rows = table("## Sizes");
     assert_eq!(rows.len(), code.len());
@@ -202,6 +205,7 @@ fn decode(runs: u32, bytes: &[u8]) -> Tile {
                 group,
                 ..QuadRecord::default()
             };
+            #[allow(clippy::needless_range_loop, reason = "the text says: u and v alike")]
             for a in 0..2 {
                 let mul = i32::wrapping_mul;
                 let sum = |terms: &[i32]| terms.iter().fold(0i32, |s, t| s.wrapping_add(*t));

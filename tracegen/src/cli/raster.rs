@@ -13,7 +13,7 @@ use crate::scene::textures::TextureSet;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::textrace::{Tables, TextraceWriter, TraceMeta};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
@@ -51,6 +51,8 @@ pub struct RasterArgs {
 /// Unreadable input, no driver, or a file that cannot be written.
 pub fn run(args: RasterArgs) -> anyhow::Result<()> {
     prepare_environment(args.threads)?;
+    check_folder(&args.output)?;
+    args.image.as_deref().map_or(Ok(()), check_folder)?;
     let started = Instant::now();
     let mut setup = args.scene.setup(None, &LoadOptions::ALL)?;
     let cascades = if args.shadows {
@@ -106,23 +108,43 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         }
         first_pictures.get_or_insert(pictures);
     }
-    let start = Instant::now();
-    writer
-        .finish()
-        .with_context(|| format!("cannot write {}", args.output.display()))?;
-    summary.captured += start.elapsed();
-    summary.print(
-        setup.frames.len(),
-        size_px,
-        std::fs::metadata(&args.output)?.len(),
-    );
-    if let (Some(path), Some(pictures)) = (&args.image, &first_pictures) {
-        picture::write_side_by_side(path, pictures, size_px)
-            .with_context(|| format!("cannot write {}", path.display()))?;
-    }
     ensure!(
         summary.identical != Some(false),
         "the captured picture differs from the plain one: the capture disturbed the rendering"
+    );
+    let cannot_write = |path: &Path| format!("cannot write {}", path.display());
+    let image = match (&args.image, &first_pictures) {
+        (Some(path), Some(pictures)) => {
+            let prepared = picture::prepare_side_by_side(path, pictures, size_px)
+                .with_context(|| cannot_write(path))?;
+            Some((path, prepared))
+        }
+        _ => None,
+    };
+    let start = Instant::now();
+    writer
+        .finish()
+        .with_context(|| cannot_write(&args.output))?;
+    summary.captured += start.elapsed();
+    if let Some((path, prepared)) = image {
+        prepared.persist().with_context(|| cannot_write(path))?;
+    }
+    let file_bytes = std::fs::metadata(&args.output)?.len();
+    summary.print(setup.frames.len(), size_px, file_bytes);
+    Ok(())
+}
+
+/// Refuses an output in a folder that does not exist before minutes go into the capture.
+fn check_folder(path: &Path) -> anyhow::Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    ensure!(
+        folder.is_dir(),
+        "cannot write {}: expected a folder {}, found none",
+        path.display(),
+        folder.display()
     );
     Ok(())
 }

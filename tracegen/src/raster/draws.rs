@@ -253,3 +253,103 @@ fn bounds(positions: &[Vec3], transform: &Affine3A) -> [Vec3; 2] {
         [lo.min(p), hi.max(p)]
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Instance, Mesh, TextureRef};
+    use glam::Vec4;
+
+    /// A scene with one mesh of `triangles[i]` triangles and material i for each entry.
+    fn scene(materials: Vec<Material>, triangles: &[usize]) -> Scene {
+        let mesh = |(material, &count): (usize, &usize)| Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            indices: [0, 1, 2].repeat(count),
+            material,
+            ..Mesh::default()
+        };
+        Scene {
+            meshes: triangles.iter().enumerate().map(mesh).collect(),
+            instances: (0..triangles.len())
+                .map(|mesh| Instance {
+                    mesh,
+                    transform: Affine3A::IDENTITY,
+                })
+                .collect(),
+            materials,
+            ..Scene::default()
+        }
+    }
+
+    fn material(alpha: AlphaMode, textured: bool) -> Material {
+        Material {
+            alpha,
+            base_color_texture: textured.then(|| TextureRef::new(0)),
+            base_color: Vec4::new(1.0, 1.0, 1.0, 0.4),
+            ..Material::default()
+        }
+    }
+
+    #[test]
+    fn blended_draws_come_last_and_primitives_are_numbered_through() {
+        let materials = vec![
+            material(AlphaMode::Blend, true),
+            material(AlphaMode::Opaque, true),
+            material(AlphaMode::Mask(0.5), true),
+        ];
+        let draws = DrawList::new(&scene(materials, &[2, 3, 4]), 0).unwrap();
+        let rows: Vec<_> = draws
+            .calls
+            .iter()
+            .map(|c| (c.mesh, c.mode, c.first_primitive))
+            .collect();
+        let expected = [
+            (1, DrawMode::Opaque, 0),
+            (2, DrawMode::Masked, 3),
+            (0, DrawMode::Blended, 7),
+        ];
+        assert_eq!(rows, expected);
+    }
+
+    #[test]
+    fn a_constant_alpha_is_tested_once_for_the_draw() {
+        let materials = vec![
+            material(AlphaMode::Mask(0.5), false),
+            material(AlphaMode::Mask(0.3), false),
+        ];
+        let draws = DrawList::new(&scene(materials, &[1, 1]), 0).unwrap();
+        assert_eq!(draws.calls.len(), 1);
+        assert_eq!(
+            (draws.calls[0].mesh, draws.calls[0].mode),
+            (1, DrawMode::Opaque)
+        );
+    }
+
+    #[test]
+    fn an_index_beyond_the_vertices_is_refused() {
+        let mut scene = scene(vec![material(AlphaMode::Opaque, true)], &[1]);
+        scene.meshes[0].indices[2] = 3;
+        let message = DrawList::new(&scene, 0).unwrap_err().to_string();
+        assert!(
+            message.contains("index 3 beyond its 3 vertices"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn each_cascade_is_a_group_of_four_taps_on_its_layer() {
+        let scene = scene(vec![material(AlphaMode::Opaque, false)], &[1]);
+        let draws = DrawList::new(&scene, 2).unwrap();
+        let set = TextureSet::default();
+        let textures = draws.textures(&set);
+        let (samplers, table) = draws.tables(&scene, &set, &textures);
+        assert_eq!(samplers, [Sampler::SHADOW]);
+        assert_eq!((textures.len(), textures[0].layers), (1, 2));
+        for (layer, group) in table[0].groups.iter().enumerate() {
+            assert_eq!(group.extent, [SHADOW_SIZE; 2]);
+            let taps: Vec<_> = group.samples.iter().map(|s| (s.layer, s.offset)).collect();
+            assert_eq!(taps, SHADOW_TAPS.map(|offset| (layer as u16, offset)));
+        }
+        assert_eq!(table[0].groups.len(), 2);
+    }
+}

@@ -1,18 +1,20 @@
 //! The picture of both eyes side by side.
 
 use super::capture::Pictures;
+use formats::container::AtomicFile;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes both eyes side by side as a PNG, through a temporary file beside `path`.
+/// Writes both eyes side by side as a PNG into a temporary file beside `path`, to be persisted
+/// there once everything else has succeeded.
 ///
 /// # Errors
 /// What the file system or the encoder reports.
-pub fn write_side_by_side(
+pub fn prepare_side_by_side(
     path: &Path,
     pictures: &Pictures,
     size_px: [u32; 2],
-) -> anyhow::Result<()> {
+) -> anyhow::Result<AtomicFile> {
     let [width, height] = size_px;
     let row_bytes = width as usize * 4;
     let mut pixels = Vec::with_capacity(2 * row_bytes * height as usize);
@@ -23,11 +25,7 @@ pub fn write_side_by_side(
         pixels.extend_from_slice(left);
         pixels.extend_from_slice(right);
     }
-    let directory = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let mut file = tempfile::NamedTempFile::new_in(directory)?;
+    let mut file = AtomicFile::create(path)?;
     let mut bytes = std::io::Cursor::new(Vec::new());
     image::write_buffer_with_format(
         &mut bytes,
@@ -38,6 +36,5 @@ pub fn write_side_by_side(
         image::ImageFormat::Png,
     )?;
     file.write_all(bytes.get_ref())?;
-    file.persist(path)?;
-    Ok(())
+    Ok(file)
 }

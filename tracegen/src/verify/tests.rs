@@ -5,14 +5,14 @@ use super::reference;
 use crate::raster::backend::{CaptureBackend, View};
 use crate::raster::capture::CaptureJob;
 use crate::raster::cull;
-use crate::raster::draws::{DrawCall, DrawList};
+use crate::raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use crate::raster::lavapipe::Lavapipe;
 use crate::raster::lighting::Lighting;
 use crate::scene::textures::TextureSet;
 use crate::scene::{
     AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd,
 };
-use formats::textrace::{Tables, Textrace, TextraceWriter, Tile, TraceMeta};
+use formats::textrace::{SUBTEXELS, Tables, Textrace, TextraceWriter, Tile, TraceMeta};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
 use formats::view::{FrameViews, Hmd};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
@@ -422,6 +422,13 @@ fn every_lane_of_a_shadowed_draw_takes_at_most_one_cascade() {
         for run in &tile.runs {
             let records = &tile.records[run.first as usize..(run.first + run.count) as usize];
             for quad in records.chunk_by(|a, b| (a.x, a.y) == (b.x, b.y)) {
+                for record in quad.iter().filter(|r| r.group > 0) {
+                    let edge = SHADOW_SIZE as i32 * SUBTEXELS;
+                    let inside = |v: i32| v > SUBTEXELS && v < edge - SUBTEXELS;
+                    for lane in (0..4).filter(|lane| record.mask >> lane & 1 == 1) {
+                        assert!(record.lane_uv(lane).into_iter().all(inside), "{record:?}");
+                    }
+                }
                 let cascades: Vec<u8> = quad
                     .iter()
                     .filter(|r| r.group > 0)

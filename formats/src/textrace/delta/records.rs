@@ -158,10 +158,12 @@ pub(super) fn decode_run(
 #[inline(always)]
 fn decode_record(state: &mut State, bits: &mut BitReader<'_>) -> Option<QuadRecord> {
     let control = bits.peek()?;
-    let field = |from: u32, count: u32| ((control >> from) & ((1 << count) - 1)) as u32;
+    let field = |from: u32, count: u32| low_u32((control >> from) & ((1 << count) - 1));
+    // A field of four bits.
+    let nibble = |from: u32| field(from, 4).to_le_bytes()[0];
     let widths = [0, 4, 8, 12].map(|from| width(field(from, 4)));
     let mut step = field(16, 3);
-    let mask = field(19, 4) as u8;
+    let mask = nibble(19);
     let mut used = CONTROL_BITS;
     let mut group = state.expected_group();
     if step == 7 {
@@ -169,7 +171,7 @@ fn decode_record(state: &mut State, bits: &mut BitReader<'_>) -> Option<QuadReco
         used += 6;
     }
     if field(23, 1) == 0 {
-        group = field(used, 4) as u8;
+        group = nibble(used);
         used += 4;
     }
     bits.skip(used);
@@ -217,7 +219,7 @@ fn take(bits: &mut BitReader<'_>, width: u32, guess: Pair) -> Option<Pair> {
         [u, v]
     };
     let [guess_u, guess_v] = guess;
-    Some([guess_u + unfold(u as u32), guess_v + unfold(v as u32)])
+    Some([guess_u + unfold(low_u32(u)), guess_v + unfold(low_u32(v))])
 }
 
 /// Zigzag: small numbers of either sign become small unsigned ones.
@@ -225,6 +227,16 @@ fn residual(actual: Pair, guess: Pair) -> [u32; 2] {
     let fold = |number: i32| ((number << 1) ^ (number >> 31)).cast_unsigned();
     let ([a, b], [c, d]) = (actual, guess);
     [fold((a - c).0), fold((b - d).0)]
+}
+
+/// The lowest 32 bits.
+#[inline(always)]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "a 32-bit field leaves later fields above it, which do not belong to it"
+)]
+fn low_u32(bits: u64) -> u32 {
+    bits as u32
 }
 
 #[inline(always)]

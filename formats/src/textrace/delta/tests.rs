@@ -1,3 +1,9 @@
+#![allow(
+    clippy::indexing_slicing,
+    clippy::cast_possible_truncation,
+    reason = "a test may panic"
+)]
+
 use super::*;
 use crate::textrace::{PrimitiveRun, QuadRecord};
 use proptest::prelude::*;

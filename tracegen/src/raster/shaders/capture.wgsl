@@ -312,9 +312,13 @@ fn find_cascade(world: vec3<f32>, normal: vec3<f32>) -> ShadowLookup {
 
 fn record_shadow(lane: Lane, found: ShadowLookup, world: vec3<f32>, normal: vec3<f32>) {
     let first = countOneBits(LEADERS);
-    for (var k = 0u; k < CASCADES; k++) {
-        let p = shadow_coordinates(k, world, normal);
-        _ = record_uv(lane, first + k, found.cascade == i32(k), p.xy);
+    // Almost every subgroup lies in one cascade: visit those between its nearest and farthest.
+    // The bounds are the same for all its lanes, so that control flow stays uniform.
+    let nearest = subgroupMin(select(found.cascade, 99, found.cascade < 0));
+    let farthest = subgroupMax(found.cascade);
+    for (var k = nearest; k <= farthest; k++) {
+        let p = shadow_coordinates(u32(k), world, normal);
+        _ = record_uv(lane, first + u32(k), found.cascade == k, p.xy);
     }
     // Lanes outside every cascade sample nothing; without a texture they still count.
     if LEADERS == 0u {

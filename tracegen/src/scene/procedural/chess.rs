@@ -351,7 +351,7 @@ pub fn scene() -> Scene {
     let dark = textured(&mut scene, 0.22, 0.1);
     let walnut = textured(&mut scene, 0.06, 0.3);
     let oak = textured(&mut scene, 0.02, 0.45);
-    let ivory = scene.plain("ivory", rgb(0xefe3c8), 0.18, |m| m.mirror = 0.08);
+    let ivory = scene.plain("ivory", rgb(0xe2d0a8), 0.18, |m| m.mirror = 0.04);
     let ebony = scene.plain("ebony", rgb(0x241a16), 0.12, |m| m.mirror = 0.14);
     board(&mut scene, light, dark, walnut);
     let mut table = MeshBuilder::new();
@@ -434,7 +434,7 @@ pub fn scene() -> Scene {
         0.01,
         20.0,
     );
-    scene.sun(vec3(-0.5, -0.8, -0.35), vec3(1.7, 1.6, 1.45));
-    scene.lamp(vec3(0.5, 0.7, 0.3), vec3(0.55, 0.5, 0.42));
-    scene.finish(vec3(0.5, 0.56, 0.64), 0)
+    scene.sun(vec3(-0.5, -0.8, -0.35), vec3(1.3, 1.2, 1.05));
+    scene.lamp(vec3(0.5, 0.7, 0.3), vec3(0.36, 0.32, 0.26));
+    scene.finish(vec3(0.28, 0.32, 0.38), 0)
 }

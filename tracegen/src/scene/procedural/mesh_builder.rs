@@ -411,6 +411,19 @@ impl MeshBuilder {
         }
     }
 
+    /// Drops vertices that no triangle uses.
+    pub fn drop_unused(&mut self) {
+        let mut renamed = vec![u32::MAX; self.positions.len()];
+        let old = std::mem::take(self);
+        for i in old.indices {
+            let from = i as usize;
+            if renamed[from] == u32::MAX {
+                renamed[from] = self.vertex(old.positions[from], old.normals[from], old.uvs[from]);
+            }
+            self.indices.push(renamed[from]);
+        }
+    }
+
     /// Number of triangles so far.
     #[must_use]
     pub fn triangles(&self) -> usize {

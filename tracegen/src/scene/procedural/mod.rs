@@ -4,13 +4,21 @@ pub mod atrium;
 pub mod atrium_furnishing;
 pub mod atrium_materials;
 pub mod atrium_parts;
+pub mod car;
+pub mod car_body;
 pub mod chess;
 pub mod creature;
+pub mod gears;
+pub mod glassware;
 pub mod jungle;
 pub mod jungle_plants;
 pub mod jungle_temple;
+pub mod lab;
 pub mod masonry;
+pub mod meadow;
+pub mod meadow_parts;
 pub mod mesh_builder;
+pub mod music_box;
 pub mod noise;
 pub mod organic;
 pub mod scene_builder;
@@ -29,6 +37,10 @@ const BUILDERS: &[Builder] = &[
     jungle::scene,
     teapot::scene,
     chess::scene,
+    car::scene,
+    lab::scene,
+    music_box::scene,
+    meadow::scene,
 ];
 
 /// In the order of [`BUILDERS`].
@@ -54,6 +66,22 @@ const NAMES: &[(&str, &str)] = &[
         "the Utah teapot on a polished floor, 15 K triangles",
     ),
     ("chess", "a chess set on a reflective board, 42 K triangles"),
+    (
+        "car",
+        "a sports car in a studio, paint, glass and chrome, 55 K triangles",
+    ),
+    (
+        "lab",
+        "glassware on a chemistry bench, refraction, 98 K triangles",
+    ),
+    (
+        "music-box",
+        "gears, comb and pinned cylinder in reflective brass and steel, 106 K triangles",
+    ),
+    (
+        "meadow",
+        "lavender rows before a farm house, 600 K triangles",
+    ),
 ];
 
 /// Names of the built-in scenes with a line about each.

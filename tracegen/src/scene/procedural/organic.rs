@@ -423,3 +423,28 @@ pub fn skin(colors: [Rgb; 2]) -> Surface {
         }
     })
 }
+
+/// A bottle's paper label with a border and lines of writing.
+#[must_use]
+pub fn paper_label(paper: Rgb, ink: Rgb) -> Surface {
+    Box::new(move |u, v| {
+        let noise = bank();
+        let rim = u.min(1.0 - u).min(v.min(1.0 - v));
+        let border = smoothstep(0.012, 0.0, (rim - 0.06).abs());
+        let line = (v * 9.0) as i32;
+        let (start, end) = (0.15, 0.55 + 0.3 * hash_unit(line, 4, 8));
+        let letter = noise
+            .grain
+            .at(u * 0.35, line as f32 * 0.137 + 0.01 * (v * 9.0).fract());
+        let inside = (start..end).contains(&u)
+            && (2..8).contains(&line)
+            && (0.25..0.7).contains(&(v * 9.0).fract());
+        let written = if inside {
+            smoothstep(0.5, 0.6, letter)
+        } else {
+            0.0
+        };
+        let color = shade(paper, 0.85 + 0.2 * noise.cloud.at(u * 0.5, v * 0.5));
+        Texel::new(mix(color, ink, border.max(written)), 0.0, 0.9)
+    })
+}

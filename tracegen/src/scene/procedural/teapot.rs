@@ -64,7 +64,7 @@ pub fn scene() -> Scene {
     ])
     .into_iter();
     let glaze = scene.plain("glaze", rgb(0xc9482e), 0.12, |m| {
-        m.mirror = 0.16;
+        m.mirror = 0.08;
         m.double_sided = true;
     });
     scene.add("teapot", teapot(), glaze);
@@ -102,7 +102,7 @@ pub fn scene() -> Scene {
         0.02,
         20.0,
     );
-    scene.sun(vec3(-0.45, -0.8, -0.4), vec3(2.2, 2.1, 1.9));
-    scene.lamp(vec3(-0.7, 0.9, 0.6), vec3(0.9, 0.95, 1.1));
-    scene.finish(vec3(0.42, 0.52, 0.66), 0)
+    scene.sun(vec3(-0.45, -0.8, -0.4), vec3(1.6, 1.5, 1.35));
+    scene.lamp(vec3(-0.7, 0.9, 0.6), vec3(0.5, 0.53, 0.6));
+    scene.finish(vec3(0.24, 0.30, 0.38), 0)
 }

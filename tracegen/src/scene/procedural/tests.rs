@@ -14,6 +14,10 @@ const TRIANGLES: &[(&str, std::ops::RangeInclusive<u64>)] = &[
     ("jungle", 300_000..=450_000),
     ("teapot", 14_700..=15_300),
     ("chess", 41_160..=42_840),
+    ("car", 53_900..=56_100),
+    ("lab", 96_040..=99_960),
+    ("music-box", 103_880..=108_120),
+    ("meadow", 588_000..=612_000),
 ];
 
 /// All built-in scenes, built once for all tests.

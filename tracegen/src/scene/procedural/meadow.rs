@@ -1,0 +1,630 @@
+//! Lavender rows before a farm house, after Provence: 600 K triangles.
+
+use super::jungle_plants::{boughs, buttressed_trunk};
+use super::masonry::{dressed_stone, plaster, roof_tiles};
+use super::meadow_parts as parts;
+use super::mesh_builder::MeshBuilder;
+use super::noise::{Rng, bank, smoothstep};
+use super::organic::{bark, planks, rock, soil, turf, upright};
+use super::scene_builder::{MaterialId, SceneBuilder};
+use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use crate::scene::Scene;
+use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+/// Triangles that the scene is filled up to.
+const TRIANGLES: u64 = 600_000;
+/// Where the farm house stands.
+const HOUSE: Vec3 = vec3(7.5, 0.0, -27.0);
+/// Distance between rows in metres.
+const ROW: f32 = 1.7;
+
+/// Height of the ground in metres.
+fn ground(x: f32, z: f32) -> f32 {
+    let noise = bank();
+    let swell = noise.cloud.smooth(x / 260.0 + 0.37, z / 260.0 + 0.11) - 0.5;
+    let hills = 9.0 * smoothstep(45.0, 130.0, vec2(x, z + 10.0).length());
+    let yard = smoothstep(7.0, 16.0, vec2(x - HOUSE.x, z - HOUSE.z).length());
+    yard * (1.6 * swell + hills * (0.6 + 1.4 * swell.abs())) + 0.012 * -z.min(0.0) * yard
+}
+
+struct Kit {
+    field: MaterialId,
+    grass_ground: MaterialId,
+    walls: MaterialId,
+    plaster: MaterialId,
+    roof: MaterialId,
+    wood: MaterialId,
+    shutter: MaterialId,
+    stone: MaterialId,
+    bark: MaterialId,
+    stem: MaterialId,
+    lavender: [MaterialId; 2],
+    grass: MaterialId,
+    straw: MaterialId,
+    poppy: MaterialId,
+    leaf: MaterialId,
+    olive: MaterialId,
+    cypress: MaterialId,
+    pane: MaterialId,
+}
+
+fn kit(scene: &mut SceneBuilder) -> Kit {
+    let recipe = |name, tile_m, surface| Recipe {
+        name,
+        size: 1024,
+        maps: Maps::Color,
+        tile_m,
+        surface,
+    };
+    let mut sets = synthesize_all(&[
+        recipe(
+            "lavender-field",
+            3.4,
+            soil([rgb(0x9a6a44), rgb(0xb98a5c)], None, 0.5),
+        ),
+        recipe(
+            "grassland",
+            8.0,
+            turf([rgb(0x55662a), rgb(0x84883f)], rgb(0xa98a5c)),
+        ),
+        recipe(
+            "farm-stone",
+            2.4,
+            dressed_stone([rgb(0xc9b28c), rgb(0xa89068)], 5, 9, 0.7),
+        ),
+        recipe(
+            "ochre-plaster",
+            3.0,
+            plaster(rgb(0xdcb884), rgb(0xb39a74), 0.6),
+        ),
+        recipe(
+            "clay-tiles",
+            1.5,
+            roof_tiles([rgb(0xc07048), rgb(0x9a5236)]),
+        ),
+        recipe(
+            "door-wood",
+            1.2,
+            upright(planks([rgb(0x7a5230), rgb(0x523420)], 7, 0.7)),
+        ),
+        recipe(
+            "blue-shutters",
+            0.8,
+            planks([rgb(0x6f92b4), rgb(0x4f7498)], 12, 0.6),
+        ),
+        recipe(
+            "field-stone",
+            1.6,
+            rock([rgb(0x9c9484), rgb(0xb8b09c)], 0.25),
+        ),
+        recipe("bark", 1.6, bark([rgb(0x4a3c2e), rgb(0x8c7a62)], 0.2)),
+    ])
+    .into_iter();
+    let mut textured = |scene: &mut SceneBuilder| match sets.next() {
+        Some(set) => scene.textured(set, |m| m.roughness = 0.9),
+        None => scene.plain("missing", rgb(0xff_00ff), 0.8, |_| {}),
+    };
+    let field = textured(scene);
+    let grass_ground = textured(scene);
+    let walls = textured(scene);
+    let plaster = textured(scene);
+    let roof = textured(scene);
+    let wood = textured(scene);
+    let shutter = textured(scene);
+    let stone = textured(scene);
+    let bark = textured(scene);
+    let leafy = |scene: &mut SceneBuilder, name: &str, color: u32| {
+        scene.plain(name, rgb(color), 0.7, |m| m.double_sided = true)
+    };
+    Kit {
+        field,
+        grass_ground,
+        walls,
+        plaster,
+        roof,
+        wood,
+        shutter,
+        stone,
+        bark,
+        stem: leafy(scene, "lavender-stem", 0x7d9070),
+        lavender: [
+            leafy(scene, "lavender-flower", 0x7a58b8),
+            leafy(scene, "lavender-pale", 0x9678cc),
+        ],
+        grass: leafy(scene, "grass", 0x7f9a3e),
+        straw: leafy(scene, "straw", 0xc2aa60),
+        poppy: leafy(scene, "poppy", 0xd8301c),
+        leaf: leafy(scene, "oak-leaf", 0x587f30),
+        olive: leafy(scene, "olive-leaf", 0x8a9a70),
+        cypress: leafy(scene, "cypress", 0x365426),
+        pane: scene.plain("window-pane", rgb(0x20282e), 0.05, |m| m.mirror = 0.35),
+    }
+}
+
+fn upright_at(x: f32, z: f32, turn: f32, scale: f32) -> Affine3A {
+    Affine3A::from_scale_rotation_translation(
+        Vec3::splat(scale),
+        Quat::from_rotation_y(turn),
+        vec3(x, ground(x, z), z),
+    )
+}
+
+/// The scene.
+#[must_use]
+pub fn scene() -> Scene {
+    let mut scene = SceneBuilder::new("meadow");
+    let kit = kit(&mut scene);
+    let mut rng = Rng::new(600);
+    land(&mut scene, &kit);
+    farm_house(&mut scene, &kit);
+    garden_wall(&mut scene, &kit, &mut rng);
+    trees(&mut scene, &kit, &mut rng);
+    lavender(&mut scene, &kit, &mut rng);
+    grass_and_poppies(&mut scene, &kit, &mut rng);
+    let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.55, z);
+    scene.camera(
+        "default",
+        eye(0.85, 6.6),
+        vec3(2.6, 0.75, -14.0),
+        0.1,
+        400.0,
+    );
+    scene.camera(
+        "yard",
+        eye(1.5, -17.5),
+        HOUSE + vec3(0.5, 2.2, 0.0),
+        0.1,
+        400.0,
+    );
+    scene.camera(
+        "rows",
+        vec3(-4.2, ground(-4.2, 3.0) + 0.9, 3.0),
+        vec3(-3.0, 0.4, -8.0),
+        0.05,
+        400.0,
+    );
+    scene.sun(vec3(0.55, -0.62, -0.42), vec3(2.3, 2.1, 1.75));
+    scene.finish(vec3(0.36, 0.52, 0.78), 0)
+}
+
+fn land(scene: &mut SceneBuilder, kit: &Kit) {
+    let mut far = MeshBuilder::new();
+    far.surface(96, 96, |s, t| {
+        // Cells widen with distance.
+        let spread = |a: f32| (2.0 * a - 1.0).abs().powf(1.7) * (2.0 * a - 1.0).signum();
+        let (x, z) = (125.0 * spread(s), -10.0 - 125.0 * spread(t));
+        (vec3(x, ground(x, z) - 0.05, z), vec2(x, z + 10.0))
+    });
+    scene.add("grassland", far, kit.grass_ground);
+    let mut field = MeshBuilder::new();
+    field.surface(60, 120, |s, t| {
+        let (x, z) = (-17.0 + 34.0 * s, 5.2 - 26.0 * t);
+        let ridge = 0.10 * (TAU * x / ROW).cos();
+        let rim = smoothstep(0.0, 0.03, s.min(1.0 - s).min(t).min(1.0 - t));
+        (
+            vec3(x, ground(x, z) - 0.12 + (0.14 + ridge) * rim, z),
+            vec2(x, z + 8.0),
+        )
+    });
+    scene.add("field", field, kit.field);
+}
+
+/// A wall of thickness 0.5 m in the x-y plane from (0, 0) to `size`, with rectangular openings
+/// (x, y, width, height); outside is +z.
+fn wall(size: glam::Vec2, openings: &[[f32; 4]]) -> MeshBuilder {
+    let mut cuts_x = vec![0.0, size.x];
+    let mut cuts_y = vec![0.0, size.y];
+    for o in openings {
+        cuts_x.extend([o[0], o[0] + o[2]]);
+        cuts_y.extend([o[1], o[1] + o[3]]);
+    }
+    for cuts in [&mut cuts_x, &mut cuts_y] {
+        cuts.sort_by(f32::total_cmp);
+        cuts.dedup();
+    }
+    let mut m = MeshBuilder::new();
+    for x in cuts_x.windows(2) {
+        for y in cuts_y.windows(2) {
+            let (cx, cy) = (0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
+            let open = openings
+                .iter()
+                .any(|o| (o[0]..o[0] + o[2]).contains(&cx) && (o[1]..o[1] + o[3]).contains(&cy));
+            if !open {
+                let (w, h) = (x[1] - x[0], y[1] - y[0]);
+                m.quad(
+                    vec3(x[0], y[0], 0.0),
+                    Vec3::X * w,
+                    Vec3::Y * h,
+                    vec2(x[0], -y[0]),
+                );
+            }
+        }
+    }
+    for &[x, y, w, h] in openings {
+        let deep = Vec3::Z * -0.32;
+        m.quad(vec3(x, y, 0.0), deep, Vec3::Y * h, vec2(0.0, 0.0));
+        m.quad(
+            vec3(x + w, y, 0.0) + deep,
+            -deep,
+            Vec3::Y * h,
+            vec2(0.0, 0.0),
+        );
+        m.quad(vec3(x, y, 0.0), Vec3::X * w, deep, vec2(0.0, 0.0));
+        m.quad(
+            vec3(x, y + h, 0.0) + deep,
+            Vec3::X * w,
+            -deep,
+            vec2(0.0, 0.0),
+        );
+    }
+    m
+}
+
+fn farm_house(scene: &mut SceneBuilder, kit: &Kit) {
+    let (w, d, h) = (9.0f32, 6.0f32, 4.9f32);
+    // Front (+z), back, left, right; openings of the front: door and windows on two floors.
+    let front: Vec<[f32; 4]> = vec![
+        [4.0, 0.0, 1.15, 2.25],
+        [1.2, 0.95, 1.0, 1.35],
+        [6.8, 0.95, 1.0, 1.35],
+        [1.2, 3.2, 0.95, 1.15],
+        [4.1, 3.2, 0.95, 1.15],
+        [6.8, 3.2, 0.95, 1.15],
+    ];
+    let side: Vec<[f32; 4]> = vec![
+        [1.3, 0.95, 0.95, 1.3],
+        [3.7, 0.95, 0.95, 1.3],
+        [2.5, 3.2, 0.9, 1.1],
+    ];
+    let corner =
+        |turn: f32, at: Vec3| Affine3A::from_rotation_translation(Quat::from_rotation_y(turn), at);
+    let facades = [
+        (
+            vec2(w, h),
+            &front,
+            corner(0.0, vec3(-w / 2.0, 0.0, d / 2.0)),
+        ),
+        (
+            vec2(w, h),
+            &front,
+            corner(std::f32::consts::PI, vec3(w / 2.0, 0.0, -d / 2.0)),
+        ),
+        (
+            vec2(d, h),
+            &side,
+            corner(-FRAC_PI_2, vec3(-w / 2.0, 0.0, -d / 2.0)),
+        ),
+        (
+            vec2(d, h),
+            &side,
+            corner(FRAC_PI_2, vec3(w / 2.0, 0.0, d / 2.0)),
+        ),
+    ];
+    let (mut walls, mut frames, mut panes, mut shutters, mut door) = (
+        MeshBuilder::new(),
+        MeshBuilder::new(),
+        MeshBuilder::new(),
+        MeshBuilder::new(),
+        MeshBuilder::new(),
+    );
+    for (size, openings, place) in &facades {
+        walls.merge(&wall(*size, openings), *place);
+        for &[x, y, ow, oh] in openings.iter() {
+            let mut f = MeshBuilder::new();
+            f.block(
+                vec3(x - 0.14, y + oh, -0.02),
+                vec3(x + ow + 0.14, y + oh + 0.22, 0.04),
+                0.012,
+            );
+            if y > 0.0 {
+                f.block(
+                    vec3(x - 0.14, y - 0.12, -0.05),
+                    vec3(x + ow + 0.14, y, 0.09),
+                    0.015,
+                );
+                let mut bars = MeshBuilder::new();
+                for (a, b) in [
+                    (
+                        vec3(x + ow * 0.5 - 0.025, y, -0.3),
+                        vec3(x + ow * 0.5 + 0.025, y + oh, -0.24),
+                    ),
+                    (
+                        vec3(x, y + oh * 0.5 - 0.02, -0.3),
+                        vec3(x + ow, y + oh * 0.5 + 0.02, -0.25),
+                    ),
+                ] {
+                    bars.block(a, b, 0.006);
+                }
+                shutters.merge(&bars, *place);
+                let mut pane = MeshBuilder::new();
+                pane.quad(
+                    vec3(x, y, -0.29),
+                    Vec3::X * ow,
+                    Vec3::Y * oh,
+                    vec2(0.0, 0.0),
+                );
+                panes.merge(&pane, *place);
+                for s in [-1.0f32, 1.0] {
+                    let near = if s < 0.0 {
+                        x - 0.03 - ow * 0.5
+                    } else {
+                        x + ow + 0.03
+                    };
+                    let mut leaf = MeshBuilder::new();
+                    leaf.block(
+                        vec3(near, y, 0.015),
+                        vec3(near + ow * 0.5, y + oh, 0.06),
+                        0.008,
+                    );
+                    for k in 0..9 {
+                        let ly = y + oh * (0.08 + 0.095 * k as f32);
+                        leaf.block(
+                            vec3(near + 0.05, ly, 0.055),
+                            vec3(near + ow * 0.5 - 0.05, ly + 0.055, 0.075),
+                            0.006,
+                        );
+                    }
+                    shutters.merge(&leaf, *place);
+                }
+            } else {
+                let mut leaf = MeshBuilder::new();
+                leaf.block(vec3(x, y, -0.3), vec3(x + ow, y + oh, -0.22), 0.02);
+                door.merge(&leaf, *place);
+                f.block(
+                    vec3(x - 0.3, -0.4, 0.0),
+                    vec3(x + ow + 0.3, 0.02, 0.55),
+                    0.03,
+                );
+            }
+            frames.merge(&f, *place);
+        }
+    }
+    // Gables and the tiled roof.
+    let rise = 1.75;
+    for s in [-1.0f32, 1.0] {
+        let x = s * w / 2.0;
+        let mut gable = MeshBuilder::new();
+        let corners = [
+            vec3(x, h, s * d / 2.0),
+            vec3(x, h, -s * d / 2.0),
+            vec3(x, h + rise, 0.0),
+        ];
+        let v = corners.map(|p| gable.vertex(p, Vec3::X * s, vec2(-s * p.z, -p.y)));
+        gable.triangle(v[0], v[1], v[2]);
+        walls.merge(&gable, Affine3A::IDENTITY);
+    }
+    let mut roof = MeshBuilder::new();
+    let slope = vec2(d / 2.0 + 0.5, rise + 0.5 * rise / (d / 2.0));
+    let tilt = slope.x.atan2(slope.y);
+    for turn in [0.0f32, std::f32::consts::PI] {
+        let sheet = parts::tiled_slope(vec2(w + 0.7, slope.length() + 0.05), 40, 15);
+        let eave = vec3(0.0, h - 0.5 * rise / (d / 2.0) + 0.02, d / 2.0 + 0.5);
+        let lay = Affine3A::from_rotation_translation(Quat::from_rotation_x(-tilt), eave);
+        roof.merge(&sheet, Affine3A::from_rotation_y(turn) * lay);
+    }
+    roof.tube(
+        &[
+            (vec3(-w / 2.0 - 0.35, h + rise + 0.02, 0.0), 0.13),
+            (vec3(w / 2.0 + 0.35, h + rise + 0.02, 0.0), 0.13),
+        ],
+        12,
+    );
+    let mut chimney = MeshBuilder::new();
+    chimney.block(
+        vec3(2.3, h + 0.6, -0.4),
+        vec3(3.0, h + rise + 1.0, 0.25),
+        0.03,
+    );
+    chimney.block(
+        vec3(2.2, h + rise + 1.0, -0.5),
+        vec3(3.1, h + rise + 1.14, 0.35),
+        0.03,
+    );
+    // A lower barn leans on the right.
+    let mut barn = MeshBuilder::new();
+    barn.block(
+        vec3(w / 2.0, -0.4, -2.6),
+        vec3(w / 2.0 + 4.2, 2.9, 2.2),
+        0.02,
+    );
+    let barn_roof = parts::tiled_slope(vec2(4.7, 5.3), 20, 12);
+    let lay = Affine3A::from_rotation_translation(
+        Quat::from_rotation_x(-1.38),
+        vec3(w / 2.0 + 2.15, 2.85, 2.5),
+    );
+    roof.merge(&barn_roof, lay);
+    let place = Affine3A::from_rotation_translation(
+        Quat::from_rotation_y(-0.32),
+        HOUSE + Vec3::Y * (ground(HOUSE.x, HOUSE.z) + 0.05),
+    );
+    for (name, mesh, material) in [
+        ("house-walls", walls, kit.plaster),
+        ("house-frames", frames, kit.stone),
+        ("house-panes", panes, kit.pane),
+        ("house-shutters", shutters, kit.shutter),
+        ("house-door", door, kit.wood),
+        ("house-roof", roof, kit.roof),
+        ("house-chimney", chimney, kit.walls),
+        ("house-barn", barn, kit.walls),
+    ] {
+        let mesh = scene.mesh(name, mesh, material);
+        scene.place(mesh, place);
+    }
+}
+
+/// A dry-stone wall along the edge of the yard, with a gap for the gate.
+fn garden_wall(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+    let mut m = MeshBuilder::new();
+    for course in 0..4 {
+        let mut x = -9.0;
+        while x < 16.0 {
+            let w = rng.range(0.28, 0.62);
+            let middle = x + 0.5 * w;
+            if !(1.2..3.6).contains(&middle) {
+                let (z, y) = (
+                    -20.8 + rng.jitter(0.03),
+                    0.21 * course as f32 + ground(middle, -20.8) - 0.08,
+                );
+                let mut stone = MeshBuilder::new();
+                let (half, height) = (0.5 * w - 0.008, 0.2 + rng.jitter(0.012));
+                stone.block(vec3(-half, 0.0, -0.2), vec3(half, height, 0.2), 0.035);
+                let turn = Quat::from_rotation_y(rng.jitter(0.06))
+                    * Quat::from_rotation_z(rng.jitter(0.03));
+                m.merge(
+                    &stone,
+                    Affine3A::from_rotation_translation(turn, vec3(middle, y, z)),
+                );
+            }
+            x += w;
+        }
+    }
+    scene.add("garden-wall", m, kit.stone);
+}
+
+fn trees(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+    let oaks: Vec<[usize; 3]> = (0..3)
+        .map(|i| {
+            let (height, radius) = ([5.2, 4.2, 3.4][i], [3.4, 2.7, 2.3][i]);
+            let foliage = if i == 2 { kit.olive } else { kit.leaf };
+            [
+                scene.mesh(
+                    "trunk",
+                    buttressed_trunk(0.26, height, 5.0, [18, 10], 40 + i as u64),
+                    kit.bark,
+                ),
+                scene.mesh(
+                    "boughs",
+                    boughs(height * 0.85, radius, 8, 0.10, rng),
+                    kit.bark,
+                ),
+                scene.mesh(
+                    "crown",
+                    parts::crown(4200, height + 0.2, radius, rng),
+                    foliage,
+                ),
+            ]
+        })
+        .collect();
+    let spots = [
+        (-6.5, -24.0, 0),
+        (-12.5, -27.5, 1),
+        (-18.5, -23.0, 0),
+        (1.2, -33.0, 1),
+        (17.5, -33.5, 0),
+        (19.5, -22.0, 2),
+        (-21.0, -10.0, 2),
+        (21.5, -9.0, 2),
+        (-30.0, -36.0, 1),
+        (28.0, -40.0, 0),
+    ];
+    for (x, z, kind) in spots {
+        let place = upright_at(x, z, rng.range(0.0, TAU), rng.range(0.9, 1.15));
+        for mesh in oaks[kind] {
+            scene.place(mesh, place);
+        }
+    }
+    let spire = scene.mesh("cypress", parts::cypress(2600, 7.5, 0.85, rng), kit.cypress);
+    for (x, z) in [
+        (0.9, -24.6),
+        (14.3, -22.2),
+        (15.8, -24.0),
+        (17.0, -26.4),
+        (-2.4, -28.5),
+        (-26.0, -30.0),
+        (-28.0, -30.8),
+        (33.0, -34.0),
+    ] {
+        scene.place(
+            spire,
+            upright_at(x, z, rng.range(0.0, TAU), rng.range(0.85, 1.2)),
+        );
+    }
+}
+
+fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+    let bushes =
+        |scene: &mut SceneBuilder, stalks: usize, spike: f32, rng: &mut Rng| -> Vec<[usize; 2]> {
+            (0..4)
+                .map(|i| {
+                    let [green, purple] = parts::lavender(stalks, 0.52, spike, rng);
+                    [
+                        scene.mesh("lavender-stems", green, kit.stem),
+                        scene.mesh("lavender-flowers", purple, kit.lavender[i % 2]),
+                    ]
+                })
+                .collect()
+        };
+    let near = bushes(scene, 112, 0.0095, rng);
+    let far = bushes(scene, 36, 0.014, rng);
+    for row in -9i32..=9 {
+        let x = row as f32 * ROW;
+        let mut z = 4.6;
+        while z > -19.6 {
+            let close = vec2(x - 0.85, z - 6.6).length() < 12.0;
+            let kinds = if close { &near } else { &far };
+            let kind = kinds[rng.below(kinds.len())];
+            let place = upright_at(
+                x + rng.jitter(0.06),
+                z,
+                rng.range(0.0, TAU),
+                rng.range(0.9, 1.2),
+            );
+            for mesh in kind {
+                scene.place(mesh, place);
+            }
+            z -= 0.58 + rng.jitter(0.06);
+        }
+    }
+}
+
+fn grass_and_poppies(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+    let poppies: Vec<[usize; 2]> = (0..3)
+        .map(|_| {
+            let [green, red] = parts::poppy(0.42, rng);
+            [
+                scene.mesh("poppy-stem", green, kit.grass),
+                scene.mesh("poppy-petals", red, kit.poppy),
+            ]
+        })
+        .collect();
+    for _ in 0..320 {
+        let (x, z) = (rng.jitter(8.0), rng.range(4.9, 8.6));
+        if vec2(x - 0.85, z - 6.6).length() < 0.9 {
+            continue;
+        }
+        let place = upright_at(x, z, rng.range(0.0, TAU), rng.range(0.8, 1.2));
+        for mesh in poppies[rng.below(3)] {
+            scene.place(mesh, place);
+        }
+    }
+    let blades = 11;
+    let tufts: Vec<usize> = (0..6)
+        .map(|i| {
+            let material = if i % 3 == 2 { kit.straw } else { kit.grass };
+            scene.mesh("tuft", parts::tuft(blades, 0.30, rng), material)
+        })
+        .collect();
+    // Grass takes what is left of the triangles.
+    let left = TRIANGLES.saturating_sub(scene.triangles()) / (3 * blades as u64);
+    for i in 0..left {
+        let (x, z) = match i % 5 {
+            // Before the field, along its sides, in the yard, and between the rows.
+            0 | 4 => (rng.jitter(8.0), rng.range(4.6, 8.2)),
+            1 => (
+                (17.2 + rng.range(0.0, 9.0)) * rng.jitter(1.0).signum(),
+                rng.range(-24.0, 8.0),
+            ),
+            2 => (rng.range(-16.0, 22.0), rng.range(-31.0, -20.2)),
+            _ => (
+                (rng.below(18) as f32 - 8.5) * ROW + rng.jitter(0.25),
+                rng.range(-19.5, 4.8),
+            ),
+        };
+        let size = if i % 5 == 3 { 0.45 } else { 1.0 };
+        scene.place(
+            tufts[rng.below(tufts.len())],
+            upright_at(x, z, rng.range(0.0, TAU), size * rng.range(0.7, 1.3)),
+        );
+    }
+}
