@@ -8,6 +8,7 @@ mod experiment_args;
 pub mod info;
 mod paper;
 mod report;
+mod reproject;
 mod run;
 mod sweep;
 #[cfg(test)]
@@ -56,6 +57,8 @@ enum Command {
     Sweep(sweep::Args),
     /// Write the experiment as one self-contained page, with JSON and CSV beside it.
     Report(Box<report::Args>),
+    /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
+    Reproject(Box<reproject::ReprojectArgs>),
 }
 
 /// Parses the command line and runs it. Errors go to stderr.
@@ -71,6 +74,7 @@ pub fn main() -> ExitCode {
         Command::Paper(args) => paper::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Reproject(args) => reproject::run(*args),
     };
     match outcome {
         Ok(code) => code,

@@ -5,5 +5,6 @@ pub mod files;
 pub mod html;
 pub mod picture;
 pub mod plots;
+pub mod sgrt;
 pub mod theme;
 pub mod z2;

@@ -1,0 +1,321 @@
+//! `replay reproject`: ray traces through the model of a ray-tracing GPU that reuses the left
+//! image for the right one.
+
+use crate::image::{Picture, png};
+use crate::report::files::write_atomically;
+use crate::report::sgrt::{self as report, Entry, Thumbnails};
+use crate::result::TraceId;
+use crate::sgrt::analyse::{Analysed, Analysis, curve_rules};
+use crate::sgrt::compose::Reuse;
+use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
+use crate::sgrt::frame::RaySource;
+use crate::sgrt::reject::Rule;
+use crate::sgrt::result::{Config, PaperValues, Report, SCHEMA};
+use crate::sgrt::{DEFAULT_RULE, paper, picture};
+use anyhow::{Context, ensure};
+use clap::Args;
+use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
+use formats::view::Eye;
+use std::error::Error;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Arguments of `replay reproject`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:
+  replay reproject teapot.raytrace
+  replay reproject teapot.raytrace --rule none --image plain.png --json
+  replay reproject *.raytrace --html out/reprojection.html
+  replay reproject chess.raytrace --curve --sensitivity --html chess.html")]
+pub struct ReprojectArgs {
+    /// Ray traces.
+    #[arg(value_name = "FILE", required_unless_present = "print_config")]
+    files: Vec<PathBuf>,
+    /// Which reprojected pixels are rejected and traced: `none` (the paper's plain reuse), or
+    /// `depth[=SHARE]` (behind a neighbour), `row[=SHARE]` (behind a surface of its row), `object`
+    /// (no neighbour of its object), `opaque` (its material has alpha cut-outs), `silhouette` (a neighbour of another object), `triangle` (the
+    /// right-eye ray misses the reused triangle), `triangles` (and those around it), joined by `+`.
+    #[arg(long, value_name = "RULE", default_value = DEFAULT_RULE)]
+    rule: Rule,
+    /// What a reused pixel takes over.
+    #[arg(long, value_enum, default_value_t = Reuse::Primary)]
+    reuse: Reuse,
+    /// Model parameters (TOML) that differ from the defaults.
+    #[arg(long, value_name = "TOML")]
+    config: Option<PathBuf>,
+    /// Prints the parameters in use, with their comments where they are the defaults, and ends.
+    #[arg(long)]
+    print_config: bool,
+    /// Adds cycles saved against image error over rules and levels of reuse.
+    #[arg(long)]
+    curve: bool,
+    /// Adds what halving and doubling each parameter does to the ratios.
+    #[arg(long)]
+    sensitivity: bool,
+    /// Prints JSON: one object, or one a line for several files.
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Prints CSV: a row for the rule and one for plain reuse, per file.
+    #[arg(long)]
+    csv: bool,
+    /// Writes the right image, its bad pixels in yellow and its FLIP map side by side (one file).
+    #[arg(long, value_name = "PNG")]
+    image: Option<PathBuf>,
+    /// Writes a report with charts and pictures.
+    #[arg(long, value_name = "HTML")]
+    html: Option<PathBuf>,
+    /// Worker threads; results do not depend on it.
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+}
+
+/// A ray trace file as the model reads it.
+struct TraceFile(Raytrace);
+
+impl RaySource for TraceFile {
+    fn tables(&self) -> &RaytraceTables {
+        self.0.tables()
+    }
+
+    fn tile(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        Ok(self.0.decode_tile(eye, index, tile)?)
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A file that cannot be read, parameters that cannot be used, an output that cannot be written.
+pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
+    super::set_threads(args.threads)?;
+    let config = read_config(args.config.as_deref())?;
+    if args.print_config {
+        let text = match args.config {
+            None => DEFAULT_TOML.to_owned(),
+            Some(_) => toml::to_string(&config)?,
+        };
+        super::print(&text)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    ensure!(
+        args.image.is_none() || args.files.len() == 1,
+        "--image: expected one FILE, found {}",
+        args.files.len()
+    );
+    let mut entries = Vec::new();
+    for (i, path) in args.files.iter().enumerate() {
+        if std::io::stderr().is_terminal() {
+            eprintln!("[{}/{}] {}", i + 1, args.files.len(), path.display());
+        }
+        entries.push(analyse(path, &args, &config)?);
+    }
+    if let Some(path) = &args.html {
+        write_atomically(path, report::page(&entries)?.as_bytes())?;
+    }
+    let reports = entries.iter().map(|e| &e.report);
+    let text = if args.json {
+        let lines: Result<Vec<String>, _> = match entries.len() {
+            1 => reports.map(serde_json::to_string_pretty).collect(),
+            _ => reports.map(serde_json::to_string).collect(),
+        };
+        lines?.join("\n") + "\n"
+    } else if args.csv {
+        report::csv(&entries)
+    } else {
+        report::text(&entries)
+    };
+    super::print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
+    let Some(path) = path else {
+        return Ok(SgrtConfig::default());
+    };
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("{}: cannot read the parameters", path.display()))?;
+    SgrtConfig::from_overrides(&text).with_context(|| path.display().to_string())
+}
+
+fn analyse(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
+    let file = TraceFile(Raytrace::open(path)?);
+    let in_file = || path.display().to_string();
+    let analysis = Analysis::load(&file).with_context(in_file)?;
+    let ours = analysis
+        .run(&args.rule, args.reuse, config)
+        .with_context(in_file)?;
+    let plain = analysis
+        .run(&Rule::default(), args.reuse, config)
+        .with_context(in_file)?;
+    if let Some(image) = &args.image {
+        write_atomically(image, &png::encode(&triptych(&analysis, &ours))?)?;
+    }
+    let meta = &analysis.frame().tables.meta;
+    let report = Report {
+        schema: SCHEMA.to_owned(),
+        tool: concat!("replay ", env!("CARGO_PKG_VERSION")).to_owned(),
+        trace: TraceId {
+            scene: meta.trace.scene.clone(),
+            checksum: format!("{:08x}", file.0.file_checksum()),
+        },
+        scene_triangles: meta.trace.scene_triangles,
+        eye_size_px: analysis.frame().size_px,
+        config: Config {
+            rule: args.rule,
+            reuse: args.reuse,
+            cache_misses: analysis.cache_misses().to_owned(),
+            model: config.clone(),
+        },
+        paper: paper::counterpart(&meta.trace.scene).map(|p| PaperValues {
+            scene: p.name.to_owned(),
+            relative_performance: p.relative_performance,
+            relative_energy: p.relative_energy,
+        }),
+        curve: if args.curve {
+            analysis.curve(&curve_rules(), config)
+        } else {
+            Vec::new()
+        },
+        sensitivity: if args.sensitivity {
+            analysis
+                .sensitivity(&ours, args.reuse, config)
+                .with_context(in_file)?
+        } else {
+            Vec::new()
+        },
+        result: ours.outcome.clone(),
+        plain: plain.outcome.clone(),
+    };
+    let pictures = if args.html.is_some() {
+        Some(thumbnails(&analysis, &ours, &plain)?)
+    } else {
+        None
+    };
+    Ok(Entry { report, pictures })
+}
+
+/// The right image, its bad pixels, and its error.
+fn triptych(analysis: &Analysis, ours: &Analysed) -> Picture {
+    let bad = picture::bad_pixels(analysis.frame(), &ours.decisions, &ours.picture);
+    Picture::side_by_side(&[&ours.picture, &bad, &ours.flip.picture()], 8)
+}
+
+fn thumbnails(
+    analysis: &Analysis,
+    ours: &Analysed,
+    plain: &Analysed,
+) -> anyhow::Result<Thumbnails> {
+    let frame = analysis.frame();
+    let small = |p: &Picture| png::encode(&p.shrunk_to(report::THUMBNAIL_PX));
+    Ok(Thumbnails {
+        left: small(&analysis.left())?,
+        bad: small(&picture::bad_pixels(frame, &ours.decisions, &ours.picture))?,
+        flip: small(&ours.flip.picture())?,
+        plain_bad: small(&picture::bad_pixels(
+            frame,
+            &plain.decisions,
+            &plain.picture,
+        ))?,
+        plain_flip: small(&plain.flip.picture())?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sgrt::synthetic::{View, globe, trace, wall};
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        args: ReprojectArgs,
+    }
+
+    fn args(list: &[&str]) -> ReprojectArgs {
+        let words = std::iter::once("reproject").chain(list.iter().copied());
+        Cli::try_parse_from(words).expect("valid arguments").args
+    }
+
+    /// A small trace in a folder of its own.
+    fn trace_file() -> (tempfile::TempDir, String) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.raytrace");
+        let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
+        scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
+        let bytes = trace(&scene, View::default()).to_bytes();
+        std::fs::write(&path, bytes).expect("written");
+        (folder, path.display().to_string())
+    }
+
+    #[test]
+    fn a_trace_file_gives_the_result_of_the_trace_in_memory() {
+        let (_folder, path) = trace_file();
+        let args = args(&[&path]);
+        let entry = analyse(Path::new(&path), &args, &SgrtConfig::default()).expect("analysed");
+        let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
+        scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
+        let source = trace(&scene, View::default());
+        let direct = Analysis::load(&source)
+            .expect("loads")
+            .run(&args.rule, args.reuse, &SgrtConfig::default())
+            .expect("runs");
+        assert_eq!(entry.report.result, direct.outcome);
+        assert!(entry.report.result.reuse_pct > 80.0);
+    }
+
+    #[test]
+    fn picture_and_page_are_written_beside_nothing_else() {
+        let (folder, path) = trace_file();
+        let out = |name: &str| folder.path().join(name).display().to_string();
+        let (png, html) = (out("a.png"), out("a.html"));
+        run(args(&[&path, "--image", &png, "--html", &html, "--json"])).expect("runs");
+        let picture = image::open(&png).expect("a picture").into_rgb8();
+        assert_eq!(picture.dimensions(), (3 * 72 + 2 * 8, 40));
+        assert!(
+            std::fs::read_to_string(&html)
+                .expect("a page")
+                .contains("91.54")
+        );
+        assert_eq!(
+            std::fs::read_dir(folder.path()).expect("a folder").count(),
+            3
+        );
+    }
+
+    #[test]
+    fn a_damaged_trace_is_refused_and_nothing_is_written() {
+        let (folder, path) = trace_file();
+        let bytes = std::fs::read(&path).expect("readable");
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("written");
+        let html = folder.path().join("a.html");
+        let error = run(args(&[&path, "--html", &html.display().to_string()])).unwrap_err();
+        assert!(format!("{error:#}").contains("a.raytrace"), "{error:#}");
+        assert!(!html.exists());
+    }
+
+    #[test]
+    fn one_picture_of_several_files_is_refused() {
+        let error = run(args(&["a", "b", "--image", "c.png"])).unwrap_err();
+        assert_eq!(error.to_string(), "--image: expected one FILE, found 2");
+    }
+
+    #[test]
+    fn parameters_that_cannot_be_used_name_file_and_key() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("p.toml");
+        std::fs::write(&path, "[tni]\nunits = 0\n").expect("written");
+        let error = read_config(Some(&path)).unwrap_err();
+        let text = format!("{error:#}");
+        assert!(
+            text.contains("p.toml") && text.contains("tni.units"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,44 @@
+//! Peak signal-to-noise ratio of 8-bit pictures.
+
+use super::Picture;
+
+/// Decibels for identical pictures, where the ratio is infinite (JSON has no infinity).
+pub const IDENTICAL_DB: f64 = 100.0;
+
+/// `10 log10(255^2 / MSE)` over all pixels and channels, at most [`IDENTICAL_DB`].
+#[must_use]
+pub fn psnr_db(reference: &Picture, test: &Picture) -> f64 {
+    let channels = |p: &Picture| 3 * p.pixels.len();
+    let count = channels(reference).min(channels(test));
+    let squares: u64 = reference
+        .pixels
+        .iter()
+        .flatten()
+        .zip(test.pixels.iter().flatten())
+        .map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2))
+        .sum();
+    if squares == 0 || count == 0 {
+        return IDENTICAL_DB;
+    }
+    let mean_square = squares as f64 / count as f64;
+    (10.0 * (255.0 * 255.0 / mean_square).log10()).min(IDENTICAL_DB)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_pictures::noise;
+    use super::*;
+
+    #[test]
+    fn one_code_of_difference_everywhere_is_48_db() {
+        let a = Picture::filled([4, 4], [10; 3]);
+        let b = Picture::filled([4, 4], [11; 3]);
+        assert!((psnr_db(&a, &b) - 48.1308).abs() < 1e-4);
+    }
+
+    #[test]
+    fn identical_pictures_have_the_cap() {
+        let a = noise([9, 7], 3);
+        assert_eq!(psnr_db(&a, &a), IDENTICAL_DB);
+    }
+}

@@ -1,0 +1,42 @@
+//! Pictures for the metrics' tests.
+
+use super::Picture;
+
+/// Uniform noise from a seed.
+pub fn noise(size_px: [u32; 2], seed: u32) -> Picture {
+    let mut state = seed.wrapping_mul(0x9E37_79B9) | 1;
+    let mut picture = Picture::filled(size_px, [0; 3]);
+    for channel in picture.pixels.iter_mut().flatten() {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        *channel = (state >> 11) as u8;
+    }
+    picture
+}
+
+/// Smooth colour, hard edges and fine lines.
+pub fn scene_like(size_px: [u32; 2]) -> Picture {
+    let mut picture = Picture::filled(size_px, [0; 3]);
+    for (i, pixel) in picture.pixels.iter_mut().enumerate() {
+        let (x, y) = (i as u32 % size_px[0], i as u32 / size_px[0]);
+        let disc = (x as i32 - 40).pow(2) + (y as i32 - 25).pow(2) < 200;
+        *pixel = match (disc, y % 9) {
+            (true, _) => [230, (3 * y) as u8, 20],
+            (false, 0) => [15, 15, 15],
+            _ => [(2 * x) as u8, 120, (255 - 2 * y) as u8],
+        };
+    }
+    picture
+}
+
+/// The picture moved right by some pixels, its left edge repeated.
+pub fn shifted(picture: &Picture, by_px: usize) -> Picture {
+    let width = picture.width();
+    let mut out = picture.clone();
+    for (i, pixel) in out.pixels.iter_mut().enumerate() {
+        let x = i % width;
+        *pixel = picture.pixels[i - x + x.saturating_sub(by_px)];
+    }
+    out
+}

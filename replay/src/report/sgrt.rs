@@ -1,0 +1,220 @@
+//! Tables, charts, CSV and page of stereo reprojection on a ray-tracing GPU.
+
+mod charts;
+mod tables;
+
+use crate::report::html::{Section, folded, page as html_page};
+use crate::report::plots::{PlotError, data_uri};
+use crate::sgrt::paper;
+use crate::sgrt::result::Report;
+use maud::{Markup, html};
+
+pub use tables::csv;
+
+/// Longest edge of a picture on the page.
+pub const THUMBNAIL_PX: u32 = 560;
+
+/// A trace's results with its pictures.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// The figures.
+    pub report: Report,
+    /// PNG files, where a page is wanted.
+    pub pictures: Option<Thumbnails>,
+}
+
+/// PNG files of one trace.
+#[derive(Clone, Debug)]
+pub struct Thumbnails {
+    /// The left image.
+    pub left: Vec<u8>,
+    /// The right image with its bad pixels in yellow.
+    pub bad: Vec<u8>,
+    /// Its FLIP map.
+    pub flip: Vec<u8>,
+    /// The same under plain reuse.
+    pub plain_bad: Vec<u8>,
+    /// The same under plain reuse.
+    pub plain_flip: Vec<u8>,
+}
+
+/// The whole page.
+///
+/// # Errors
+/// A chart that cannot be drawn.
+pub fn page(entries: &[Entry]) -> Result<String, PlotError> {
+    let lead = html! {
+        p {
+            "The left image is traced in full; its hits are reprojected into the right eye and "
+            "reused where error detection lets them stand. Ratios are against the same hardware "
+            "that traces both eyes in full. Paper: Lee et al., \u{201c}Fast Stereoscopic "
+            "Rendering on Mobile Ray Tracing GPU for Virtual Reality Applications\u{201d}."
+        }
+    };
+    Ok(html_page(
+        "Stereo reprojection on a mobile ray-tracing GPU",
+        &lead,
+        &sections(entries)?,
+    ))
+}
+
+/// The sections, for a page that holds more than these.
+///
+/// # Errors
+/// A chart that cannot be drawn.
+pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
+    let mut out = vec![
+        Section::new("Performance and energy", performance(entries)?),
+        Section::new("Reuse and image error", accuracy(entries)),
+        Section::new("Units, cores and memory", hardware(entries)),
+    ];
+    for entry in entries {
+        let scene = &entry.report.trace.scene;
+        if let Some(pictures) = &entry.pictures {
+            out.push(Section::new(
+                format!("Pictures: {scene}"),
+                picture_row(entry, pictures),
+            ));
+        }
+        if !entry.report.curve.is_empty() {
+            out.push(Section::new(
+                format!("Cycles against error: {scene}"),
+                curve(entry)?,
+            ));
+        }
+        if !entry.report.sensitivity.is_empty() {
+            out.push(Section::new(
+                format!("Sensitivity: {scene}"),
+                html! {
+                    p {
+                        "The paper publishes none of these parameters. Each is halved and doubled "
+                        "alone (of a hit rate, the misses); rows are by effect."
+                    }
+                    (tables::sensitivity(&entry.report).markup())
+                },
+            ));
+        }
+    }
+    if let Some(entry) = entries.first() {
+        let config = toml::to_string(&entry.report.config).unwrap_or_default();
+        out.push(Section::new(
+            "Configuration",
+            folded("All parameters", &config),
+        ));
+    }
+    Ok(out)
+}
+
+/// The tables for a terminal.
+#[must_use]
+pub fn text(entries: &[Entry]) -> String {
+    let mut out = String::new();
+    let mut part = |title: &str, table: String| {
+        out.push_str(title);
+        out.push('\n');
+        out.push_str(table.trim_end_matches('\n'));
+        out.push_str("\n\n");
+    };
+    part(
+        "Performance and energy",
+        tables::performance(entries).text(),
+    );
+    part("Reuse and image error", tables::accuracy(entries).text());
+    part("Right pixels by class", tables::classes(entries).text());
+    part("G-buffer traffic", tables::traffic(entries).text());
+    for entry in entries {
+        let scene = &entry.report.trace.scene;
+        if !entry.report.curve.is_empty() {
+            let title = format!("Cycles against error: {scene}");
+            part(&title, tables::curve(&entry.report).text());
+        }
+        if !entry.report.sensitivity.is_empty() {
+            let title = format!("Sensitivity: {scene}");
+            part(&title, tables::sensitivity(&entry.report).text());
+        }
+    }
+    out.truncate(out.trim_end().len());
+    out.push('\n');
+    out
+}
+
+fn performance(entries: &[Entry]) -> Result<Markup, PlotError> {
+    Ok(html! {
+        (charts::ratios(entries)?)
+        (tables::performance(entries).markup())
+        p {
+            "The paper's average reuse is " (paper::REUSE_PCT) " %, its units' work falls by about "
+            (paper::TNI_REDUCTION_PCT) " % and its cores' work grows by about "
+            (paper::SRP_OVERHEAD_PCT) " %. Its unit counts, latencies, cache sizes and energies "
+            "are not published; ours are parameters, the same for all scenes. "
+            "\u{201c}Units alone\u{201d} is the ratio of unit cycles. Only primary hits are "
+            "reused, so the share of primary rays in all steps bounds what can be saved: a scene "
+            "with many shadow, reflection and refraction rays gains little however much is reused."
+        }
+    })
+}
+
+fn accuracy(entries: &[Entry]) -> Markup {
+    html! {
+        p {
+            "FLIP (0 to 1) compares the right image with the fully traced one at the display's "
+            "pixels per degree (ppd). Percentages are of all right pixels. A position error is the "
+            "distance between reused and true hit over the pixel's width at that depth."
+        }
+        (tables::accuracy(entries).markup())
+        (tables::classes(entries).markup())
+    }
+}
+
+fn hardware(entries: &[Entry]) -> Markup {
+    html! {
+        (tables::work(entries).markup())
+        (tables::traffic(entries).markup())
+        (tables::energy(entries).markup())
+    }
+}
+
+fn picture_row(entry: &Entry, pictures: &Thumbnails) -> Markup {
+    let report = &entry.report;
+    let figure = |png: &[u8], caption: String| {
+        html! {
+            figure {
+                img src=(data_uri::png(png)) alt=(caption) style="max-width:100%";
+                figcaption { (caption) }
+            }
+        }
+    };
+    let flip = |o: &crate::sgrt::result::Outcome| {
+        format!(
+            "FLIP, mean {:.4} at {:.1} ppd (black none, yellow largest)",
+            o.flip_mean, o.pixels_per_degree
+        )
+    };
+    let (ours, plain) = (&report.result, &report.plain);
+    html! {
+        div.row {
+            (figure(&pictures.left, "Left image, traced".to_owned()))
+            (figure(&pictures.bad, format!(
+                "Right image, rule {}: {:.2} % reused, yellow is traced",
+                report.config.rule, ours.reuse_pct
+            )))
+            (figure(&pictures.flip, flip(ours)))
+        }
+        div.row {
+            (figure(&pictures.plain_bad, format!(
+                "Right image, plain reuse: {:.2} % reused, yellow is traced", plain.reuse_pct
+            )))
+            (figure(&pictures.plain_flip, flip(plain)))
+        }
+    }
+}
+
+fn curve(entry: &Entry) -> Result<Markup, PlotError> {
+    Ok(html! {
+        (charts::curve(&entry.report)?)
+        (tables::curve(&entry.report).markup())
+    })
+}
+
+#[cfg(test)]
+mod tests;

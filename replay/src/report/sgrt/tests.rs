@@ -1,0 +1,107 @@
+use super::*;
+use crate::result::TraceId;
+use crate::sgrt::analyse::{Analysis, curve_rules};
+use crate::sgrt::compose::Reuse;
+use crate::sgrt::config::SgrtConfig;
+use crate::sgrt::reject::Rule;
+use crate::sgrt::result::{Config, PaperValues, SCHEMA};
+use crate::sgrt::synthetic::{View, globe, trace, wall};
+
+fn entry() -> Entry {
+    let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
+    scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
+    let source = trace(&scene, View::default());
+    let analysis = Analysis::load(&source).expect("loads");
+    let model = SgrtConfig::default();
+    let rule: Rule = crate::sgrt::DEFAULT_RULE.parse().expect("a rule");
+    let run = |rule: &Rule| analysis.run(rule, Reuse::Primary, &model).expect("runs");
+    let (ours, plain) = (run(&rule), run(&Rule::default()));
+    let png = crate::image::png::encode(&ours.picture).expect("a picture");
+    Entry {
+        report: Report {
+            schema: SCHEMA.to_owned(),
+            tool: "replay test".to_owned(),
+            trace: TraceId {
+                scene: "scenes/teapot.obj".to_owned(),
+                checksum: "0badcafe".to_owned(),
+            },
+            scene_triangles: 1,
+            eye_size_px: [72, 40],
+            paper: Some(PaperValues {
+                scene: "Teapot".to_owned(),
+                relative_performance: 1.64,
+                relative_energy: 0.96,
+            }),
+            curve: analysis.curve(&curve_rules()[..3], &model),
+            sensitivity: analysis
+                .sensitivity(&ours, Reuse::Primary, &model)
+                .expect("runs"),
+            config: Config {
+                rule,
+                reuse: Reuse::Primary,
+                cache_misses: "rates".to_owned(),
+                model,
+            },
+            result: ours.outcome,
+            plain: plain.outcome,
+        },
+        pictures: Some(Thumbnails {
+            left: png.clone(),
+            bad: png.clone(),
+            flip: png.clone(),
+            plain_bad: png.clone(),
+            plain_flip: png,
+        }),
+    }
+}
+
+#[test]
+fn the_page_shows_both_charts_the_pictures_and_the_papers_values() {
+    let page = page(&[entry(), entry()]).expect("a page");
+    for needle in [
+        "Relative performance",
+        "Relative energy",
+        "91.54",
+        "data:image/png;base64,",
+        "Cycles against error",
+        "Sensitivity",
+        "tni.units",
+        "dram_pj_per_byte",
+    ] {
+        assert!(page.contains(needle), "{needle}");
+    }
+}
+
+#[test]
+fn csv_has_as_many_cells_in_each_row_as_in_its_heading() {
+    let text = csv(&[entry()]);
+    let widths: Vec<usize> = text.lines().map(|l| l.split(',').count()).collect();
+    assert_eq!(widths.len(), 3);
+    assert!(widths.iter().all(|w| *w == widths[0]), "{widths:?}");
+}
+
+#[test]
+fn json_holds_the_agreed_fields() {
+    let json = serde_json::to_value(entry().report).expect("json");
+    assert_eq!(json["schema"], "replay.reproject/1");
+    for field in [
+        "reuse_pct",
+        "wrong_object_pct",
+        "relative_performance",
+        "relative_energy",
+        "tni_cycles",
+        "srp_cycles",
+        "flip_mean",
+        "psnr_db",
+    ] {
+        assert!(json["result"][field].is_number(), "{field}");
+    }
+    assert_eq!(json["config"]["rule"], crate::sgrt::DEFAULT_RULE);
+}
+
+#[test]
+fn the_terminal_tables_name_scene_and_rule() {
+    let text = text(&[entry()]);
+    assert!(text.contains("teapot") && text.contains("none (plain reuse)"));
+    assert!(text.ends_with('\n') && !text.ends_with("\n\n"));
+}

@@ -1,0 +1,137 @@
+//! Reused hits against the traced truth.
+
+use super::frame::{Frame, Sample};
+use super::reject::{Decision, PixelClass};
+use formats::raytrace::EyeCamera;
+use formats::view::Eye;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Pixels of one class and what is wrong with them. Percentages elsewhere are of all right pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ClassCounts {
+    /// Samples of the class.
+    pub pixels: u64,
+    /// Reused hit is on another object than the true one, sky counted as an object.
+    pub wrong_object: u64,
+    /// Right object, another triangle, and farther off than [`POSITION_LIMITS_PX`]'s first.
+    pub wrong_primitive: u64,
+    /// Right object, position off by more than each of [`POSITION_LIMITS_PX`].
+    pub position_over: [u64; 2],
+}
+
+/// Position errors that are counted, in pixels.
+pub const POSITION_LIMITS_PX: [f32; 2] = [1.0, 2.0];
+
+/// All classes and the position error of reused hits on the right object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Accuracy {
+    /// The only arrival, reused.
+    pub reused: ClassCounts,
+    /// Nearest of several arrivals, reused.
+    pub overlapped: ClassCounts,
+    /// Nothing arrived; traced.
+    pub missing: ClassCounts,
+    /// Rejected; traced.
+    pub bad: ClassCounts,
+    /// Mean position error, pixels.
+    pub position_mean_px: f64,
+    /// 99th percentile of the position error, pixels.
+    pub position_p99_px: f64,
+}
+
+impl Accuracy {
+    /// Right samples.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.reused.pixels + self.overlapped.pixels + self.missing.pixels + self.bad.pixels
+    }
+
+    /// Counts of reused samples, overlapped ones included.
+    #[must_use]
+    pub fn all_reused(&self) -> ClassCounts {
+        let (a, b) = (&self.reused, &self.overlapped);
+        ClassCounts {
+            pixels: a.pixels + b.pixels,
+            wrong_object: a.wrong_object + b.wrong_object,
+            wrong_primitive: a.wrong_primitive + b.wrong_primitive,
+            position_over: std::array::from_fn(|i| a.position_over[i] + b.position_over[i]),
+        }
+    }
+
+    /// A count as a percentage of all right samples.
+    #[must_use]
+    pub fn pct(&self, count: u64) -> f64 {
+        if self.total() == 0 {
+            return 0.0;
+        }
+        100.0 * count as f64 / self.total() as f64
+    }
+}
+
+/// Distance between the reused hit and the true one over the pixel's width at the true hit's
+/// depth, in pixels: grazing surfaces stretch it. The sky has none; between sky and surface it is
+/// infinite.
+#[must_use]
+pub fn position_error_px(
+    eye: &EyeCamera,
+    decision: &Decision,
+    left: &Sample,
+    truth: &Sample,
+) -> f32 {
+    match (decision.primitive == super::frame::SKY, truth.is_sky()) {
+        (true, true) => return 0.0,
+        (false, false) => {}
+        _ => return f32::INFINITY,
+    }
+    let reused = glam::Vec3::from(decision.exact.unwrap_or(left.position));
+    let actual = glam::Vec3::from(truth.position);
+    let depth = (actual - glam::Vec3::from(eye.position)).dot(glam::Vec3::from(eye.forward));
+    let pixel_m = depth * (eye.fov.left + eye.fov.right) / eye.size_px[0] as f32;
+    reused.distance(actual) / pixel_m
+}
+
+/// Counts the classes and the errors.
+#[must_use]
+pub fn assess(frame: &Frame, decisions: &[Decision]) -> Accuracy {
+    let eye = frame.tables.camera(Eye::Right);
+    let mut accuracy = Accuracy::default();
+    // NaN marks samples without a position error.
+    let errors: Vec<f32> = decisions
+        .par_iter()
+        .zip(&frame.right().samples)
+        .map(|(decision, truth)| {
+            if !decision.class.is_reused() {
+                return f32::NAN;
+            }
+            let left = &frame.left().samples[decision.source as usize];
+            position_error_px(eye, decision, left, truth)
+        })
+        .collect();
+    for ((decision, truth), error) in decisions.iter().zip(&frame.right().samples).zip(&errors) {
+        let counts = match decision.class {
+            PixelClass::Reused => &mut accuracy.reused,
+            PixelClass::Overlapped => &mut accuracy.overlapped,
+            PixelClass::Missing => &mut accuracy.missing,
+            PixelClass::Bad => &mut accuracy.bad,
+        };
+        counts.pixels += 1;
+        if !decision.class.is_reused() {
+            continue;
+        }
+        let left = &frame.left().samples[decision.source as usize];
+        if left.object != truth.object {
+            counts.wrong_object += 1;
+            continue;
+        }
+        for (count, limit) in counts.position_over.iter_mut().zip(POSITION_LIMITS_PX) {
+            *count += u64::from(*error > limit);
+        }
+        let elsewhere = *error > POSITION_LIMITS_PX[0];
+        counts.wrong_primitive += u64::from(decision.primitive != truth.primitive && elsewhere);
+    }
+    let finite: Vec<f32> = errors.into_iter().filter(|e| e.is_finite()).collect();
+    accuracy.position_mean_px = crate::image::mean(&finite);
+    accuracy.position_p99_px = f64::from(crate::image::quantile(&finite, 0.99));
+    accuracy
+}

@@ -1,0 +1,396 @@
+//! The model's parameters, read from TOML. Defaults and their reasons: `data/sgrt-default.toml`.
+
+use serde::{Deserialize, Serialize};
+
+/// The default parameters with their comments.
+pub const DEFAULT_TOML: &str = include_str!("../../data/sgrt-default.toml");
+
+/// All parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SgrtConfig {
+    /// Traversal and intersection units.
+    pub tni: Tni,
+    /// Caches of the hierarchy's nodes and triangles.
+    pub cache: Cache,
+    /// External memory.
+    pub memory: Memory,
+    /// Programmable cores.
+    pub srp: Srp,
+    /// G-buffer record.
+    pub gbuffer: Gbuffer,
+    /// Energy per operation.
+    pub energy: Energy,
+}
+
+/// Fixed-function traversal and intersection.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tni {
+    /// Units.
+    pub units: u32,
+    /// Clock.
+    pub clock_mhz: f64,
+    /// Traversal pipelines of a unit.
+    pub trv_pipelines: u32,
+    /// Issue cycles of a step.
+    pub trv_cycles_per_step: f64,
+    /// Stages of a traversal pipeline.
+    pub trv_depth_cycles: u32,
+    /// Intersection pipelines of a unit.
+    pub ist_pipelines: u32,
+    /// Issue cycles of a ray-triangle test.
+    pub ist_cycles_per_test: f64,
+    /// Stages of an intersection pipeline.
+    pub ist_depth_cycles: u32,
+    /// Rays that a unit holds in flight.
+    pub rays_in_flight: u32,
+    /// Rays that a unit takes in or hands back in a cycle.
+    pub rays_per_cycle: f64,
+}
+
+/// Caches of the hierarchy.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cache {
+    /// Node cache of a unit.
+    pub node_l1_bytes: u64,
+    /// Triangle cache of a unit.
+    pub triangle_l1_bytes: u64,
+    /// Ways of both.
+    pub l1_ways: u32,
+    /// Cache that all units share.
+    pub l2_bytes: u64,
+    /// Its ways.
+    pub l2_ways: u32,
+    /// Line size of all.
+    pub line_bytes: u64,
+    /// Cycles from an L1 miss to data out of the L2.
+    pub l2_latency_cycles: u32,
+    /// Node visits that hit the L1, where the trace has no addresses.
+    pub node_l1_hit_rate: HitRates,
+    /// Triangle visits that hit the L1, where the trace has no addresses.
+    pub triangle_l1_hit_rate: HitRates,
+    /// L1 misses that hit the L2, where the trace has no addresses.
+    pub l2_hit_rate: HitRates,
+}
+
+/// A hit rate by class of ray, 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HitRates {
+    /// Primary rays.
+    pub primary: f64,
+    /// Shadow rays of primary hits.
+    pub shadow: f64,
+    /// Everything further down the ray tree.
+    pub secondary: f64,
+}
+
+/// External memory.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Memory {
+    /// Peak bandwidth, 10^9 bytes a second.
+    pub bandwidth_gb_s: f64,
+    /// Latency of a read.
+    pub latency_ns: f64,
+}
+
+/// Programmable cores and the kernels' costs in cycles of one lane.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Srp {
+    /// Cores.
+    pub cores: u32,
+    /// Lanes of a core.
+    pub lanes_per_core: u32,
+    /// Clock.
+    pub clock_mhz: f64,
+    /// Per ray generated.
+    pub ray_generation_cycles: f64,
+    /// Per closest-hit ray, hit or miss.
+    pub shading_cycles: f64,
+    /// Per alpha look-up.
+    pub alpha_test_cycles: f64,
+    /// Per left pixel projected into the right eye.
+    pub reproject_cycles: f64,
+    /// Per right pixel tested.
+    pub detect_cycles: f64,
+    /// Per right pixel reused.
+    pub reuse_cycles: f64,
+}
+
+/// Bytes of a G-buffer record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gbuffer {
+    /// Colour.
+    pub color_bytes: u32,
+    /// Normal.
+    pub normal_bytes: u32,
+    /// Texture coordinates.
+    pub texcoord_bytes: u32,
+    /// Position.
+    pub position_bytes: u32,
+    /// Primitive and object number.
+    pub ids_bytes: u32,
+    /// What error detection reads of each pixel of the row.
+    pub row_bytes: u32,
+}
+
+impl Gbuffer {
+    /// Bytes of a whole record.
+    #[must_use]
+    pub fn record_bytes(&self) -> u64 {
+        [
+            self.color_bytes,
+            self.normal_bytes,
+            self.texcoord_bytes,
+            self.position_bytes,
+            self.ids_bytes,
+        ]
+        .into_iter()
+        .map(u64::from)
+        .sum()
+    }
+}
+
+/// Energy per operation and per byte.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Energy {
+    /// Per traversal step.
+    pub step_pj: f64,
+    /// Per ray-triangle test.
+    pub triangle_test_pj: f64,
+    /// Per ray taken in and handed back.
+    pub ray_pj: f64,
+    /// Per cycle of one lane of a programmable core.
+    pub srp_lane_cycle_pj: f64,
+    /// Per byte read from an L1.
+    pub l1_pj_per_byte: f64,
+    /// Per byte read from the L2.
+    pub l2_pj_per_byte: f64,
+    /// Per byte moved in or out of the tile G-buffer.
+    pub sram_pj_per_byte: f64,
+    /// Per byte moved in or out of external memory.
+    pub dram_pj_per_byte: f64,
+    /// Power that flows whatever is done.
+    pub static_mw: f64,
+    /// DRAM bytes of attributes and texels per shaded hit.
+    pub shading_dram_bytes: f64,
+    /// DRAM bytes of the frame buffer per pixel.
+    pub frame_buffer_bytes: f64,
+}
+
+/// Parameters that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// Not TOML, an unknown key, or a value of the wrong type.
+    #[error("{0}")]
+    Toml(#[from] toml::de::Error),
+    /// A value outside its range.
+    #[error("{key}: expected {expected}, found {found}")]
+    Range {
+        /// Dotted name.
+        key: String,
+        /// What is allowed.
+        expected: &'static str,
+        /// What the file says.
+        found: String,
+    },
+}
+
+impl Default for SgrtConfig {
+    fn default() -> Self {
+        // A test holds that the embedded file parses.
+        toml::from_str(DEFAULT_TOML).expect("the embedded defaults parse")
+    }
+}
+
+impl SgrtConfig {
+    /// The defaults with a file's values laid over them.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the key and what was expected.
+    pub fn from_overrides(text: &str) -> Result<Self, ConfigError> {
+        let mut table: toml::Table = toml::from_str(DEFAULT_TOML)?;
+        overlay(&mut table, toml::from_str(text)?);
+        let config: Self = table.try_into()?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Checks every value against its range.
+    ///
+    /// # Errors
+    /// `ConfigError::Range` for the first value outside.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        for (key, value) in self.numbers() {
+            let rate = key.contains("hit_rate");
+            let cost = key.starts_with("energy.") || key.starts_with("gbuffer.");
+            let kernel = key.starts_with("srp.") && key.ends_with("_cycles");
+            let (expected, fits) = if rate {
+                ("a rate from 0 to 1", (0.0..=1.0).contains(&value))
+            } else if cost || kernel {
+                ("a number of at least 0", value >= 0.0)
+            } else {
+                ("a number above 0", value > 0.0)
+            };
+            if !fits || !value.is_finite() {
+                return Err(ConfigError::Range {
+                    key,
+                    expected,
+                    found: value.to_string(),
+                });
+            }
+        }
+        let c = &self.cache;
+        for (key, bytes, ways) in [
+            ("cache.node_l1_bytes", c.node_l1_bytes, c.l1_ways),
+            ("cache.triangle_l1_bytes", c.triangle_l1_bytes, c.l1_ways),
+            ("cache.l2_bytes", c.l2_bytes, c.l2_ways),
+        ] {
+            let set = c.line_bytes.saturating_mul(u64::from(ways));
+            if !bytes.is_multiple_of(set) || !(bytes / set).is_power_of_two() {
+                return Err(ConfigError::Range {
+                    key: key.to_owned(),
+                    expected: "a power of two of sets (ways x line_bytes each)",
+                    found: format!("{bytes} bytes over sets of {set} bytes"),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Every parameter by its dotted name, in file order.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<(String, f64)> {
+        let mut out = Vec::new();
+        if let Ok(table) = toml::Table::try_from(self) {
+            collect("", &table, &mut out);
+        }
+        out
+    }
+
+    /// A copy with one parameter scaled; whole numbers are rounded and stay at least 1, rates stay
+    /// rates (their miss rate is scaled). `None` for an unknown name.
+    #[must_use]
+    pub fn scaled(&self, key: &str, factor: f64) -> Option<Self> {
+        let mut table = toml::Table::try_from(self).ok()?;
+        let mut parts = key.split('.').peekable();
+        let mut at = &mut table;
+        while let Some(part) = parts.next() {
+            let value = at.get_mut(part)?;
+            if parts.peek().is_some() {
+                at = value.as_table_mut()?;
+                continue;
+            }
+            *value = match *value {
+                toml::Value::Integer(n) => {
+                    toml::Value::Integer(((n as f64 * factor).round() as i64).max(1))
+                }
+                toml::Value::Float(x) if key.contains("hit_rate") => {
+                    toml::Value::Float((1.0 - (1.0 - x) * factor).clamp(0.0, 1.0))
+                }
+                toml::Value::Float(x) => toml::Value::Float(x * factor),
+                _ => return None,
+            };
+            return table.try_into().ok();
+        }
+        None
+    }
+}
+
+fn overlay(base: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (base.get_mut(&key), value) {
+            (Some(toml::Value::Table(b)), toml::Value::Table(o)) => overlay(b, o),
+            // A whole number is fine where the default is a fraction.
+            (Some(slot @ toml::Value::Float(_)), toml::Value::Integer(n)) => {
+                *slot = toml::Value::Float(n as f64);
+            }
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}
+
+fn collect(prefix: &str, table: &toml::Table, out: &mut Vec<(String, f64)>) {
+    for (key, value) in table {
+        let name = format!("{prefix}{key}");
+        match value {
+            toml::Value::Table(inner) => collect(&format!("{name}."), inner, out),
+            toml::Value::Integer(n) => out.push((name, *n as f64)),
+            toml::Value::Float(x) => out.push((name, *x)),
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_embedded_defaults_pass_their_own_check() {
+        SgrtConfig::default().check().expect("valid");
+    }
+
+    #[test]
+    fn a_file_may_name_only_what_it_changes() {
+        let config = SgrtConfig::from_overrides("[tni]\nunits = 8\nclock_mhz = 700\n").expect("ok");
+        assert_eq!(config.tni.units, 8);
+        assert_eq!(config.tni.clock_mhz, 700.0);
+        assert_eq!(config.srp, SgrtConfig::default().srp);
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_by_name() {
+        let error = SgrtConfig::from_overrides("[tni]\ncolour = 8\n").unwrap_err();
+        assert!(error.to_string().contains("colour"), "{error}");
+    }
+
+    #[test]
+    fn a_value_out_of_range_says_key_expected_and_found() {
+        let error = SgrtConfig::from_overrides("[memory]\nlatency_ns = -1.0\n").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "memory.latency_ns: expected a number above 0, found -1"
+        );
+        let error = SgrtConfig::from_overrides("[cache]\nl2_bytes = 100000\n").unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .starts_with("cache.l2_bytes: expected a power of two")
+        );
+    }
+
+    #[test]
+    fn scaling_keeps_counts_whole_and_rates_rates() {
+        let base = SgrtConfig::default();
+        assert_eq!(
+            base.scaled("tni.ist_pipelines", 0.5)
+                .expect("known")
+                .tni
+                .ist_pipelines,
+            1
+        );
+        assert_eq!(base.scaled("tni.units", 2.0).expect("known").tni.units, 8);
+        let scaled = base
+            .scaled("cache.l2_hit_rate.primary", 2.0)
+            .expect("known");
+        assert!((scaled.cache.l2_hit_rate.primary - 0.7).abs() < 1e-12);
+        assert!(base.scaled("no.such", 2.0).is_none());
+    }
+
+    #[test]
+    fn every_parameter_can_be_scaled() {
+        let base = SgrtConfig::default();
+        for (key, _) in base.numbers() {
+            assert!(base.scaled(&key, 2.0).is_some(), "{key}");
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! A whole stereo frame of a ray trace: what each pixel sees and what its rays cost.
+
+use super::work::PixelWork;
+use formats::raytrace::{RayTile, RaytraceTables};
+use formats::view::{Eye, TILE_SIZE_PX};
+use rayon::prelude::*;
+use std::error::Error;
+
+/// Object and primitive number of a pixel that sees the sky.
+pub const SKY: u32 = u32::MAX;
+
+/// Anything that tiles of a ray trace come from.
+pub trait RaySource: Sync {
+    /// Everything but the tiles.
+    fn tables(&self) -> &RaytraceTables;
+
+    /// Decodes a tile of an eye into `tile`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the tile, saying where.
+    fn tile(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), Box<dyn Error + Send + Sync>>;
+}
+
+/// A frame that could not be put together.
+#[derive(Debug, thiserror::Error)]
+pub enum FrameError {
+    /// The source could not give a tile.
+    #[error("{eye:?} eye, tile {tile}: {source}")]
+    Tile {
+        /// Eye asked for.
+        eye: Eye,
+        /// Tile number.
+        tile: u32,
+        /// Why.
+        source: Box<dyn Error + Send + Sync>,
+    },
+    /// A tile has another number of pixel records than its size asks for.
+    #[error("{eye:?} eye, tile {tile}: expected {expected} pixel records, found {found}")]
+    Pixels {
+        /// Eye asked for.
+        eye: Eye,
+        /// Tile number.
+        tile: u32,
+        /// Width times height times samples.
+        expected: usize,
+        /// Records there.
+        found: usize,
+    },
+    /// Sizes that reprojection cannot work with.
+    #[error("eyes: expected two images of one size above 0, found {left:?} and {right:?}")]
+    Size {
+        /// Left image.
+        left: [u32; 2],
+        /// Right image.
+        right: [u32; 2],
+    },
+}
+
+/// What a sample of a pixel sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Hit position relative to the trace's origin; for the sky the unit direction towards it.
+    pub position: [f32; 3],
+    /// Primitive, or [`SKY`].
+    pub primitive: u32,
+    /// Object, or [`SKY`].
+    pub object: u32,
+    /// Material; 0 for the sky.
+    pub material: u32,
+    /// Radiance that any eye sees alike, linear RGB.
+    pub view_independent: [f32; 3],
+    /// The rest, linear RGB.
+    pub view_dependent: [f32; 3],
+}
+
+impl Sample {
+    /// True where nothing was hit.
+    #[must_use]
+    pub fn is_sky(&self) -> bool {
+        self.primitive == SKY
+    }
+
+    /// Traced colour, linear RGB.
+    #[must_use]
+    pub fn color(&self) -> [f32; 3] {
+        add(self.view_independent, self.view_dependent)
+    }
+}
+
+/// Sum of two colours.
+#[must_use]
+pub fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|c| a[c] + b[c])
+}
+
+/// One eye, row by row, `samples_per_px` entries a pixel.
+#[derive(Clone, Debug, Default)]
+pub struct EyeFrame {
+    /// What is seen.
+    pub samples: Vec<Sample>,
+    /// What it cost to trace.
+    pub work: Vec<PixelWork>,
+}
+
+/// Both eyes, traced in full.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The trace's tables.
+    pub tables: RaytraceTables,
+    /// Left and right eye.
+    pub eyes: [EyeFrame; 2],
+    /// Width and height of an eye's image in pixels.
+    pub size_px: [u32; 2],
+    /// Samples per pixel, at least 1.
+    pub samples_per_px: u32,
+}
+
+impl Frame {
+    /// Decodes all tiles of both eyes.
+    ///
+    /// # Errors
+    /// [`FrameError`] for the first tile that cannot be read.
+    pub fn load(source: &dyn RaySource) -> Result<Self, FrameError> {
+        let tables = source.tables().clone();
+        let [left, right] = [Eye::Left, Eye::Right].map(|e| tables.camera(e).size_px);
+        if left != right || left.contains(&0) {
+            return Err(FrameError::Size { left, right });
+        }
+        let samples_per_px = tables.meta.samples_per_px.max(1);
+        let load = |eye| load_eye(source, eye, left, samples_per_px as usize);
+        let eyes = [load(Eye::Left)?, load(Eye::Right)?];
+        Ok(Self {
+            tables,
+            eyes,
+            size_px: left,
+            samples_per_px,
+        })
+    }
+
+    /// The left eye.
+    #[must_use]
+    pub fn left(&self) -> &EyeFrame {
+        &self.eyes[0]
+    }
+
+    /// The right eye.
+    #[must_use]
+    pub fn right(&self) -> &EyeFrame {
+        &self.eyes[1]
+    }
+
+    /// Samples of an eye: pixels times samples per pixel.
+    #[must_use]
+    pub fn sample_count(&self) -> usize {
+        self.size_px[0] as usize * self.size_px[1] as usize * self.samples_per_px as usize
+    }
+
+    /// Sample numbers of the pixels of a tile, row by row.
+    pub fn tile_samples(&self, tile: u32) -> impl Iterator<Item = usize> + use<> {
+        let ([x, y], [w, h]) = self.tables.tile_rect(tile);
+        let (width, spp) = (self.size_px[0] as usize, self.samples_per_px as usize);
+        (y..y + h).flat_map(move |row| {
+            let first = (row as usize * width + x as usize) * spp;
+            first..first + w as usize * spp
+        })
+    }
+
+    /// Averages per-sample colours to an image, linear RGB.
+    #[must_use]
+    pub fn resolve(&self, colors: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let spp = self.samples_per_px as usize;
+        if spp == 1 {
+            return colors.to_vec();
+        }
+        let average = |samples: &[[f32; 3]]| {
+            let sum = samples.iter().fold([0.0; 3], |a, b| add(a, *b));
+            sum.map(|c| c / spp as f32)
+        };
+        colors.par_chunks_exact(spp).map(average).collect()
+    }
+}
+
+fn load_eye(
+    source: &dyn RaySource,
+    eye: Eye,
+    [width, height]: [u32; 2],
+    spp: usize,
+) -> Result<EyeFrame, FrameError> {
+    let tables = source.tables();
+    let camera = tables.camera(eye);
+    let columns = width.div_ceil(TILE_SIZE_PX);
+    let count = width as usize * height as usize * spp;
+    let empty = Sample {
+        position: [0.0; 3],
+        primitive: SKY,
+        object: SKY,
+        material: 0,
+        view_independent: [0.0; 3],
+        view_dependent: [0.0; 3],
+    };
+    let mut samples = vec![empty; count];
+    let mut work = vec![PixelWork::default(); count];
+    let band = width as usize * TILE_SIZE_PX as usize * spp;
+    samples
+        .par_chunks_mut(band)
+        .zip(work.par_chunks_mut(band))
+        .enumerate()
+        .try_for_each(|(tile_row, (samples, work))| {
+            let mut tile = RayTile::default();
+            for column in 0..columns {
+                let index = tile_row as u32 * columns + column;
+                source
+                    .tile(eye, index, &mut tile)
+                    .map_err(|source| FrameError::Tile {
+                        eye,
+                        tile: index,
+                        source,
+                    })?;
+                let ([left, top], [w, h]) = tables.tile_rect(index);
+                let expected = w as usize * h as usize * spp;
+                if tile.pixels.len() != expected {
+                    return Err(FrameError::Pixels {
+                        eye,
+                        tile: index,
+                        expected,
+                        found: tile.pixels.len(),
+                    });
+                }
+                for (i, pixel) in tile.pixels.iter().enumerate() {
+                    let (row, in_row) = (i / (w as usize * spp), i % (w as usize * spp));
+                    let at = (row * width as usize + left as usize) * spp + in_row;
+                    let seen = &mut samples[at];
+                    *seen = match &pixel.hit {
+                        Some(hit) => Sample {
+                            position: hit.position,
+                            primitive: hit.primitive,
+                            object: hit.object,
+                            material: hit.material,
+                            ..empty
+                        },
+                        None => {
+                            let (x, y) = (left + (in_row / spp) as u32, top + row as u32);
+                            let s = (in_row % spp) as u32;
+                            let at =
+                                formats::raytrace::camera::sample_position_px(x, y, s, spp as u32);
+                            Sample {
+                                position: camera.direction(at),
+                                ..empty
+                            }
+                        }
+                    };
+                    seen.view_independent = pixel.view_independent;
+                    seen.view_dependent = pixel.view_dependent;
+                    work[at] = PixelWork::of(tile.rays_of(pixel));
+                }
+            }
+            Ok(())
+        })?;
+    Ok(EyeFrame { samples, work })
+}

@@ -1,0 +1,51 @@
+//! Surfaces between adjacent pixels of a left row, as the right eye sees them.
+
+use crate::sgrt::frame::Frame;
+use crate::sgrt::reproject::Reprojection;
+
+/// Two adjacent left pixels belong to one surface only where their depths differ by less.
+const SAME_SURFACE_SHARE: f32 = 0.05;
+
+/// Nearest depth, at each right sample, of the segments that join adjacent left pixels of one
+/// object in its row; infinite where there is none.
+///
+/// A near surface that the right eye sees stretched leaves gaps between its splats; the segments
+/// close them.
+pub fn spans(frame: &Frame, arrived: &Reprojection) -> Vec<f32> {
+    let (width, spp) = (frame.size_px[0] as usize, frame.samples_per_px as usize);
+    let mut nearest = vec![f32::INFINITY; frame.sample_count()];
+    let samples = &frame.left().samples;
+    for (index, a) in arrived.projected.iter().enumerate() {
+        let next = index + spp;
+        let is_last = (index / spp) % width == width - 1;
+        if is_last || samples[index].is_sky() || samples[index].object != samples[next].object {
+            continue;
+        }
+        let b = &arrived.projected[next];
+        let (near, far) = (a.depth.min(b.depth), a.depth.max(b.depth));
+        let row = a.at_px[1];
+        if far > near * (1.0 + SAME_SURFACE_SHARE) || row.is_nan() || row < 0.0 {
+            continue;
+        }
+        let row = row as usize;
+        if row >= frame.size_px[1] as usize {
+            continue;
+        }
+        let (x0, x1) = (a.at_px[0], b.at_px[0]);
+        let first = (x0.min(x1) - 0.5).ceil().max(0.0);
+        let last = (x0.max(x1) - 0.5).floor().min(width as f32 - 1.0);
+        let mut x = first;
+        while x <= last {
+            let share = if x1 == x0 {
+                0.0
+            } else {
+                (x + 0.5 - x0) / (x1 - x0)
+            };
+            let depth = a.depth + (b.depth - a.depth) * share;
+            let slot = &mut nearest[(row * width + x as usize) * spp + index % spp];
+            *slot = slot.min(depth);
+            x += 1.0;
+        }
+    }
+    nearest
+}

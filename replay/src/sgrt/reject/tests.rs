@@ -1,0 +1,266 @@
+use super::*;
+use crate::sgrt::accuracy::assess;
+use crate::sgrt::compose::{Reuse, compose};
+use crate::sgrt::reproject::reproject;
+use crate::sgrt::synthetic::{DIFFUSE, MIRROR, Placed, Shape, View, frame, globe, wall};
+
+/// The rule that `replay reproject` uses unless told otherwise.
+const DEFAULT: &str = crate::sgrt::DEFAULT_RULE;
+
+fn decided(frame: &Frame, rule: &str) -> Vec<Decision> {
+    decide(frame, &reproject(frame), &rule.parse().expect("a rule"))
+}
+
+fn room() -> Vec<Placed> {
+    let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
+    scene.extend(wall(1.0, [0.2, 0.3], -0.3, 2));
+    scene.extend(globe([0.4, 0.0, -2.0], 0.5, 3));
+    scene
+}
+
+#[test]
+fn a_rule_prints_as_it_is_written() {
+    for text in [
+        "none",
+        "depth=0.05+object",
+        "row=0.02+silhouette+triangle",
+        "object+opaque+triangles",
+    ] {
+        assert_eq!(text.parse::<Rule>().expect(text).to_string(), text);
+    }
+    assert_eq!("depth".parse::<Rule>().expect("default").depth, Some(0.02));
+}
+
+#[test]
+fn an_unknown_rule_is_refused_with_the_choices() {
+    for text in [
+        "",
+        "dept=1",
+        "depth=x",
+        "depth=-1",
+        "object=2",
+        "none+object",
+    ] {
+        let error = text.parse::<Rule>().unwrap_err().to_string();
+        assert!(error.contains("silhouette, triangle, triangles"), "{error}");
+    }
+}
+
+#[test]
+fn a_plane_across_the_view_has_no_wrong_pixel_under_any_rule() {
+    for depth in [0.5, 2.0, 7.3] {
+        let frame = frame(&wall(depth, [50.0, 50.0], 0.0, 1), View::default());
+        for rule in ["none", "depth", "row", "object", "triangle", DEFAULT] {
+            let accuracy = assess(&frame, &decided(&frame, rule));
+            let reused = accuracy.all_reused();
+            assert_eq!(reused.wrong_object, 0);
+            assert_eq!(reused.wrong_primitive, 0);
+            assert_eq!(reused.position_over, [0, 0], "depth {depth}, {rule}");
+            // Only the strip that the left eye does not see is missing.
+            let strip = (36.0 * 0.064 / depth).ceil() as u64 * 40;
+            assert!(accuracy.missing.pixels <= strip);
+            let share = reused.pixels as f64 / accuracy.total() as f64;
+            assert!(share > 0.8, "depth {depth}, {rule}: {share}");
+        }
+    }
+}
+
+#[test]
+fn an_exact_sphere_has_no_wrong_pixel_inside_its_silhouette() {
+    let sphere = Placed {
+        shape: Shape::Sphere {
+            center: [0.0, 0.0, -2.0],
+            radius: 0.7,
+        },
+        object: 1,
+        material: DIFFUSE,
+    };
+    let frame = frame(&[sphere], View::default());
+    let decisions = decided(&frame, "silhouette");
+    let accuracy = assess(&frame, &decisions);
+    assert_eq!(accuracy.all_reused().wrong_object, 0);
+    // Half a pixel beside, seen at most about ten degrees off the tangent, is under 2 px.
+    assert_eq!(accuracy.all_reused().position_over[1], 0);
+    assert!(accuracy.pct(accuracy.all_reused().pixels) > 80.0);
+    let on_sphere = |d: &&Decision| d.class.is_reused() && d.primitive != SKY;
+    for decision in decisions.iter().filter(on_sphere) {
+        let left = frame.left().samples[decision.source as usize].position;
+        let off = glam::Vec3::from(left).distance(glam::Vec3::new(0.0, 0.0, -2.0)) - 0.7;
+        assert!(off.abs() < 1e-5);
+    }
+}
+
+#[test]
+fn a_sphere_of_triangles_has_no_wrong_pixel_under_the_default_rule() {
+    let frame = frame(&globe([0.1, 0.05, -2.0], 0.8, 1), View::default());
+    let accuracy = assess(&frame, &decided(&frame, DEFAULT));
+    let reused = accuracy.all_reused();
+    assert_eq!((reused.wrong_object, reused.wrong_primitive), (0, 0));
+    assert_eq!(reused.position_over, [0, 0]);
+    assert!(accuracy.pct(reused.pixels) > 85.0);
+}
+
+#[test]
+fn classes_sum_to_the_pixels_under_every_rule() {
+    let frame = frame(&room(), View::default());
+    for rule in ["none", "depth=0.01", "row+object", "silhouette", DEFAULT] {
+        let accuracy = assess(&frame, &decided(&frame, rule));
+        assert_eq!(accuracy.total(), 72 * 40);
+    }
+}
+
+#[test]
+fn without_eye_separation_all_is_reused_without_error() {
+    let view = View {
+        ipd_m: 0.0,
+        ..View::default()
+    };
+    let frame = frame(&room(), view);
+    for rule in ["none", "depth", DEFAULT] {
+        let decisions = decided(&frame, rule);
+        let accuracy = assess(&frame, &decisions);
+        let reused = accuracy.all_reused();
+        if rule == "none" {
+            assert_eq!(reused.pixels, 72 * 40);
+        }
+        assert_eq!(reused.wrong_object + reused.wrong_primitive, 0);
+        assert!(accuracy.position_mean_px < 1e-4);
+        for reuse in Reuse::ALL {
+            let colors = compose(&frame, &decisions, reuse);
+            for (color, truth) in colors.iter().zip(&frame.right().samples) {
+                assert_eq!(*color, truth.color());
+            }
+        }
+    }
+}
+
+#[test]
+fn traced_pixels_are_the_truth_bit_for_bit() {
+    let frame = frame(&room(), View::default());
+    for rule in ["none", "object", DEFAULT] {
+        let decisions = decided(&frame, rule);
+        for reuse in Reuse::ALL {
+            let colors = compose(&frame, &decisions, reuse);
+            let mut traced = 0;
+            for (i, decision) in decisions.iter().enumerate() {
+                if !decision.class.is_reused() {
+                    traced += 1;
+                    let truth = frame.right().samples[i].color();
+                    assert_eq!(colors[i].map(f32::to_bits), truth.map(f32::to_bits));
+                }
+            }
+            assert!(traced > 0);
+        }
+    }
+}
+
+#[test]
+fn a_retested_hit_is_the_traced_hit_unless_something_hides_it() {
+    let frame = frame(&room(), View::default());
+    let decisions = decided(&frame, "triangles");
+    let mut exact = 0;
+    for (decision, truth) in decisions.iter().zip(&frame.right().samples) {
+        if let Some(position) = decision.exact
+            && decision.primitive == truth.primitive
+        {
+            exact += 1;
+            let off = glam::Vec3::from(position).distance(truth.position.into());
+            assert!(off < 1e-4, "{off}");
+        }
+    }
+    assert!(exact > 2000, "{exact}");
+}
+
+#[test]
+fn stricter_rules_reuse_less_and_wrong_less() {
+    let frame = frame(&room(), View::default());
+    let of = |rule: &str| {
+        let accuracy = assess(&frame, &decided(&frame, rule));
+        let reused = accuracy.all_reused();
+        (reused.pixels, reused.wrong_object)
+    };
+    let (none, loose, strict) = (of("none"), of("depth=0.5"), of("depth=0.02+silhouette"));
+    assert!(none.0 >= loose.0 && loose.0 > strict.0);
+    assert!(none.1 >= loose.1 && loose.1 >= strict.1);
+    assert!(none.1 > 0, "the scene has occlusion to get wrong");
+}
+
+#[test]
+fn a_near_surface_stretched_in_the_right_eye_hides_what_is_behind_it() {
+    // A floor-like slanted rectangle that the right eye sees wider, before a wall.
+    let mut scene = wall(9.0, [40.0, 40.0], 0.0, 1);
+    let (near, far) = (-0.4, -1.6);
+    let corners = [
+        [-0.25, -1.0, near],
+        [-0.05, -1.0, far],
+        [-0.05, 1.0, far],
+        [-0.25, 1.0, near],
+    ];
+    for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
+        scene.push(Placed {
+            shape: Shape::Triangle([corners[a], corners[b], corners[c]]),
+            object: 2,
+            material: MIRROR,
+        });
+    }
+    let frame = frame(&scene, View::default());
+    let wrong = |rule: &str| {
+        assess(&frame, &decided(&frame, rule))
+            .all_reused()
+            .wrong_object
+    };
+    assert!(
+        wrong("row") < wrong("none"),
+        "{} {}",
+        wrong("row"),
+        wrong("none")
+    );
+}
+
+#[test]
+fn mirrored_scenes_reuse_alike_from_the_mirrored_eye() {
+    // Mirroring the scene and swapping the eyes must mirror the decisions.
+    let scene = room();
+    let mirrored: Vec<Placed> = scene
+        .iter()
+        .map(|placed| Placed {
+            shape: match placed.shape {
+                Shape::Triangle(v) => Shape::Triangle(v.map(|[x, y, z]| [-x, y, z])),
+                sphere @ Shape::Sphere { .. } => sphere,
+            },
+            ..*placed
+        })
+        .collect();
+    let view = View::default();
+    let swapped = View {
+        ipd_m: -view.ipd_m,
+        ..view
+    };
+    let (a, b) = (frame(&scene, view), frame(&mirrored, swapped));
+    let (da, db) = (decided(&a, "depth"), decided(&b, "depth"));
+    let width = view.size_px[0] as usize;
+    let same = (0..da.len())
+        .filter(|i| {
+            let j = i / width * width + width - 1 - i % width;
+            da[*i].class.is_reused() == db[j].class.is_reused()
+        })
+        .count();
+    // Hits that fall on the line between two pixels go one way in both.
+    assert!(same * 1000 >= da.len() * 985, "{same} of {}", da.len());
+}
+
+#[test]
+fn several_samples_a_pixel_are_reprojected_each_for_itself() {
+    let view = View {
+        samples_per_px: 4,
+        size_px: [40, 24],
+        ..View::default()
+    };
+    let frame = frame(&room(), view);
+    let decisions = decided(&frame, DEFAULT);
+    assert_eq!(decisions.len(), 40 * 24 * 4);
+    let accuracy = assess(&frame, &decisions);
+    assert!(accuracy.pct(accuracy.all_reused().pixels) > 60.0);
+    let image = frame.resolve(&compose(&frame, &decisions, Reuse::Primary));
+    assert_eq!(image.len(), 40 * 24);
+}

@@ -1,0 +1,276 @@
+//! What `replay reproject` yields: plain data that the printers read.
+
+use super::accuracy::Accuracy;
+use super::compose::Reuse;
+use super::config::SgrtConfig;
+use super::energy::EnergyPj;
+use super::evaluate::Evaluation;
+use super::gbuffer::Traffic;
+use super::reject::Rule;
+use crate::result::TraceId;
+use serde::{Deserialize, Serialize};
+
+/// Schema of the object that `replay reproject --json` prints.
+pub const SCHEMA: &str = "replay.reproject/1";
+
+/// Everything about one trace.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Program and version.
+    pub tool: String,
+    /// The trace.
+    pub trace: TraceId,
+    /// Triangles of the scene.
+    pub scene_triangles: u64,
+    /// Width and height of an eye's image.
+    pub eye_size_px: [u32; 2],
+    /// The whole configuration.
+    pub config: Config,
+    /// Under the rule asked for.
+    pub result: Outcome,
+    /// The paper's plain reuse: every arrival, as it is.
+    pub plain: Outcome,
+    /// The paper's values for the scene that this one stands for.
+    pub paper: Option<PaperValues>,
+    /// Units' cycles saved against image error, where asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub curve: Vec<CurvePoint>,
+    /// What the ratios owe to each parameter, where asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+/// What was run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Config {
+    /// Error detection.
+    pub rule: Rule,
+    /// What a reused pixel takes over.
+    pub reuse: Reuse,
+    /// Where cache misses come from: `addresses` of the trace or hit `rates`.
+    pub cache_misses: String,
+    /// The hardware.
+    pub model: SgrtConfig,
+}
+
+/// The paper's values for a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PaperValues {
+    /// Scene in the paper.
+    pub scene: String,
+    /// Frames per second over the reference's.
+    pub relative_performance: f64,
+    /// Energy over the reference's.
+    pub relative_energy: f64,
+}
+
+/// The figures of one rule and level of reuse.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Right pixels reused, overlapped ones included.
+    pub reuse_pct: f64,
+    /// Right pixels reused whose hit is on another object than the true one.
+    pub wrong_object_pct: f64,
+    /// Right object, another triangle, and more than a pixel off.
+    pub wrong_primitive_pct: f64,
+    /// Right object, more than one pixel off.
+    pub position_over_1px_pct: f64,
+    /// Right object, more than two pixels off.
+    pub position_over_2px_pct: f64,
+    /// Frames per second over those of tracing both eyes in full.
+    pub relative_performance: f64,
+    /// Energy over that of tracing both eyes in full.
+    pub relative_energy: f64,
+    /// Unit cycles of tracing both eyes in full over those with reprojection: what the ratio would
+    /// be if the units were always the bottleneck.
+    pub tni_relative_performance: f64,
+    /// Traversal steps that are primary rays', of both eyes' in full: reusing a share r of primary
+    /// hits can save at most half of r times this.
+    pub primary_steps_pct: f64,
+    /// Cycles of the traversal and intersection units.
+    pub tni_cycles: u64,
+    /// Cycles of the programmable cores.
+    pub srp_cycles: u64,
+    /// The same with both eyes traced in full.
+    pub reference_tni_cycles: u64,
+    /// The same with both eyes traced in full.
+    pub reference_srp_cycles: u64,
+    /// Unit cycles saved, of both eyes' in full.
+    pub tni_reduction_pct: f64,
+    /// Unit cycles saved, of the right eye's in full.
+    pub right_tni_reduction_pct: f64,
+    /// Kernel cycles that reprojection adds, of the reference's.
+    pub srp_overhead_pct: f64,
+    /// The units' scarcest resource.
+    pub tni_bottleneck: String,
+    /// Time of the frame in the model.
+    pub time_us: f64,
+    /// Time of the reference in the model.
+    pub reference_time_us: f64,
+    /// Mean FLIP of the right image against the traced one.
+    pub flip_mean: f64,
+    /// 99th percentile of FLIP.
+    pub flip_p99: f64,
+    /// Pixels per degree that FLIP is for.
+    pub pixels_per_degree: f64,
+    /// Peak signal-to-noise ratio; 100 for identical pictures.
+    pub psnr_db: f64,
+    /// Structural similarity.
+    pub ssim: f64,
+    /// Pixels by class and their errors.
+    pub classes: Accuracy,
+    /// Rays, steps and triangle tests.
+    pub work: Work,
+    /// The same with both eyes traced in full.
+    pub reference_work: Work,
+    /// G-buffer bytes, tile by tile.
+    pub gbuffer_tiled: Traffic,
+    /// G-buffer bytes with the whole screen's in DRAM.
+    pub gbuffer_whole_screen: Traffic,
+    /// Energy with the whole screen's G-buffer in DRAM over the reference's.
+    pub whole_screen_relative_energy: f64,
+    /// Energy by component.
+    pub energy: EnergyPj,
+    /// The same with both eyes traced in full.
+    pub reference_energy: EnergyPj,
+}
+
+/// Work of a frame on the units.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Work {
+    /// Rays.
+    pub rays: u64,
+    /// Traversal steps.
+    pub steps: u64,
+    /// Triangle tests, re-tests included.
+    pub triangle_tests: u64,
+    /// Of those, re-tests of reused triangles.
+    pub retests: u64,
+    /// Shading kernels.
+    pub shaded: u64,
+    /// Look-ups that missed an L1.
+    pub l1_misses: u64,
+    /// Look-ups that missed the L2.
+    pub l2_misses: u64,
+}
+
+impl Work {
+    fn of(run: &super::evaluate::Run) -> Self {
+        Self {
+            rays: run.work.rays(),
+            steps: run.work.steps(),
+            triangle_tests: run.work.triangle_tests(),
+            retests: run.work.retest_tests,
+            shaded: run.work.shaded,
+            l1_misses: run.misses.l1.round() as u64,
+            l2_misses: run.misses.l2.round() as u64,
+        }
+    }
+}
+
+/// One point of the run-time-against-error curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// Error detection.
+    pub rule: Rule,
+    /// What a reused pixel takes over.
+    pub reuse: Reuse,
+    /// Right pixels reused.
+    pub reuse_pct: f64,
+    /// Wrong object.
+    pub wrong_object_pct: f64,
+    /// Unit cycles saved, of both eyes' in full.
+    pub tni_reduction_pct: f64,
+    /// Frames per second over the reference's.
+    pub relative_performance: f64,
+    /// Mean FLIP.
+    pub flip_mean: f64,
+    /// 99th percentile of FLIP.
+    pub flip_p99: f64,
+}
+
+/// What a parameter does to the ratios.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sensitivity {
+    /// Dotted name.
+    pub parameter: String,
+    /// Its value.
+    pub value: f64,
+    /// Relative performance with half of it and with twice of it (a rate: its miss rate).
+    pub relative_performance: [f64; 2],
+    /// Relative energy with half of it and with twice of it.
+    pub relative_energy: [f64; 2],
+}
+
+/// Image error of the right image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImageError {
+    /// Mean FLIP.
+    pub flip_mean: f64,
+    /// 99th percentile of FLIP.
+    pub flip_p99: f64,
+    /// Pixels per degree.
+    pub pixels_per_degree: f64,
+    /// Peak signal-to-noise ratio.
+    pub psnr_db: f64,
+    /// Structural similarity.
+    pub ssim: f64,
+}
+
+impl Outcome {
+    /// Puts the figures together.
+    #[must_use]
+    pub fn new(accuracy: &Accuracy, evaluation: &Evaluation, error: &ImageError) -> Self {
+        let reused = accuracy.all_reused();
+        let (reference, run) = (&evaluation.reference, &evaluation.reprojected);
+        let saved_pct = |part: f64, whole: f64| {
+            if whole > 0.0 {
+                100.0 * (1.0 - part / whole)
+            } else {
+                0.0
+            }
+        };
+        let cycles = |c: f64| c.round() as u64;
+        Self {
+            reuse_pct: accuracy.pct(reused.pixels),
+            wrong_object_pct: accuracy.pct(reused.wrong_object),
+            wrong_primitive_pct: accuracy.pct(reused.wrong_primitive),
+            position_over_1px_pct: accuracy.pct(reused.position_over[0]),
+            position_over_2px_pct: accuracy.pct(reused.position_over[1]),
+            relative_performance: evaluation.relative_performance(),
+            relative_energy: evaluation.relative_energy(),
+            tni_relative_performance: reference.tni_cycles / run.tni_cycles,
+            primary_steps_pct: 100.0 * reference.work.by_class[0].steps as f64
+                / reference.work.steps().max(1) as f64,
+            tni_cycles: cycles(run.tni_cycles),
+            srp_cycles: cycles(run.srp.total()),
+            reference_tni_cycles: cycles(reference.tni_cycles),
+            reference_srp_cycles: cycles(reference.srp.total()),
+            tni_reduction_pct: saved_pct(run.tni_cycles, reference.tni_cycles),
+            right_tni_reduction_pct: saved_pct(
+                evaluation.right_tni_cycles,
+                evaluation.right_full_tni_cycles,
+            ),
+            srp_overhead_pct: 100.0 * run.srp.added_lane_cycles() / reference.srp.lane_cycles(),
+            tni_bottleneck: run.tni.bottleneck().to_owned(),
+            time_us: run.time_ns * 1e-3,
+            reference_time_us: reference.time_ns * 1e-3,
+            flip_mean: error.flip_mean,
+            flip_p99: error.flip_p99,
+            pixels_per_degree: error.pixels_per_degree,
+            psnr_db: error.psnr_db,
+            ssim: error.ssim,
+            classes: *accuracy,
+            work: Work::of(run),
+            reference_work: Work::of(reference),
+            gbuffer_tiled: run.gbuffer,
+            gbuffer_whole_screen: evaluation.whole_screen,
+            whole_screen_relative_energy: evaluation.whole_screen_energy_pj
+                / reference.energy.total(),
+            energy: run.energy,
+            reference_energy: reference.energy,
+        }
+    }
+}

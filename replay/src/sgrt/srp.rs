@@ -1,0 +1,96 @@
+//! Programmable cores: cycles of the kernels of a batch.
+
+use super::config::SgrtConfig;
+use super::work::BatchWork;
+
+/// Cycles of all lanes together by kernel; [`SrpCycles::total`] divides them over the lanes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SrpCycles {
+    /// Ray generation.
+    pub generation: f64,
+    /// Shading, alpha look-ups included.
+    pub shading: f64,
+    /// Projection of left pixels.
+    pub reproject: f64,
+    /// Error detection.
+    pub detect: f64,
+    /// Reuse.
+    pub reuse: f64,
+    /// Lanes.
+    lanes: f64,
+}
+
+impl SrpCycles {
+    /// Cycles of one lane, summed over kernels.
+    #[must_use]
+    pub fn lane_cycles(&self) -> f64 {
+        self.generation + self.shading + self.added_lane_cycles()
+    }
+
+    /// Cycles of one lane of the three kernels that reprojection adds.
+    #[must_use]
+    pub fn added_lane_cycles(&self) -> f64 {
+        self.reproject + self.detect + self.reuse
+    }
+
+    /// Cycles of the cores with all lanes busy.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        if self.lanes > 0.0 {
+            self.lane_cycles() / self.lanes
+        } else {
+            0.0
+        }
+    }
+
+    /// Adds another batch's.
+    pub fn add(&mut self, other: &Self) {
+        self.generation += other.generation;
+        self.shading += other.shading;
+        self.reproject += other.reproject;
+        self.detect += other.detect;
+        self.reuse += other.reuse;
+        self.lanes = other.lanes;
+    }
+}
+
+/// Kernel cycles of a batch.
+#[must_use]
+pub fn cycles(work: &BatchWork, config: &SgrtConfig) -> SrpCycles {
+    let srp = &config.srp;
+    SrpCycles {
+        generation: (work.rays() + work.retest_rays) as f64 * srp.ray_generation_cycles,
+        shading: work.shaded as f64 * srp.shading_cycles
+            + work.alpha_tests() as f64 * srp.alpha_test_cycles,
+        reproject: work.reprojected as f64 * srp.reproject_cycles,
+        detect: work.detected as f64 * srp.detect_cycles,
+        reuse: work.reused as f64 * srp.reuse_cycles,
+        lanes: f64::from(srp.cores) * f64::from(srp.lanes_per_core),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kernels_cost_their_items_times_their_cycles_over_all_lanes() {
+        let config = SgrtConfig::default();
+        let work = BatchWork {
+            shaded: 10,
+            reprojected: 5,
+            detected: 6,
+            reused: 4,
+            ..BatchWork::default()
+        };
+        let c = cycles(&work, &config);
+        let s = &config.srp;
+        let lanes = f64::from(s.cores * s.lanes_per_core);
+        let expected = 10.0 * s.shading_cycles
+            + 5.0 * s.reproject_cycles
+            + 6.0 * s.detect_cycles
+            + 4.0 * s.reuse_cycles;
+        assert!((c.total() - expected / lanes).abs() < 1e-12);
+        assert_eq!(c.added_lane_cycles() + 10.0 * s.shading_cycles, expected);
+    }
+}

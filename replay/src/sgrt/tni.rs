@@ -1,0 +1,100 @@
+//! Traversal and intersection unit: cycles of a batch of rays.
+//!
+//! A unit holds many rays in flight and issues, each cycle, at most one step per traversal
+//! pipeline and one triangle test per intersection pipeline, whichever ray is ready. Its
+//! throughput is therefore set by the scarcest of five resources, and the batch takes
+//!
+//! `max(traversal issue, intersection issue, ray hand-over, latency / rays in flight, DRAM bytes)`
+//!
+//! where latency is what a ray would take alone: its steps and tests through the full depth of
+//! their pipelines, plus what its cache misses wait. Batches follow each other without a gap, so
+//! filling and draining cancel. A cycle-by-cycle simulation of one unit in the tests stays within
+//! a few per cent of this.
+
+use super::cache::Misses;
+use super::config::SgrtConfig;
+use super::work::BatchWork;
+
+/// Cycles that each resource needs for a batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TniCycles {
+    /// Issue slots of the traversal pipelines.
+    pub traversal: f64,
+    /// Issue slots of the intersection pipelines.
+    pub intersection: f64,
+    /// Rays in and out.
+    pub handover: f64,
+    /// Serial latency of all rays over the rays in flight.
+    pub latency: f64,
+    /// Transfer of the lines that missed the L2.
+    pub bandwidth: f64,
+}
+
+impl TniCycles {
+    /// Cycles of the batch: the scarcest resource.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        [
+            self.traversal,
+            self.intersection,
+            self.handover,
+            self.latency,
+            self.bandwidth,
+        ]
+        .into_iter()
+        .fold(0.0, f64::max)
+    }
+
+    /// Name of the scarcest resource.
+    #[must_use]
+    pub fn bottleneck(&self) -> &'static str {
+        let all = [
+            ("traversal", self.traversal),
+            ("intersection", self.intersection),
+            ("hand-over", self.handover),
+            ("latency", self.latency),
+            ("bandwidth", self.bandwidth),
+        ];
+        let total = self.total();
+        all.iter()
+            .find(|(_, c)| *c == total)
+            .map_or("none", |a| a.0)
+    }
+
+    /// Adds another batch's cycles, resource by resource.
+    pub fn add(&mut self, other: &Self) {
+        self.traversal += other.traversal;
+        self.intersection += other.intersection;
+        self.handover += other.handover;
+        self.latency += other.latency;
+        self.bandwidth += other.bandwidth;
+    }
+}
+
+/// Cycles of a batch whose memory accesses missed as told.
+#[must_use]
+pub fn cycles(work: &BatchWork, misses: &Misses, config: &SgrtConfig) -> TniCycles {
+    let tni = &config.tni;
+    let units = f64::from(tni.units);
+    let (steps, tests) = (work.steps() as f64, work.triangle_tests() as f64);
+    let rays = (work.rays() + work.retest_rays) as f64;
+
+    let dram_cycles = config.memory.latency_ns * tni.clock_mhz * 1e-3;
+    let latency = steps * f64::from(tni.trv_depth_cycles)
+        + tests * f64::from(tni.ist_depth_cycles)
+        + misses.l1 * f64::from(config.cache.l2_latency_cycles)
+        + misses.l2 * dram_cycles;
+    // GB/s over MHz is thousands of bytes a cycle.
+    let bytes_per_cycle = config.memory.bandwidth_gb_s * 1e3 / tni.clock_mhz;
+
+    TniCycles {
+        traversal: steps * tni.trv_cycles_per_step / (units * f64::from(tni.trv_pipelines)),
+        intersection: tests * tni.ist_cycles_per_test / (units * f64::from(tni.ist_pipelines)),
+        handover: rays / (units * tni.rays_per_cycle),
+        latency: latency / (units * f64::from(tni.rays_in_flight)),
+        bandwidth: misses.dram_bytes / bytes_per_cycle,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,150 @@
+use super::*;
+use crate::sgrt::work::RayWork;
+
+fn batch(rays: u64, steps: u64, tests: u64) -> BatchWork {
+    let mut work = BatchWork::default();
+    work.by_class[0] = RayWork {
+        rays,
+        steps,
+        triangle_tests: tests,
+        alpha_tests: 0,
+    };
+    work
+}
+
+#[test]
+fn steps_over_pipelines_is_the_time_of_a_traversal_bound_batch() {
+    let config = SgrtConfig::default();
+    let c = cycles(&batch(100, 64_000, 100), &Misses::default(), &config);
+    let pipelines = f64::from(config.tni.units * config.tni.trv_pipelines);
+    assert_eq!(c.total(), 64_000.0 / pipelines);
+    assert_eq!(c.bottleneck(), "traversal");
+}
+
+#[test]
+fn twice_the_units_halve_everything_but_the_memory() {
+    let mut config = SgrtConfig::default();
+    let misses = Misses {
+        l1: 50.0,
+        l2: 20.0,
+        dram_bytes: 20.0 * 64.0,
+    };
+    let one = cycles(&batch(10, 900, 300), &misses, &config);
+    config.tni.units *= 2;
+    let two = cycles(&batch(10, 900, 300), &misses, &config);
+    assert_eq!(two.traversal * 2.0, one.traversal);
+    assert_eq!(two.intersection * 2.0, one.intersection);
+    assert_eq!(two.latency * 2.0, one.latency);
+    assert_eq!(two.bandwidth, one.bandwidth);
+}
+
+#[test]
+fn bytes_over_bandwidth_is_the_time_of_a_memory_bound_batch() {
+    let config = SgrtConfig::default();
+    let misses = Misses {
+        l1: 0.0,
+        l2: 0.0,
+        dram_bytes: 5_120_000.0,
+    };
+    let c = cycles(&batch(1, 1, 1), &misses, &config);
+    // 25.6 GB/s at 500 MHz are 51.2 bytes a cycle.
+    assert!((c.total() - 100_000.0).abs() < 1e-6);
+    assert_eq!(c.bottleneck(), "bandwidth");
+}
+
+/// A ray of the cycle-by-cycle twin: steps, and a triangle test after every `steps_per_test`.
+#[derive(Clone, Copy)]
+struct TwinRay {
+    steps: u32,
+    steps_per_test: u32,
+    miss_every: u32,
+}
+
+/// One unit, cycle by cycle: a ring of rays, each ready at some cycle; each pipeline takes the
+/// first ready ray that wants it.
+fn twin(rays: &[TwinRay], config: &SgrtConfig) -> (u64, BatchWork, Misses) {
+    #[derive(Clone, Copy)]
+    struct Slot {
+        ray: TwinRay,
+        done: u32,
+        test_next: bool,
+        ready: u64,
+    }
+    let tni = &config.tni;
+    let l2 = u64::from(config.cache.l2_latency_cycles);
+    let mut work = batch(rays.len() as u64, 0, 0);
+    let mut misses = Misses::default();
+    let mut waiting = rays.iter().copied();
+    let mut slots: Vec<Slot> = Vec::new();
+    let mut cycle = 0u64;
+    loop {
+        if slots.len() < tni.rays_in_flight as usize {
+            slots.extend(waiting.next().map(|ray| Slot {
+                ray,
+                done: 0,
+                test_next: false,
+                ready: cycle,
+            }));
+        }
+        if slots.is_empty() {
+            return (cycle, work, misses);
+        }
+        let (mut trv, mut ist) = (tni.trv_pipelines, tni.ist_pipelines);
+        for slot in &mut slots {
+            if slot.ready > cycle {
+                continue;
+            }
+            if slot.test_next && ist > 0 {
+                ist -= 1;
+                slot.test_next = false;
+                slot.ready = cycle + u64::from(tni.ist_depth_cycles);
+                work.by_class[0].triangle_tests += 1;
+            } else if !slot.test_next && slot.done < slot.ray.steps && trv > 0 {
+                trv -= 1;
+                slot.done += 1;
+                slot.test_next = slot.done.is_multiple_of(slot.ray.steps_per_test);
+                slot.ready = cycle + u64::from(tni.trv_depth_cycles);
+                work.by_class[0].steps += 1;
+                if slot.done.is_multiple_of(slot.ray.miss_every) {
+                    slot.ready += l2;
+                    misses.l1 += 1.0;
+                }
+            }
+        }
+        cycle += 1;
+        slots.retain(|s| s.done < s.ray.steps || s.test_next || s.ready > cycle);
+    }
+}
+
+#[test]
+fn the_throughput_model_stays_close_to_a_cycle_by_cycle_unit() {
+    let mut config = SgrtConfig::default();
+    config.tni.units = 1;
+    config.tni.trv_pipelines = 4;
+    let rays = |n: u32, steps_per_test, miss_every| -> Vec<TwinRay> {
+        let ray = |i: u32| TwinRay {
+            steps: 12 + i * 7 % 33,
+            steps_per_test,
+            miss_every,
+        };
+        (0..n).map(ray).collect()
+    };
+    // Traversal, intersection and latency bound in turn.
+    for (name, in_flight, steps_per_test, miss_every) in [
+        ("traversal", 256, 16, 1000),
+        ("intersection", 256, 2, 1000),
+        ("latency", 32, 16, 1000),
+        ("latency", 64, 8, 2),
+    ] {
+        config.tni.rays_in_flight = in_flight;
+        let (simulated, work, misses) = twin(&rays(6000, steps_per_test, miss_every), &config);
+        let model = cycles(&work, &misses, &config);
+        let off = model.total() / simulated as f64 - 1.0;
+        assert_eq!(model.bottleneck(), name);
+        assert!(
+            off.abs() < 0.06,
+            "{name}: model off by {:.1} %",
+            off * 100.0
+        );
+    }
+}

@@ -1,0 +1,203 @@
+//! What rays cost, by class of ray: the input of the cycle and energy models.
+
+use formats::raytrace::{NO_PARENT, RayKind, RayRecord};
+
+/// Rays that reuse treats alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(usize)]
+pub enum RayClass {
+    /// From the eye.
+    Primary = 0,
+    /// From the primary hit to a light: its outcome does not depend on the eye.
+    Shadow = 1,
+    /// Reflection and refraction rays, and everything that they spawn: these do.
+    Secondary = 2,
+}
+
+impl RayClass {
+    /// All classes, in index order.
+    pub const ALL: [Self; 3] = [Self::Primary, Self::Shadow, Self::Secondary];
+
+    /// Class of a ray.
+    #[must_use]
+    pub fn of(ray: &RayRecord) -> Self {
+        match ray.kind {
+            RayKind::Primary => Self::Primary,
+            RayKind::Shadow if ray.parent == 0 => Self::Shadow,
+            // A trace without parents cannot tell; by depth is the same for the first level.
+            RayKind::Shadow if ray.parent == NO_PARENT && ray.depth <= 1 => Self::Shadow,
+            _ => Self::Secondary,
+        }
+    }
+}
+
+/// Work of a set of rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayWork<N> {
+    /// Rays.
+    pub rays: N,
+    /// Inner nodes visited.
+    pub steps: N,
+    /// Triangles tested.
+    pub triangle_tests: N,
+    /// Alpha look-ups.
+    pub alpha_tests: N,
+}
+
+impl RayWork<u64> {
+    /// Adds another set.
+    pub fn add(&mut self, other: &RayWork<u32>) {
+        self.rays += u64::from(other.rays);
+        self.steps += u64::from(other.steps);
+        self.triangle_tests += u64::from(other.triangle_tests);
+        self.alpha_tests += u64::from(other.alpha_tests);
+    }
+}
+
+/// Work of one pixel's ray tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PixelWork {
+    /// By [`RayClass`].
+    pub by_class: [RayWork<u32>; 3],
+    /// Reflection and refraction rays: each ends in a shading kernel.
+    pub secondary_shaded: u32,
+}
+
+impl PixelWork {
+    /// Sums a pixel's rays; sums that do not fit saturate.
+    #[must_use]
+    pub fn of(rays: &[RayRecord]) -> Self {
+        let mut work = Self::default();
+        for ray in rays {
+            let class = RayClass::of(ray);
+            let w = &mut work.by_class[class as usize];
+            w.rays = w.rays.saturating_add(1);
+            w.steps = w.steps.saturating_add(ray.steps);
+            w.triangle_tests = w.triangle_tests.saturating_add(ray.triangle_tests);
+            w.alpha_tests = w.alpha_tests.saturating_add(ray.alpha_tests);
+            if class == RayClass::Secondary && ray.kind != RayKind::Shadow {
+                work.secondary_shaded = work.secondary_shaded.saturating_add(1);
+            }
+        }
+        work
+    }
+}
+
+/// Work of a batch (a tile of one eye) on both kinds of hardware.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BatchWork {
+    /// Rays traced, by class.
+    pub by_class: [RayWork<u64>; 3],
+    /// Right-eye rays intersected with the triangle that they may reuse.
+    pub retest_rays: u64,
+    /// Triangle tests of those.
+    pub retest_tests: u64,
+    /// Shading kernels run.
+    pub shaded: u64,
+    /// Left pixels projected.
+    pub reprojected: u64,
+    /// Right pixels tested.
+    pub detected: u64,
+    /// Right pixels reused.
+    pub reused: u64,
+}
+
+impl BatchWork {
+    /// Adds a pixel whose whole ray tree is traced.
+    pub fn add_traced(&mut self, pixel: &PixelWork) {
+        for class in RayClass::ALL {
+            self.add_class(pixel, class);
+        }
+        self.shaded += 1 + u64::from(pixel.secondary_shaded);
+    }
+
+    /// Adds the rays of one class of a pixel's tree.
+    pub fn add_class(&mut self, pixel: &PixelWork, class: RayClass) {
+        self.by_class[class as usize].add(&pixel.by_class[class as usize]);
+    }
+
+    /// Adds another batch.
+    pub fn add(&mut self, other: &Self) {
+        for (sum, part) in self.by_class.iter_mut().zip(&other.by_class) {
+            sum.rays += part.rays;
+            sum.steps += part.steps;
+            sum.triangle_tests += part.triangle_tests;
+            sum.alpha_tests += part.alpha_tests;
+        }
+        self.retest_rays += other.retest_rays;
+        self.retest_tests += other.retest_tests;
+        self.shaded += other.shaded;
+        self.reprojected += other.reprojected;
+        self.detected += other.detected;
+        self.reused += other.reused;
+    }
+
+    /// Rays traced.
+    #[must_use]
+    pub fn rays(&self) -> u64 {
+        self.by_class.iter().map(|w| w.rays).sum()
+    }
+
+    /// Traversal steps.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.by_class.iter().map(|w| w.steps).sum()
+    }
+
+    /// Triangle tests, re-tests included.
+    #[must_use]
+    pub fn triangle_tests(&self) -> u64 {
+        self.retest_tests + self.by_class.iter().map(|w| w.triangle_tests).sum::<u64>()
+    }
+
+    /// Alpha look-ups.
+    #[must_use]
+    pub fn alpha_tests(&self) -> u64 {
+        self.by_class.iter().map(|w| w.alpha_tests).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ray(kind: RayKind, parent: u32, depth: u8) -> RayRecord {
+        RayRecord {
+            kind,
+            parent,
+            depth,
+            steps: 10,
+            triangle_tests: 3,
+            ..RayRecord::default()
+        }
+    }
+
+    #[test]
+    fn shadow_rays_of_a_reflection_are_secondary() {
+        let rays = [
+            ray(RayKind::Primary, NO_PARENT, 0),
+            ray(RayKind::Shadow, 0, 1),
+            ray(RayKind::Reflection, 0, 1),
+            ray(RayKind::Shadow, 2, 2),
+        ];
+        let work = PixelWork::of(&rays);
+        assert_eq!(work.by_class.map(|w| w.rays), [1, 1, 2]);
+        assert_eq!(work.by_class.map(|w| w.steps), [10, 10, 20]);
+        assert_eq!(work.secondary_shaded, 1);
+    }
+
+    #[test]
+    fn a_traced_pixel_counts_every_ray_once() {
+        let pixel = PixelWork::of(&[
+            ray(RayKind::Primary, NO_PARENT, 0),
+            ray(RayKind::Refraction, 0, 1),
+        ]);
+        let mut batch = BatchWork::default();
+        batch.add_traced(&pixel);
+        assert_eq!(
+            (batch.rays(), batch.steps(), batch.triangle_tests()),
+            (2, 20, 6)
+        );
+        assert_eq!(batch.shaded, 2);
+    }
+}
