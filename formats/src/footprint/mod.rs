@@ -57,17 +57,18 @@ pub struct LevelSelection {
 /// `lod <= 0` magnifies: level 0 with the `mag` filter. Linear mip filtering reads `floor(lod)`
 /// and the next one, and the last level alone from there on.
 #[must_use]
+#[inline]
 pub fn select_levels(lod: f32, sampler: &Sampler, levels: u32) -> LevelSelection {
     let last = levels.saturating_sub(1);
     let magnified = lod <= 0.0;
     let filter = if magnified { sampler.mag } else { sampler.min };
-    // A float cast saturates, so a negative level of detail gives level 0.
+    // Above zero a float cast rounds down, and it saturates.
     let (first, count) = match sampler.mip {
         MipFilter::None => (0, 1),
         _ if magnified => (0, 1),
-        MipFilter::Nearest => (((lod + 0.5).floor() as u32).min(last), 1),
+        MipFilter::Nearest => (((lod + 0.5) as u32).min(last), 1),
         MipFilter::Linear => {
-            let first = (lod.floor() as u32).min(last);
+            let first = (lod as u32).min(last);
             (first, if first == last { 1 } else { 2 })
         }
     };

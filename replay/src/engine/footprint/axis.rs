@@ -11,8 +11,8 @@ pub struct Axis {
     /// Texel offset of the sample.
     offset: i64,
     step: Step,
-    /// Power of two: repeating is a mask.
-    power_of_two: bool,
+    /// Repeating a power of two is a mask.
+    repeat_mask: Option<usize>,
     /// Byte offset within the level of a texel's block, by texel.
     bytes: Vec<u32>,
 }
@@ -42,32 +42,55 @@ impl Axis {
             } else {
                 Step::Ratio(steps)
             },
-            power_of_two: (size as u64).is_power_of_two(),
+            repeat_mask: (wrap == Wrap::Repeat && bytes.len().is_power_of_two())
+                .then(|| bytes.len() - 1),
             bytes,
         }
     }
 
-    /// Byte offsets of the two texels around a coordinate (bilinear filtering).
+    /// For each lane, byte offsets of the two texels around its coordinate (bilinear filtering).
+    ///
+    /// All four lanes at once, whether they are covered or not: the choice of arithmetic is made
+    /// once, and what remains has no branches.
     #[inline(always)]
-    pub fn linear(&self, coordinate: i32) -> (u32, u32) {
-        let first = match self.step {
-            Step::Shift(shift) => (i64::from(coordinate) - (1 << (shift - 1))) >> shift,
-            Step::Ratio(steps) => {
-                (2 * i64::from(coordinate) * self.size - steps).div_euclid(2 * steps)
+    pub fn linear(&self, coordinates: [i32; 4]) -> [[u32; 2]; 4] {
+        match self.step {
+            Step::Shift(shift) => {
+                let half = 1_i64 << (shift - 1);
+                let first = |c: i32| ((i64::from(c) - half) >> shift) + self.offset;
+                if let Some(mask) = self.repeat_mask {
+                    return coordinates.map(|c| {
+                        let texel = first(c) as usize;
+                        [
+                            self.bytes[texel & mask],
+                            self.bytes[texel.wrapping_add(1) & mask],
+                        ]
+                    });
+                }
+                coordinates.map(|c| self.pair(first(c)))
             }
-        };
-        let first = first + self.offset;
-        (self.byte(first), self.byte(first + 1))
+            Step::Ratio(steps) => coordinates.map(|c| {
+                let twice = 2 * i64::from(c) * self.size - steps;
+                self.pair(twice.div_euclid(2 * steps) + self.offset)
+            }),
+        }
     }
 
-    /// Byte offset of the texel that holds a coordinate.
+    /// For each lane, byte offset of the texel that holds its coordinate.
     #[inline(always)]
-    pub fn nearest(&self, coordinate: i32) -> u32 {
-        let texel = match self.step {
-            Step::Shift(shift) => i64::from(coordinate) >> shift,
-            Step::Ratio(steps) => (i64::from(coordinate) * self.size).div_euclid(steps),
-        };
-        self.byte(texel + self.offset)
+    pub fn nearest(&self, coordinates: [i32; 4]) -> [u32; 4] {
+        coordinates.map(|c| {
+            let texel = match self.step {
+                Step::Shift(shift) => i64::from(c) >> shift,
+                Step::Ratio(steps) => (i64::from(c) * self.size).div_euclid(steps),
+            };
+            self.byte(texel + self.offset)
+        })
+    }
+
+    #[inline(always)]
+    fn pair(&self, first: i64) -> [u32; 2] {
+        [self.byte(first), self.byte(first + 1)]
     }
 
     #[inline(always)]
@@ -78,7 +101,6 @@ impl Axis {
     #[inline(always)]
     fn wrapped(&self, texel: i64) -> i64 {
         match self.wrap {
-            Wrap::Repeat if self.power_of_two => texel & (self.size - 1),
             Wrap::Repeat if (texel as u64) < self.size as u64 => texel,
             Wrap::Repeat => texel.rem_euclid(self.size),
             Wrap::MirroredRepeat => {

@@ -168,6 +168,8 @@ impl<'a> Builder<'a> {
         let kind = Arc::new(Kind {
             size: texture.size,
             extent,
+            to_texels: [0, 1]
+                .map(|a| texture.size[a] as f32 / (SUBTEXELS as f32 * extent[a] as f32)),
             sampler: key.sampler,
             skew_bytes: key.skew_bytes,
             levels,

@@ -47,24 +47,20 @@ impl Bundle {
     pub fn push(&mut self, texels: [u32; 4]) {
         let [a, b, c, d] = texels;
         let index = usize::from(self.count & 3);
-        // Unused entries repeat the first line, so that whole arrays can be compared.
+        // Unused entries repeat the first line, so that whole arrays can be compared. No branches:
+        // whether a footprint crosses a line is a coin toss to the processor.
         let mut lines = [a; 4];
-        let mut len = 1;
-        if b != a {
-            lines[1] = b;
-            len = 2;
-        }
-        if c != a && c != b {
-            lines[len] = c;
-            len += 1;
-        }
-        if d != a && d != b && d != c {
-            lines[len & 3] = d;
-            len += 1;
-        }
-        if index > 0 && self.lines[index - 1] == lines {
-            self.repeats |= 1 << index;
-        }
+        let new_b = b != a;
+        lines[1] = b;
+        let mut len = 1 + usize::from(new_b);
+        let new_c = (c != a) & (c != b);
+        lines[len] = if new_c { c } else { a };
+        len += usize::from(new_c);
+        let new_d = (d != a) & (d != b) & (d != c);
+        lines[len & 3] = if new_d { d } else { lines[len & 3] };
+        len += usize::from(new_d);
+        let repeats = (index > 0) & (self.lines[index.wrapping_sub(1) & 3] == lines);
+        self.repeats |= u8::from(repeats) << index;
         self.lines[index] = lines;
         self.lens[index] = len as u8;
         self.count += 1;

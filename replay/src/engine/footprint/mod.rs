@@ -14,7 +14,7 @@ pub use bundle::Bundle;
 use super::ReplayError;
 use crate::config::{RunConfig, SamplingConfig};
 use axis::Axis;
-use formats::footprint::{quad_lod, select_levels};
+use formats::footprint::{LodFormula, fast_log2, quad_lod, select_levels};
 use formats::textrace::{QuadRecord, Tables};
 use formats::texture::{Filter, Sampler};
 use std::sync::Arc;
@@ -60,6 +60,8 @@ struct Kind {
     size: [u32; 2],
     /// The group's, which defines the fixed-point step.
     extent: [u32; 2],
+    /// Fixed-point steps to texels of level 0.
+    to_texels: [f32; 2],
     sampler: Sampler,
     /// Bytes by which the texture starts after the start of a line.
     skew_bytes: u32,
@@ -138,8 +140,7 @@ impl Footprints {
     /// Footprints of a record in one kind of texture; true if two levels are read.
     #[inline(always)]
     fn bundles(&self, kind: &Kind, record: &QuadRecord, out: &mut [Bundle; 2]) -> bool {
-        let lod =
-            quad_lod(record, kind.extent, kind.size, self.sampling.lod) + self.sampling.lod_bias;
+        let lod = self.lod(kind, record) + self.sampling.lod_bias;
         let levels = select_levels(lod, &kind.sampler, kind.levels.len() as u32);
         let both = levels.count > 1;
         let lanes = if self.helper_lanes {
@@ -162,6 +163,19 @@ impl Footprints {
         both
     }
 
+    /// `quad_lod`, with the scale computed once a trace for the formula that is used by default.
+    #[inline(always)]
+    fn lod(&self, kind: &Kind, record: &QuadRecord) -> f32 {
+        if self.sampling.lod != LodFormula::Llvmpipe {
+            return quad_lod(record, kind.extent, kind.size, self.sampling.lod);
+        }
+        let squared = |d: [i32; 2]| {
+            let [u, v] = [0, 1].map(|a| d[a] as f32 * kind.to_texels[a]);
+            u * u + v * v
+        };
+        0.5 * fast_log2(squared(record.dx).max(squared(record.dy)))
+    }
+
     #[inline(always)]
     fn fill(
         &self,
@@ -175,22 +189,30 @@ impl Footprints {
         out.begin(level as u8);
         let Level { base_bytes, u, v } = &kind.levels[level as usize];
         let base = base_bytes + kind.skew_bytes;
-        let mut left = lanes;
-        while left != 0 {
-            let [s, t] = uv[left.trailing_zeros() as usize & 3];
-            left &= left - 1;
-            match filter {
-                Filter::Linear => {
-                    let ((x0, x1), (y0, y1)) = (u.linear(s), v.linear(t));
-                    let line = |x: u32, y: u32| (base + x + y) >> self.line_shift;
-                    out.push([line(x0, y0), line(x1, y0), line(x0, y1), line(x1, y1)]);
+        let line = |offset: u32| (base + offset) >> self.line_shift;
+        let [us, vs] = [0, 1].map(|axis| uv.map(|lane| lane[axis]));
+        match filter {
+            Filter::Linear => {
+                let (columns, rows) = (u.linear(us), v.linear(vs));
+                for lane in lanes_of(lanes) {
+                    let ([x0, x1], [y0, y1]) = (columns[lane], rows[lane]);
+                    out.push([line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)]);
                 }
-                Filter::Nearest => {
-                    out.push([(base + u.nearest(s) + v.nearest(t)) >> self.line_shift; 4]);
+            }
+            Filter::Nearest => {
+                let (columns, rows) = (u.nearest(us), v.nearest(vs));
+                for lane in lanes_of(lanes) {
+                    out.push([line(columns[lane] + rows[lane]); 4]);
                 }
             }
         }
     }
+}
+
+/// The lanes of a mask, ascending.
+#[inline(always)]
+fn lanes_of(mask: u8) -> impl Iterator<Item = usize> {
+    (0..4).filter(move |lane| mask >> lane & 1 != 0)
 }
 
 #[cfg(test)]
