@@ -38,7 +38,7 @@ impl Cache for RandomReplacement {
             self.state ^= self.state >> 7;
             self.state ^= self.state << 17;
             // The high bits, scaled: xorshift's low bits are its weak ones.
-            ((self.state >> 32) * set.len() as u64 >> 32) as usize
+            (((self.state >> 32) * set.len() as u64) >> 32) as usize
         });
         set[way] = line;
     }

@@ -30,7 +30,7 @@ impl TreePlru {
         let mut node = way + self.ways;
         while node > 1 {
             let parent = node / 2;
-            if node % 2 == 0 {
+            if node.is_multiple_of(2) {
                 *tree |= 1 << parent;
             } else {
                 *tree &= !(1 << parent);

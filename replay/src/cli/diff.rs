@@ -70,8 +70,8 @@ fn tables(left: &Tables, right: &Tables, ignore_meta: bool) -> Result<Option<Str
             serde_json::to_value(&left.meta)?,
             serde_json::to_value(&right.meta)?,
         );
-        let keys = a.as_object().into_iter().flat_map(serde_json::Map::keys);
-        for key in keys.filter(|key| a[*key] != b[*key]) {
+        let mut keys = a.as_object().into_iter().flat_map(serde_json::Map::keys);
+        if let Some(key) = keys.find(|key| a[*key] != b[*key]) {
             return Ok(Some(differ(&format!("meta.{key}"), &a[key], &b[key])));
         }
     }

@@ -76,7 +76,7 @@ impl Synthetic {
             let mut z = state;
             z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
             z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-            (((z ^ z >> 31) >> 32) * u64::from(below) >> 32) as i32
+            ((((z ^ (z >> 31)) >> 32) * u64::from(below)) >> 32) as i32
         };
         let edge = self.patch_px as i32;
         let mut patches = Vec::new();

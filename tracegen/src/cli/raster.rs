@@ -202,7 +202,7 @@ fn lasting_arguments(arguments: impl Iterator<Item = String>) -> Vec<String> {
         if WITH_VALUE.contains(&argument.as_str()) {
             skip_value = true;
         } else if !WITH_VALUE.contains(&name)
-            && !(argument.starts_with("-o") && !argument.starts_with("--"))
+            && !argument.starts_with("-o")
             && argument != "--no-plain"
         {
             kept.push(argument);

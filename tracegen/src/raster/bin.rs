@@ -4,6 +4,7 @@
 //! record of a region uniquely, so the result does not.
 
 use super::backend::RawRecord;
+use formats::textrace::quad_morton;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -118,12 +119,6 @@ pub fn sort_key(record: &RawRecord) -> u64 {
         | u64::from(morton) << 8
         | u64::from(record.group()) << 4
         | u64::from(record.mask())
-}
-
-/// Position of a quad on the Morton curve of its tile, x in the even bits.
-fn quad_morton(x: u8, y: u8) -> u8 {
-    let spread = |v: u8| v & 1 | (v & 2) << 1 | (v & 4) << 2;
-    spread(x) | spread(y) << 1
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ pub mod material;
 pub mod picture;
 pub mod ray;
 pub mod reference;
+pub mod robustness;
 pub mod scene;
 pub mod soup;
 pub mod texture;

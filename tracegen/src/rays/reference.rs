@@ -211,10 +211,12 @@ pub fn brute_force_f64(
     let direction = direction.normalize();
     let mut nearest: Option<f64> = None;
     let mut doubtful = false;
-    // Edges that the line passes within the tolerance of, with the triangles' facing there.
     for t in 0..mesh.triangles.len() {
         let index = mesh.triangles[t];
         let [a, b, c] = mesh.corners(t).map(|v| v - origin);
+        if far_from_line(&[a, b, c], direction, tolerance) {
+            continue;
+        }
         // Volume with the vertices in ascending order: neighbours get the same bits.
         let edge = |p: DVec3, q: DVec3, ip: u32, iq: u32| {
             if ip < iq {
@@ -273,6 +275,14 @@ pub fn brute_force_f64(
     }
 }
 
+/// True where the line misses even the sphere about a triangle.
+fn far_from_line(v: &[DVec3; 3], direction: DVec3, tolerance: f64) -> bool {
+    let center = (v[0] + v[1] + v[2]) / 3.0;
+    let radius = v.iter().map(|p| (*p - center).length()).fold(0.0, f64::max);
+    let across = center - direction * center.dot(direction);
+    across.length() > radius * 1.000_001 + tolerance
+}
+
 fn near_triangle(v: &[DVec3; 3], direction: DVec3, tolerance: f64) -> bool {
     // Project along the ray: distance of the origin from the triangle in the plane across it.
     let flat = v.map(|p| p - direction * p.dot(direction));
@@ -293,7 +303,9 @@ fn grazes_silhouette(mesh: &TestMesh, origin: DVec3, direction: DVec3, tolerance
     let mut facing = std::collections::BTreeMap::new();
     for (t, index) in mesh.triangles.iter().enumerate() {
         let corners = mesh.corners(t).map(|v| v - origin);
-        if !near_triangle(&corners, direction, tolerance) {
+        if far_from_line(&corners, direction, tolerance)
+            || !near_triangle(&corners, direction, tolerance)
+        {
             continue;
         }
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -314,6 +326,9 @@ fn grazes_silhouette(mesh: &TestMesh, origin: DVec3, direction: DVec3, tolerance
 fn interior_hits(mesh: &TestMesh, origin: DVec3, direction: DVec3, tolerance: f64) -> bool {
     (0..mesh.triangles.len()).any(|t| {
         let v = mesh.corners(t).map(|v| v - origin);
+        if far_from_line(&v, direction, tolerance) {
+            return false;
+        }
         let volumes = [(1, 2), (2, 0), (0, 1)].map(|(p, q)| v[p].cross(v[q]).dot(direction));
         let inside = volumes.iter().all(|x| *x > 0.0) || volumes.iter().all(|x| *x < 0.0);
         let normal = (v[1] - v[0]).cross(v[2] - v[0]);

@@ -16,11 +16,11 @@ const SETTINGS: BvhBuildParams = BvhBuildParams {
     pre_split: false,
     ploc_search_distance: PlocSearchDistance::Medium,
     search_depth_threshold: 0,
-    reinsertion_batch_ratio: 0.15,
+    reinsertion_batch_ratio: 0.25,
     post_collapse_reinsertion_batch_ratio_multiplier: 1.0,
     sort_precision: SortPrecision::U64,
     max_prims_per_leaf: 4,
-    collapse_traversal_cost: 1.0,
+    collapse_traversal_cost: 2.0,
 };
 
 /// The settings by name, for the trace.
@@ -171,7 +171,14 @@ fn emit2(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
             children: [Child::NONE; 2],
         };
         let first = tree.nodes[at as usize].first_index;
-        for side in [1u32, 0] {
+        // The larger child, likelier to be visited, is laid out right behind its parent.
+        let area = |side: u32| tree.nodes[(first + side) as usize].aabb().half_area();
+        let order = if !root_is_leaf && area(1) > area(0) {
+            [0u32, 1]
+        } else {
+            [1, 0]
+        };
+        for side in order {
             let member = match (root_is_leaf, side) {
                 (true, 0) => Some(0),
                 (true, _) => None,

@@ -154,13 +154,13 @@ mod avx2 {
         fn step2(ray: &Ray, node: &Node2, t_max: f32) -> ([f32; 2], u32) {
             // SAFETY: dispatch makes sure of AVX2; loads are of whole arrays.
             unsafe {
-                let mut m = _mm_setr_ps(ray.t_min, ray.t_min, -t_max, -t_max);
-                for a in 0..3 {
+                let ends = _mm_setr_ps(ray.t_min, ray.t_min, -t_max, -t_max);
+                let [x, y, z] = std::array::from_fn(|a| {
                     let planes = _mm_load_ps(node.bounds[a].as_ptr());
                     let planes = _mm_permutevar_ps(planes, ray.order2[a]);
-                    let t = _mm_mul_ps(_mm_sub_ps(planes, ray.origin2[a]), ray.reciprocal2[a]);
-                    m = _mm_max_ps(m, t);
-                }
+                    _mm_mul_ps(_mm_sub_ps(planes, ray.origin2[a]), ray.reciprocal2[a])
+                });
+                let m = _mm_max_ps(_mm_max_ps(x, y), _mm_max_ps(z, ends));
                 let far = _mm_xor_ps(_mm_movehl_ps(m, m), _mm_set1_ps(-0.0));
                 let mask = _mm_movemask_ps(_mm_cmple_ps(m, far)) as u32 & 3;
                 let second = _mm_shuffle_ps::<1>(m, m);

@@ -91,15 +91,21 @@ impl Width for Two {
     ) -> Option<Child> {
         let node = &bvh.nodes2[node as usize];
         let (near, mask) = K::step2(ray, node, t_max);
+        // Branches beat selects here: a guessed child is fetched while its box is still tested.
+        let [left, right] = node.children;
         match mask {
             0 => None,
-            1 => Some(node.children[0]),
-            2 => Some(node.children[1]),
+            1 => Some(left),
+            2 => Some(right),
             _ => {
-                let far = usize::from(near[0] <= near[1]);
-                stack[*top] = pack(near[far], node.children[far]);
+                let (nearer, pushed) = if near[0] <= near[1] {
+                    (left, pack(near[1], right))
+                } else {
+                    (right, pack(near[0], left))
+                };
+                stack[*top] = pushed;
                 *top += 1;
-                Some(node.children[far ^ 1])
+                Some(nearer)
             }
         }
     }

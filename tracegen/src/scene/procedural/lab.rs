@@ -1,7 +1,7 @@
 //! A chemistry bench: flasks, tubes, a retort and a condenser in glass. 98 K triangles.
 
 use super::glassware::{
-    beaker, bottle, erlenmeyer, filling, glass_tube, helix, round_flask, shell, stopper, test_tube,
+    beaker, bottle, erlenmeyer, filling, glass_tube, shell, stopper, test_tube,
 };
 use super::masonry::octagon_tiles;
 use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
@@ -10,21 +10,21 @@ use super::organic::{paper_label, polished_wood};
 use super::scene_builder::{MaterialId, SceneBuilder};
 use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
 use crate::scene::Scene;
-use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use glam::{Affine3A, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-struct Kit {
-    glass: MaterialId,
-    amber: MaterialId,
-    liquids: [MaterialId; 5],
-    steel: MaterialId,
-    brass: MaterialId,
-    rubber: MaterialId,
-    wood: MaterialId,
-    bench: MaterialId,
-    tiles: MaterialId,
-    label: MaterialId,
-    flame: MaterialId,
+pub(super) struct Kit {
+    pub(super) glass: MaterialId,
+    pub(super) amber: MaterialId,
+    pub(super) liquids: [MaterialId; 5],
+    pub(super) steel: MaterialId,
+    pub(super) brass: MaterialId,
+    pub(super) rubber: MaterialId,
+    pub(super) wood: MaterialId,
+    pub(super) bench: MaterialId,
+    pub(super) tiles: MaterialId,
+    pub(super) label: MaterialId,
+    pub(super) flame: MaterialId,
 }
 
 fn kit(scene: &mut SceneBuilder) -> Kit {
@@ -114,21 +114,36 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
     }
 }
 
-fn at(x: f32, y: f32, z: f32) -> Affine3A {
+pub(super) fn at(x: f32, y: f32, z: f32) -> Affine3A {
     Affine3A::from_translation(vec3(x, y, z))
 }
 
-/// A turned vessel and what is in it, placed together.
-fn vessel(
+/// How a vessel is blown.
+pub(super) struct Ware<'a> {
+    /// Outline of the outer skin from the axis to the rim.
+    pub(super) outer: &'a [Knot],
+    /// Thickness of the glass, metres.
+    pub(super) wall: f32,
+    /// Segments around.
+    pub(super) segments: usize,
+    /// How far the rim is pulled out into a spout, as a fraction of its radius.
+    pub(super) lip: f32,
+}
+
+/// A turned vessel and what is in it (liquid and its level), placed together.
+pub(super) fn vessel(
     scene: &mut SceneBuilder,
     glass: MaterialId,
-    outer: &[Knot],
-    wall: f32,
+    ware: &Ware<'_>,
     fill: Option<(MaterialId, f32)>,
-    segments: usize,
     places: &[Affine3A],
-    lip: f32,
 ) {
+    let &Ware {
+        outer,
+        wall,
+        segments,
+        lip,
+    } = ware;
     let mut m = MeshBuilder::new();
     let top = outer.last().map_or(0.0, |k| k.at.y);
     // A spout: the rim is pulled out on one side.
@@ -158,7 +173,7 @@ pub fn scene() -> Scene {
     furniture(&mut scene, &kit);
     flasks(&mut scene, &kit);
     rack(&mut scene, &kit);
-    distillation(&mut scene, &kit);
+    super::lab_still::distillation(&mut scene, &kit);
     shelf(&mut scene, &kit);
     scene.camera(
         "default",
@@ -193,57 +208,67 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &flask,
-        0.0018,
+        &Ware {
+            outer: &flask,
+            wall: 0.0018,
+            segments: 47,
+            lip: 0.0,
+        },
         Some((kit.liquids[0], 0.055)),
-        47,
         &[at(-0.10, 0.0, 0.16)],
-        0.0,
     );
     let small = erlenmeyer(0.105, 2);
     vessel(
         scene,
         kit.glass,
-        &small,
-        0.0016,
+        &Ware {
+            outer: &small,
+            wall: 0.0016,
+            segments: 40,
+            lip: 0.0,
+        },
         Some((kit.liquids[4], 0.036)),
-        40,
         &[at(0.20, 0.0, 0.185)],
-        0.0,
     );
     let large = beaker(0.043, 0.115, 3);
     vessel(
         scene,
         kit.glass,
-        &large,
-        0.0017,
+        &Ware {
+            outer: &large,
+            wall: 0.0017,
+            segments: 47,
+            lip: 0.14,
+        },
         Some((kit.liquids[1], 0.062)),
-        47,
         &[at(0.075, 0.0, 0.155)],
-        0.14,
     );
     let cup = beaker(0.030, 0.075, 3);
     vessel(
         scene,
         kit.glass,
-        &cup,
-        0.0014,
+        &Ware {
+            outer: &cup,
+            wall: 0.0014,
+            segments: 40,
+            lip: 0.14,
+        },
         Some((kit.liquids[2], 0.03)),
-        40,
         &[at(-0.24, 0.0, 0.19)],
-        0.14,
     );
     // A graduated cylinder and its foot.
     let cylinder = beaker(0.0155, 0.19, 3);
     vessel(
         scene,
         kit.glass,
-        &cylinder,
-        0.0013,
+        &Ware {
+            outer: &cylinder,
+            wall: 0.0013,
+            segments: 34,
+            lip: 0.18,
+        },
         Some((kit.liquids[3], 0.11)),
-        34,
         &[at(-0.185, 0.006, 0.065)],
-        0.18,
     );
     let mut foot = MeshBuilder::new();
     foot.lathe_shaped(
@@ -292,12 +317,14 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &dish,
-        0.0014,
+        &Ware {
+            outer: &dish,
+            wall: 0.0014,
+            segments: 40,
+            lip: 0.0,
+        },
         Some((kit.liquids[3], 0.005)),
-        40,
         &[at(0.0, 0.0, 0.245)],
-        0.0,
     );
     let mut funnel = MeshBuilder::new();
     let cone = curve(
@@ -357,12 +384,14 @@ fn rack(scene: &mut SceneBuilder, kit: &Kit) {
         vessel(
             scene,
             kit.glass,
-            &tube,
-            0.0010,
+            &Ware {
+                outer: &tube,
+                wall: 0.0010,
+                segments: 17,
+                lip: 0.0,
+            },
             Some((kit.liquids[(i * 2 + 1) % 5], level)),
-            17,
             &[place],
-            0.0,
         );
     }
 }
@@ -403,249 +432,6 @@ fn plate_with_hole(m: &mut MeshBuilder, center: Vec3, half: glam::Vec2, hole: f3
     }
 }
 
-fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
-    // Burner.
-    let (bx, bz) = (-0.02, 0.0);
-    let mut burner = MeshBuilder::new();
-    let body = [
-        sharp(0.0, 0.0),
-        sharp(0.036, 0.0),
-        smooth(0.036, 0.004),
-        smooth(0.026, 0.009),
-        smooth(0.012, 0.013),
-        sharp(0.0095, 0.02),
-        sharp(0.0115, 0.021),
-        sharp(0.0115, 0.036),
-        sharp(0.0088, 0.037),
-        sharp(0.0088, 0.072),
-        sharp(0.0098, 0.073),
-        sharp(0.0098, 0.079),
-        sharp(0.0072, 0.079),
-        sharp(0.0072, 0.045),
-        sharp(0.0, 0.045),
-    ];
-    burner.lathe(&curve(&body, 3), 32);
-    let burner = scene.mesh("burner", burner, kit.brass);
-    scene.place(burner, at(bx, 0.0, bz));
-    let mut flame = MeshBuilder::new();
-    flame.lathe(
-        &curve(
-            &[
-                smooth(0.0, 0.08),
-                smooth(0.0065, 0.086),
-                smooth(0.0078, 0.096),
-                smooth(0.0045, 0.112),
-                smooth(0.0, 0.128),
-            ],
-            4,
-        ),
-        20,
-    );
-    let flame = scene.mesh("flame", flame, kit.flame);
-    scene.place(flame, at(bx, 0.0, bz));
-    let hose: Vec<(Vec3, f32)> = (0..=24)
-        .map(|i| {
-            let t = i as f32 / 24.0;
-            (
-                vec3(
-                    bx - 0.03 - 0.33 * t,
-                    0.008 + 0.012 * (1.0 - t),
-                    bz - 0.02 - 0.14 * t * t + 0.03 * (9.0 * t).sin(),
-                ),
-                0.0055,
-            )
-        })
-        .collect();
-    let mut tube = MeshBuilder::new();
-    tube.tube(&hose, 12);
-    scene.add("hose", tube, kit.rubber);
-
-    // Retort: a bulb whose neck bends over into the condenser.
-    let bulb = round_flask(0.045, 0.012, 1);
-    let lift = 0.131;
-    vessel(
-        scene,
-        kit.glass,
-        &bulb,
-        0.0015,
-        Some((kit.liquids[2], 0.034)),
-        47,
-        &[at(bx, lift, bz)],
-        0.0,
-    );
-    let mut plug = MeshBuilder::new();
-    plug.lathe(&stopper(0.0125), 24);
-    let plug = scene.mesh("stopper", plug, kit.rubber);
-    scene.place(plug, at(bx, lift + 0.103, bz));
-    let neck: Vec<(Vec3, f32)> = (0..=40)
-        .map(|i| {
-            let t = i as f32 / 40.0;
-            let bend = smoothstep(0.0, 0.45, t);
-            let y = lift + 0.088 + 0.055 * (t * 3.2).sin().max(-1.0) * (1.0 - 0.3 * t)
-                - 0.03 * bend * t;
-            (
-                vec3(bx + 0.02 + 0.165 * t.powf(0.9), y, bz - 0.003 * t),
-                0.0125 - 0.0055 * t,
-            )
-        })
-        .collect();
-    scene.add("retort-neck", glass_tube(&neck, 0.82, 16), kit.glass);
-
-    // Condenser: jacket, coil, nozzles, hung at a slant from the neck's end.
-    let end = neck.last().map_or(Vec3::ZERO, |n| n.0);
-    let slant = Affine3A::from_rotation_translation(
-        Quat::from_rotation_z(0.42),
-        end + vec3(0.022, -0.175, 0.0),
-    );
-    let jacket = curve(
-        &[
-            sharp(0.0062, 0.0),
-            smooth(0.0066, 0.012),
-            smooth(0.021, 0.022),
-            smooth(0.023, 0.032),
-            smooth(0.023, 0.09),
-            smooth(0.023, 0.148),
-            smooth(0.021, 0.158),
-            smooth(0.0085, 0.168),
-            sharp(0.0082, 0.182),
-        ],
-        4,
-    );
-    let mut walls = jacket.clone();
-    walls.extend(jacket.iter().rev().map(|k| Knot {
-        at: vec2(k.at.x - 0.0014, k.at.y),
-        sharp: k.sharp,
-    }));
-    walls.push(jacket[0]);
-    let mut m = MeshBuilder::new();
-    m.lathe(&walls, 32);
-    let jacket = scene.mesh("condenser", m, kit.glass);
-    scene.place(jacket, slant);
-    let mut coil = helix(0.0125, 0.0125, 9.0, 0.0032, 20);
-    for (p, _) in &mut coil {
-        p.y += 0.033;
-    }
-    let coil = scene.mesh("coil", glass_tube(&coil, 0.65, 8), kit.glass);
-    scene.place(coil, slant);
-    for (y, side) in [(0.036, 1.0f32), (0.144, -1.0)] {
-        let nozzle = [
-            (vec3(side * 0.021, y, 0.0), 0.0045),
-            (vec3(side * 0.032, y, 0.0), 0.004),
-            (vec3(side * 0.045, y + 0.002, 0.0), 0.0038),
-        ];
-        let nozzle = scene.mesh("nozzle", glass_tube(&nozzle, 0.6, 16), kit.glass);
-        scene.place(nozzle, slant);
-    }
-    // Receiver.
-    let foot = slant.transform_point3(vec3(0.0, -0.002, 0.0));
-    let receiver = round_flask(0.031, 0.022, 1);
-    let low = (foot.y - 0.088).max(0.012);
-    vessel(
-        scene,
-        kit.glass,
-        &receiver,
-        0.0014,
-        Some((kit.liquids[0], 0.018)),
-        40,
-        &[at(foot.x, low, foot.z)],
-        0.0,
-    );
-    let mut cork = MeshBuilder::new();
-    cork.lathe(
-        &curve(
-            &[
-                sharp(0.019, 0.0),
-                smooth(0.023, 0.005),
-                smooth(0.021, 0.012),
-                sharp(0.017, 0.014),
-                sharp(0.015, 0.010),
-                sharp(0.015, 0.0),
-                sharp(0.019, 0.0),
-            ],
-            3,
-        ),
-        36,
-    );
-    let ring = scene.mesh("cork-ring", cork, kit.wood);
-    scene.place(ring, at(foot.x, low - 0.012, foot.z));
-
-    // Stand: plate, rod, two clamps; a tripod with gauze over the flame.
-    let mut stand = MeshBuilder::new();
-    stand.block(
-        vec3(bx - 0.12, 0.0, bz - 0.13),
-        vec3(bx + 0.05, 0.010, bz - 0.02),
-        0.003,
-    );
-    let rod_x = bx - 0.075;
-    stand.tube(
-        &[
-            (vec3(rod_x, 0.008, bz - 0.075), 0.0048),
-            (vec3(rod_x, 0.36, bz - 0.075), 0.0048),
-        ],
-        20,
-    );
-    for y in [lift + 0.094] {
-        stand.block(
-            vec3(rod_x - 0.011, y - 0.011, bz - 0.087),
-            vec3(rod_x + 0.011, y + 0.011, bz - 0.062),
-            0.003,
-        );
-        stand.tube(
-            &[
-                (vec3(rod_x, y, bz - 0.07), 0.0034),
-                (vec3(bx - 0.03, y, bz - 0.035), 0.0034),
-                (vec3(bx - 0.014, y, bz - 0.012), 0.0034),
-            ],
-            14,
-        );
-        let ring: Vec<(Vec3, f32)> = (0..=32)
-            .map(|i| {
-                let (sin, cos) = (TAU * (i % 32) as f32 / 32.0).sin_cos();
-                (vec3(bx + 0.0165 * cos, y, bz + 0.0165 * sin), 0.0026)
-            })
-            .collect();
-        stand.tube(&ring, 12);
-    }
-    let top = 0.1285;
-    let ring: Vec<(Vec3, f32)> = (0..=40)
-        .map(|i| {
-            let (sin, cos) = (TAU * (i % 40) as f32 / 40.0).sin_cos();
-            (
-                vec3(bx + 0.047 * cos, top - 0.004, bz + 0.047 * sin),
-                0.0028,
-            )
-        })
-        .collect();
-    stand.tube(&ring, 12);
-    for i in 0..3 {
-        let (sin, cos) = (0.5 + TAU * i as f32 / 3.0).sin_cos();
-        stand.tube(
-            &[
-                (
-                    vec3(bx + 0.047 * cos, top - 0.004, bz + 0.047 * sin),
-                    0.0028,
-                ),
-                (vec3(bx + 0.072 * cos, 0.0, bz + 0.072 * sin), 0.0028),
-            ],
-            12,
-        );
-    }
-    for i in -13..=13 {
-        let o = 0.0035 * i as f32;
-        let reach = (0.0475f32.powi(2) - o * o).max(0.0).sqrt();
-        for k in 0..2 {
-            let (a, b) = if k == 0 {
-                (vec3(o, 0.0, -reach), vec3(o, 0.0, reach))
-            } else {
-                (vec3(-reach, 0.0007, o), vec3(reach, 0.0007, o))
-            };
-            let c = vec3(bx, top, bz);
-            stand.tube(&[(c + a, 0.0005), (c + b, 0.0005)], 5);
-        }
-    }
-    scene.add("stand", stand, kit.steel);
-}
-
 fn shelf(scene: &mut SceneBuilder, kit: &Kit) {
     let mut board = MeshBuilder::new();
     board.block(vec3(-0.62, 0.262, -0.32), vec3(0.62, 0.282, -0.16), 0.003);
@@ -666,32 +452,38 @@ fn shelf(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.amber,
-        &outer,
-        0.002,
+        &Ware {
+            outer: &outer,
+            wall: 0.002,
+            segments: 22,
+            lip: 0.0,
+        },
         Some((kit.liquids[1], 0.05)),
-        22,
         &amber,
-        0.0,
     );
     vessel(
         scene,
         kit.glass,
-        &outer,
-        0.002,
+        &Ware {
+            outer: &outer,
+            wall: 0.002,
+            segments: 22,
+            lip: 0.0,
+        },
         Some((kit.liquids[0], 0.062)),
-        22,
         &clear,
-        0.0,
     );
     vessel(
         scene,
         kit.glass,
-        &outer,
-        0.002,
+        &Ware {
+            outer: &outer,
+            wall: 0.002,
+            segments: 22,
+            lip: 0.0,
+        },
         Some((kit.liquids[4], 0.045)),
-        22,
         &low,
-        0.0,
     );
     let mut plug = MeshBuilder::new();
     plug.lathe(&stopper(0.0145), 12);

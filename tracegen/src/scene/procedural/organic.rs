@@ -218,7 +218,7 @@ fn leaf_outline(shape: LeafShape, x: f32, y: f32) -> (f32, f32) {
                     best = (inside * size, vein);
                 }
             }
-            if y > 0.99 || y < 0.01 || x.abs() > 0.98 {
+            if !(0.01..=0.99).contains(&y) || x.abs() > 0.98 {
                 (-1.0, 0.0)
             } else {
                 best

@@ -1,0 +1,255 @@
+//! The still: burner, retort, condenser, receiver and the stand that holds them.
+
+use super::glassware::{glass_tube, helix, round_flask, stopper};
+use super::lab::{Kit, Ware, at, vessel};
+use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
+use super::noise::smoothstep;
+use super::scene_builder::SceneBuilder;
+use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use std::f32::consts::TAU;
+
+pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
+    // Burner.
+    let (bx, bz) = (-0.02, 0.0);
+    let mut burner = MeshBuilder::new();
+    let body = [
+        sharp(0.0, 0.0),
+        sharp(0.036, 0.0),
+        smooth(0.036, 0.004),
+        smooth(0.026, 0.009),
+        smooth(0.012, 0.013),
+        sharp(0.0095, 0.02),
+        sharp(0.0115, 0.021),
+        sharp(0.0115, 0.036),
+        sharp(0.0088, 0.037),
+        sharp(0.0088, 0.072),
+        sharp(0.0098, 0.073),
+        sharp(0.0098, 0.079),
+        sharp(0.0072, 0.079),
+        sharp(0.0072, 0.045),
+        sharp(0.0, 0.045),
+    ];
+    burner.lathe(&curve(&body, 3), 32);
+    let burner = scene.mesh("burner", burner, kit.brass);
+    scene.place(burner, at(bx, 0.0, bz));
+    let mut flame = MeshBuilder::new();
+    flame.lathe(
+        &curve(
+            &[
+                smooth(0.0, 0.08),
+                smooth(0.0065, 0.086),
+                smooth(0.0078, 0.096),
+                smooth(0.0045, 0.112),
+                smooth(0.0, 0.128),
+            ],
+            4,
+        ),
+        20,
+    );
+    let flame = scene.mesh("flame", flame, kit.flame);
+    scene.place(flame, at(bx, 0.0, bz));
+    let hose: Vec<(Vec3, f32)> = (0..=24)
+        .map(|i| {
+            let t = i as f32 / 24.0;
+            (
+                vec3(
+                    bx - 0.03 - 0.33 * t,
+                    0.008 + 0.012 * (1.0 - t),
+                    bz - 0.02 - 0.14 * t * t + 0.03 * (9.0 * t).sin(),
+                ),
+                0.0055,
+            )
+        })
+        .collect();
+    let mut tube = MeshBuilder::new();
+    tube.tube(&hose, 12);
+    scene.add("hose", tube, kit.rubber);
+
+    // Retort: a bulb whose neck bends over into the condenser.
+    let bulb = round_flask(0.045, 0.012, 1);
+    let lift = 0.131;
+    vessel(
+        scene,
+        kit.glass,
+        &Ware {
+            outer: &bulb,
+            wall: 0.0015,
+            segments: 47,
+            lip: 0.0,
+        },
+        Some((kit.liquids[2], 0.034)),
+        &[at(bx, lift, bz)],
+    );
+    let mut plug = MeshBuilder::new();
+    plug.lathe(&stopper(0.0125), 24);
+    let plug = scene.mesh("stopper", plug, kit.rubber);
+    scene.place(plug, at(bx, lift + 0.103, bz));
+    let neck: Vec<(Vec3, f32)> = (0..=40)
+        .map(|i| {
+            let t = i as f32 / 40.0;
+            let bend = smoothstep(0.0, 0.45, t);
+            let y = lift + 0.088 + 0.055 * (t * 3.2).sin().max(-1.0) * (1.0 - 0.3 * t)
+                - 0.03 * bend * t;
+            (
+                vec3(bx + 0.02 + 0.165 * t.powf(0.9), y, bz - 0.003 * t),
+                0.0125 - 0.0055 * t,
+            )
+        })
+        .collect();
+    scene.add("retort-neck", glass_tube(&neck, 0.82, 16), kit.glass);
+
+    // Condenser: jacket, coil, nozzles, hung at a slant from the neck's end.
+    let end = neck.last().map_or(Vec3::ZERO, |n| n.0);
+    let slant = Affine3A::from_rotation_translation(
+        Quat::from_rotation_z(0.42),
+        end + vec3(0.022, -0.175, 0.0),
+    );
+    let jacket = curve(
+        &[
+            sharp(0.0062, 0.0),
+            smooth(0.0066, 0.012),
+            smooth(0.021, 0.022),
+            smooth(0.023, 0.032),
+            smooth(0.023, 0.09),
+            smooth(0.023, 0.148),
+            smooth(0.021, 0.158),
+            smooth(0.0085, 0.168),
+            sharp(0.0082, 0.182),
+        ],
+        4,
+    );
+    let mut walls = jacket.clone();
+    walls.extend(jacket.iter().rev().map(|k| Knot {
+        at: vec2(k.at.x - 0.0014, k.at.y),
+        sharp: k.sharp,
+    }));
+    walls.push(jacket[0]);
+    let mut m = MeshBuilder::new();
+    m.lathe(&walls, 32);
+    let jacket = scene.mesh("condenser", m, kit.glass);
+    scene.place(jacket, slant);
+    let mut coil = helix(0.0125, 0.0125, 9.0, 0.0032, 20);
+    for (p, _) in &mut coil {
+        p.y += 0.033;
+    }
+    let coil = scene.mesh("coil", glass_tube(&coil, 0.65, 8), kit.glass);
+    scene.place(coil, slant);
+    for (y, side) in [(0.036, 1.0f32), (0.144, -1.0)] {
+        let nozzle = [
+            (vec3(side * 0.021, y, 0.0), 0.0045),
+            (vec3(side * 0.032, y, 0.0), 0.004),
+            (vec3(side * 0.045, y + 0.002, 0.0), 0.0038),
+        ];
+        let nozzle = scene.mesh("nozzle", glass_tube(&nozzle, 0.6, 16), kit.glass);
+        scene.place(nozzle, slant);
+    }
+    // Receiver.
+    let foot = slant.transform_point3(vec3(0.0, -0.002, 0.0));
+    let receiver = round_flask(0.031, 0.022, 1);
+    let low = (foot.y - 0.088).max(0.012);
+    vessel(
+        scene,
+        kit.glass,
+        &Ware {
+            outer: &receiver,
+            wall: 0.0014,
+            segments: 40,
+            lip: 0.0,
+        },
+        Some((kit.liquids[0], 0.018)),
+        &[at(foot.x, low, foot.z)],
+    );
+    let mut cork = MeshBuilder::new();
+    cork.lathe(
+        &curve(
+            &[
+                sharp(0.019, 0.0),
+                smooth(0.023, 0.005),
+                smooth(0.021, 0.012),
+                sharp(0.017, 0.014),
+                sharp(0.015, 0.010),
+                sharp(0.015, 0.0),
+                sharp(0.019, 0.0),
+            ],
+            3,
+        ),
+        36,
+    );
+    let ring = scene.mesh("cork-ring", cork, kit.wood);
+    scene.place(ring, at(foot.x, low - 0.012, foot.z));
+
+    // Stand: plate, rod, two clamps; a tripod with gauze over the flame.
+    let mut stand = MeshBuilder::new();
+    stand.block(
+        vec3(bx - 0.12, 0.0, bz - 0.13),
+        vec3(bx + 0.05, 0.010, bz - 0.02),
+        0.003,
+    );
+    let rod_x = bx - 0.075;
+    stand.tube(
+        &[
+            (vec3(rod_x, 0.008, bz - 0.075), 0.0048),
+            (vec3(rod_x, 0.36, bz - 0.075), 0.0048),
+        ],
+        20,
+    );
+    let y = lift + 0.094;
+    stand.block(
+        vec3(rod_x - 0.011, y - 0.011, bz - 0.087),
+        vec3(rod_x + 0.011, y + 0.011, bz - 0.062),
+        0.003,
+    );
+    stand.tube(
+        &[
+            (vec3(rod_x, y, bz - 0.07), 0.0034),
+            (vec3(bx - 0.03, y, bz - 0.035), 0.0034),
+            (vec3(bx - 0.014, y, bz - 0.012), 0.0034),
+        ],
+        14,
+    );
+    let ring: Vec<(Vec3, f32)> = (0..=32)
+        .map(|i| {
+            let (sin, cos) = (TAU * (i % 32) as f32 / 32.0).sin_cos();
+            (vec3(bx + 0.0165 * cos, y, bz + 0.0165 * sin), 0.0026)
+        })
+        .collect();
+    stand.tube(&ring, 12);
+    let top = 0.1285;
+    let ring: Vec<(Vec3, f32)> = (0..=40)
+        .map(|i| {
+            let (sin, cos) = (TAU * (i % 40) as f32 / 40.0).sin_cos();
+            (
+                vec3(bx + 0.047 * cos, top - 0.004, bz + 0.047 * sin),
+                0.0028,
+            )
+        })
+        .collect();
+    stand.tube(&ring, 12);
+    for i in 0..3 {
+        let (sin, cos) = (0.5 + TAU * i as f32 / 3.0).sin_cos();
+        stand.tube(
+            &[
+                (
+                    vec3(bx + 0.047 * cos, top - 0.004, bz + 0.047 * sin),
+                    0.0028,
+                ),
+                (vec3(bx + 0.072 * cos, 0.0, bz + 0.072 * sin), 0.0028),
+            ],
+            12,
+        );
+    }
+    for i in -13..=13 {
+        let o = 0.0035 * i as f32;
+        let reach = (0.0475f32.powi(2) - o * o).max(0.0).sqrt();
+        for k in 0..2 {
+            let (a, b) = if k == 0 {
+                (vec3(o, 0.0, -reach), vec3(o, 0.0, reach))
+            } else {
+                (vec3(-reach, 0.0007, o), vec3(reach, 0.0007, o))
+            };
+            let c = vec3(bx, top, bz);
+            stand.tube(&[(c + a, 0.0005), (c + b, 0.0005)], 5);
+        }
+    }
+    scene.add("stand", stand, kit.steel);
+}

@@ -1,0 +1,336 @@
+//! The music box's gear train, governor, bells and fittings.
+
+use super::gears::{Gear, placed, screw, worm};
+use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
+use super::music_box::{CYLINDER, CYLINDER_HALF, Kit, MODULE};
+use super::scene_builder::SceneBuilder;
+use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+/// Spring barrel, great wheel, intermediate wheels and the governor.
+pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
+    // Gears stand in planes of constant x: their z axis turns to +x.
+    let facing = Quat::from_rotation_y(FRAC_PI_2);
+    let wheel = |teeth: u32, thickness: f32, spokes: u32| Gear {
+        teeth,
+        module: MODULE,
+        thickness,
+        bore: 0.0014,
+        spokes,
+    };
+    let great = wheel(36, 0.0030, 5);
+    let pinion = wheel(12, 0.0062, 0);
+    let second = wheel(32, 0.0022, 5);
+    let third = wheel(22, 0.0020, 4);
+    let meshes: Vec<usize> = [great, pinion, second, third]
+        .iter()
+        .zip([kit.brass, kit.steel, kit.brass, kit.brass])
+        .map(|(gear, material)| scene.mesh("gear", gear.build(), material))
+        .collect();
+    // In the wheel's plane, angles run from -z upwards.
+    let offset = |angle: f32, distance: f32| {
+        facing * vec3(angle.cos() * distance, angle.sin() * distance, 0.0)
+    };
+    for (plane, sign) in [
+        (CYLINDER.x - CYLINDER_HALF - 0.0075, -1.0f32),
+        (CYLINDER.x + CYLINDER_HALF + 0.0075, 1.0),
+    ] {
+        let center = vec3(plane, CYLINDER.y, CYLINDER.z);
+        scene.place(meshes[0], placed(center, facing, 0.0));
+        let direction = if sign < 0.0 { 2.9 } else { 0.25 };
+        let c1 = center + offset(direction, great.pitch_radius() + pinion.pitch_radius());
+        let t1 = pinion.mesh_turn(&great, 0.0, direction);
+        scene.place(meshes[1], placed(c1, facing, t1));
+        // The second wheel shares the pinion's arbor, further out.
+        let plane2 = Vec3::X * (sign * 0.0045);
+        scene.place(meshes[2], placed(c1 + plane2, facing, t1));
+        let direction2 = if sign < 0.0 { 1.2 } else { 1.9 };
+        let c2 = c1 + plane2 + offset(direction2, second.pitch_radius() + pinion.pitch_radius());
+        let t2 = pinion.mesh_turn(&second, t1, direction2);
+        scene.place(meshes[1], placed(c2, facing, t2));
+        scene.place(meshes[3], placed(c2 + plane2, facing, t2));
+        let mut arbors = MeshBuilder::new();
+        for c in [center, c1, c2] {
+            let shaft = [
+                sharp(0.0, -0.011),
+                sharp(0.0007, -0.011),
+                sharp(0.0013, -0.009),
+                sharp(0.0013, 0.009),
+                sharp(0.0007, 0.011),
+                sharp(0.0, 0.011),
+            ];
+            let mut rod = MeshBuilder::new();
+            rod.lathe(&shaft, 20);
+            arbors.merge(
+                &rod,
+                Affine3A::from_rotation_translation(
+                    Quat::from_rotation_z(-FRAC_PI_2),
+                    vec3(plane + sign * 0.003, c.y, c.z),
+                ),
+            );
+        }
+        scene.add("arbors", arbors, kit.steel);
+        // Cock: a plate outside the train, with jewelled holes.
+        let mut plate = MeshBuilder::new();
+        let x = plane + sign * 0.0135;
+        plate.block(
+            vec3(x - 0.001, 0.0085, CYLINDER.z - 0.027),
+            vec3(x + 0.001, 0.048, CYLINDER.z + 0.021),
+            0.0004,
+        );
+        scene.add("plate", plate, kit.polished);
+        let mut jewels = MeshBuilder::new();
+        for c in [center, c1, c2] {
+            let mut jewel = MeshBuilder::new();
+            jewel.lathe(
+                &curve(
+                    &[
+                        sharp(0.0017, 0.0),
+                        smooth(0.0016, 0.0006),
+                        smooth(0.0, 0.0011),
+                    ],
+                    4,
+                ),
+                24,
+            );
+            let out = Quat::from_rotation_z(-sign * FRAC_PI_2);
+            jewels.merge(
+                &jewel,
+                Affine3A::from_rotation_translation(out, vec3(x + sign * 0.001, c.y, c.z)),
+            );
+        }
+        scene.add("jewels", jewels, kit.ruby);
+    }
+    governor(scene, kit);
+}
+
+/// Worm and fan: an upright endless screw with two vanes.
+fn governor(scene: &mut SceneBuilder, kit: &Kit) {
+    let foot = vec3(-0.071, 0.010, 0.022);
+    let upright = Quat::from_rotation_x(-FRAC_PI_2);
+    let thread = scene.mesh("worm", worm(0.0016, 0.014, 9.0, 18), kit.steel);
+    scene.place(
+        thread,
+        Affine3A::from_rotation_translation(upright, foot + Vec3::Y * 0.012),
+    );
+    let mut fan = MeshBuilder::new();
+    for s in [-1.0f32, 1.0] {
+        fan.surface(10, 6, |u, v| {
+            let x = s * (0.0012 + 0.0095 * u);
+            let curl = 0.0018 * u * u * s;
+            (vec3(x, 0.010 * v, curl), vec2(x, v * 0.01))
+        });
+        fan.surface(10, 6, |u, v| {
+            let x = s * (0.0012 + 0.0095 * (1.0 - u));
+            let curl = 0.0018 * (1.0 - u) * (1.0 - u) * s - 0.00035;
+            (vec3(x, 0.010 * v, curl), vec2(x, v * 0.01))
+        });
+    }
+    let fan = scene.mesh("fan", fan, kit.polished);
+    scene.place(
+        fan,
+        Affine3A::from_rotation_translation(Quat::from_rotation_y(0.6), foot + Vec3::Y * 0.021),
+    );
+    let mut cage = MeshBuilder::new();
+    cage.tube(&[(foot, 0.0009), (foot + Vec3::Y * 0.034, 0.0009)], 12);
+    cage.block(
+        foot + vec3(-0.004, -0.002, -0.004),
+        foot + vec3(0.004, 0.001, 0.004),
+        0.0006,
+    );
+    scene.add("governor-post", cage, kit.steel);
+}
+
+/// Six bells on a rod behind the cylinder, largest on the left, each with its hammer.
+pub(super) fn bells(scene: &mut SceneBuilder, kit: &Kit) {
+    let mut bell = MeshBuilder::new();
+    let skin = [
+        sharp(0.0, 1.0),
+        smooth(0.28, 0.98),
+        smooth(0.52, 0.84),
+        smooth(0.62, 0.55),
+        smooth(0.74, 0.24),
+        sharp(1.0, 0.0),
+        sharp(0.94, 0.0),
+        smooth(0.68, 0.24),
+        smooth(0.56, 0.55),
+        smooth(0.46, 0.80),
+        smooth(0.0, 0.92),
+    ];
+    // The outline runs from the crown down: turned round, it faces outwards.
+    let skin: Vec<_> = skin.into_iter().rev().collect();
+    bell.lathe(&curve(&skin, 2), 32);
+    let bell = scene.mesh("bell", bell, kit.polished);
+    let mut hammer = MeshBuilder::new();
+    hammer.lathe(
+        &curve(
+            &[
+                smooth(0.0, -0.0016),
+                smooth(0.0016, 0.0),
+                smooth(0.0, 0.0016),
+            ],
+            4,
+        ),
+        14,
+    );
+    hammer.tube(
+        &[
+            (vec3(0.0, 0.0, 0.0), 0.0004),
+            (vec3(0.0, -0.012, 0.004), 0.0004),
+            (vec3(0.0, -0.024, 0.005), 0.0004),
+        ],
+        8,
+    );
+    let hammer = scene.mesh("hammer", hammer, kit.steel);
+    let (y, z) = (0.0425, -0.036);
+    for i in 0..6 {
+        let size = 0.0088 - 0.0007 * i as f32;
+        let x = -0.034 + 0.0155 * i as f32;
+        scene.place(
+            bell,
+            Affine3A::from_scale_rotation_translation(
+                Vec3::splat(size),
+                Quat::IDENTITY,
+                vec3(x, y - size, z),
+            ),
+        );
+        scene.place(
+            hammer,
+            Affine3A::from_translation(vec3(x, y - 0.8 * size, z + size + 0.0022)),
+        );
+    }
+    let mut rod = MeshBuilder::new();
+    rod.tube(
+        &[
+            (vec3(-0.048, y + 0.001, z), 0.0011),
+            (vec3(0.055, y + 0.001, z), 0.0011),
+        ],
+        14,
+    );
+    for x in [-0.046, 0.053] {
+        rod.tube(
+            &[
+                (vec3(x, 0.0066, z), 0.0016),
+                (vec3(x, y + 0.003, z), 0.0013),
+            ],
+            14,
+        );
+    }
+    scene.add("bell-rod", rod, kit.brass);
+}
+
+/// Bedplate, its screws, spring barrel and the winding key.
+pub(super) fn fittings(scene: &mut SceneBuilder, kit: &Kit) {
+    let mut bed = MeshBuilder::new();
+    bed.block(
+        vec3(-0.080, 0.0066, -0.042),
+        vec3(0.082, 0.0090, 0.047),
+        0.0008,
+    );
+    scene.add("bedplate", bed, kit.brass);
+    let head = scene.mesh("bed-screw", screw(0.0028), kit.blued);
+    for (i, (x, z)) in [
+        (-0.074, -0.037),
+        (0.076, -0.037),
+        (-0.074, 0.042),
+        (0.076, 0.042),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let turn = Quat::from_rotation_y(0.9 * i as f32 + 0.4);
+        scene.place(
+            head,
+            Affine3A::from_rotation_translation(turn, vec3(x, 0.0090, z)),
+        );
+    }
+    // Spring barrel behind the cylinder, its mainspring seen from above.
+    let mut barrel = MeshBuilder::new();
+    let (r, h) = (0.0085, 0.012);
+    barrel.lathe(
+        &[
+            sharp(0.0, 0.0),
+            sharp(1.1 * r, 0.0),
+            sharp(1.1 * r, 0.0012),
+            sharp(r, 0.0016),
+            sharp(r, h),
+            sharp(0.92 * r, h),
+            sharp(0.92 * r, 0.003),
+            sharp(0.0, 0.003),
+        ],
+        64,
+    );
+    let place = Affine3A::from_translation(vec3(0.052, 0.009, -0.025));
+    let barrel_mesh = scene.mesh("barrel", barrel, kit.polished);
+    let mut spring = MeshBuilder::new();
+    let coil = |s: f32| {
+        let a = 7.0 * TAU * s;
+        let radius = 0.0016 + (0.86 * r - 0.0016) * s;
+        vec2(radius * a.cos(), -radius * a.sin())
+    };
+    for (shift, outside) in [(0.0002f32, true), (-0.0002, false)] {
+        let mut band = MeshBuilder::new();
+        band.surface(300, 1, |s, t| {
+            let p = coil(s);
+            let q = p + p.normalize_or_zero() * shift;
+            (vec3(q.x, 0.0035 + 0.0075 * t, q.y), vec2(s * 0.2, t * 0.01))
+        });
+        band.orient(|p| {
+            if outside {
+                vec3(p.x, 0.0, p.z)
+            } else {
+                vec3(-p.x, 0.0, -p.z)
+            }
+        });
+        spring.merge(&band, Affine3A::IDENTITY);
+    }
+    spring.surface(300, 1, |s, t| {
+        let p = coil(s);
+        let q = p + p.normalize_or_zero() * (0.0002 - 0.0004 * t);
+        (vec3(q.x, 0.011, q.y), vec2(s * 0.2, t * 0.001))
+    });
+    let spring = scene.mesh("mainspring", spring, kit.blued);
+    for x in [0.0, -0.03] {
+        let place = Affine3A::from_translation(Vec3::X * x) * place;
+        scene.place(barrel_mesh, place);
+        scene.place(spring, place);
+    }
+    // Key in the front of the box.
+    let mut key = MeshBuilder::new();
+    key.lathe(
+        &curve(
+            &[
+                sharp(0.0, 0.0),
+                sharp(0.0034, 0.0),
+                smooth(0.0026, 0.004),
+                smooth(0.0022, 0.012),
+                sharp(0.003, 0.018),
+                sharp(0.0, 0.018),
+            ],
+            3,
+        ),
+        24,
+    );
+    for side in [-1.0f32, 1.0] {
+        let loop_points: Vec<(Vec3, f32)> = (0..=36)
+            .map(|i| {
+                let a = TAU * (i % 36) as f32 / 36.0;
+                (
+                    vec3(
+                        side * (0.0072 + 0.006 * a.cos()),
+                        0.021 + 0.0075 * a.sin(),
+                        0.0,
+                    ),
+                    0.0015,
+                )
+            })
+            .collect();
+        key.tube(&loop_points, 12);
+    }
+    let key = scene.mesh("key", key, kit.polished);
+    let turned = Quat::from_rotation_z(-FRAC_PI_2) * Quat::from_rotation_y(0.5);
+    scene.place(
+        key,
+        Affine3A::from_rotation_translation(turned, vec3(0.092, 0.028, 0.01)),
+    );
+}
