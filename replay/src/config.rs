@@ -175,9 +175,11 @@ pub struct TmuConfig {
     pub loop_cycles: u32,
     /// Threads (quads) that a core holds at once.
     pub threads: u32,
-    /// Footprints whose tags are checked in one cycle ahead of filtering: a trip that fails costs
-    /// the thread's footprints over this, rounded up.
-    pub probe_footprints: u32,
+    /// Footprints that one issue slot tries when their lines are not there: tags are checked a
+    /// quad at a time, while filtering takes one footprint a cycle.
+    pub retry_footprints: u32,
+    /// Lines that a thread asks the L2 for in one trip; further ones wait for the next trip.
+    pub fetches_per_trip: u32,
 }
 
 impl Default for TmuConfig {
@@ -185,9 +187,10 @@ impl Default for TmuConfig {
         Self {
             l1_penalty_cycles: 20,
             l2_penalty_cycles: 200,
-            loop_cycles: 36,
-            threads: 32,
-            probe_footprints: 8,
+            loop_cycles: 64,
+            threads: 64,
+            retry_footprints: 4,
+            fetches_per_trip: 2,
         }
     }
 }
@@ -343,12 +346,17 @@ impl RunConfig {
             "1 to 100000",
             tmu.loop_cycles.to_string(),
         )?;
-        range(
-            (1..=4096).contains(&tmu.probe_footprints),
-            "tmu.probe_footprints",
-            "1 to 4096",
-            tmu.probe_footprints.to_string(),
-        )?;
+        for (key, count) in [
+            ("tmu.retry_footprints", tmu.retry_footprints),
+            ("tmu.fetches_per_trip", tmu.fetches_per_trip),
+        ] {
+            range(
+                (1..=4096).contains(&count),
+                key,
+                "1 to 4096",
+                count.to_string(),
+            )?;
+        }
         for (key, cycles) in [
             ("tmu.l1_penalty_cycles", tmu.l1_penalty_cycles),
             ("tmu.l2_penalty_cycles", tmu.l2_penalty_cycles),

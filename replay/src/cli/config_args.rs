@@ -107,9 +107,12 @@ pub struct ConfigArgs {
     /// Threads (quads) that a core holds at once
     #[arg(long, value_name = "N", help_heading = "Texture unit")]
     tmu_threads: Option<u32>,
-    /// Footprints whose tags are checked in a cycle
+    /// Missing footprints that one issue slot tries
     #[arg(long, value_name = "N", help_heading = "Texture unit")]
-    probe_footprints: Option<u32>,
+    retry_footprints: Option<u32>,
+    /// Lines that a thread fetches in one trip
+    #[arg(long, value_name = "N", help_heading = "Texture unit")]
+    fetches_per_trip: Option<u32>,
 }
 
 /// Sets what a flag gives.
@@ -174,7 +177,8 @@ impl ConfigArgs {
         set(&mut config.tmu.l2_penalty_cycles, self.l2_penalty);
         set(&mut config.tmu.loop_cycles, self.loop_cycles);
         set(&mut config.tmu.threads, self.tmu_threads);
-        set(&mut config.tmu.probe_footprints, self.probe_footprints);
+        set(&mut config.tmu.retry_footprints, self.retry_footprints);
+        set(&mut config.tmu.fetches_per_trip, self.fetches_per_trip);
         Ok(())
     }
 }

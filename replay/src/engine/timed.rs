@@ -16,6 +16,8 @@ struct Core<A> {
     pipeline: Pipeline,
     l1: A,
     in_flight: InFlight,
+    /// The current thread's missing footprints, see `Pipeline::start`.
+    pending: Vec<u64>,
     feed: Feed,
     busy: bool,
 }
@@ -63,6 +65,7 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
                 pipeline: Pipeline::new(config.tmu),
                 l1,
                 in_flight: InFlight::default(),
+                pending: Vec::new(),
                 feed: Feed::default(),
                 busy: false,
             })
@@ -102,21 +105,11 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
                 .unwrap_or(0);
         }
         let mut sum = PipelineStats::default();
-        for core in &self.cores {
-            let stats = core.pipeline.stats();
-            sum.useful += stats.useful;
-            sum.wasted += stats.wasted;
-            sum.idle += stats.idle;
-            sum.threads += stats.threads;
-            sum.loops += stats.loops;
-        }
-        let active = sum.useful + sum.wasted + sum.idle;
+        self.cores
+            .iter()
+            .for_each(|core| sum.add(&core.pipeline.stats()));
         let tmu = TmuResult {
-            utilization: if active == 0 {
-                0.0
-            } else {
-                sum.useful as f64 / active as f64
-            },
+            utilization: sum.utilization(),
             wasted_issues: sum.wasted,
             threads: sum.threads,
             loops: sum.loops,
@@ -167,6 +160,7 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
         let now = core.pipeline.clock();
         core.in_flight.arrive(now, &mut core.l1);
         self.shared.in_flight.arrive(now, &mut self.shared.l2);
+        core.pending.clear();
         let mut probe = Probe {
             place: self.tally.quad(quad.at, quad.lanes()),
             tally: &mut self.tally,
@@ -175,7 +169,8 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
             l1_in_flight: &mut core.in_flight,
             shared: &mut self.shared,
             now,
-            ready: now,
+            pending: &mut core.pending,
+            fetches: 0,
             footprints: 0,
         };
         self.footprints.for_quad(
@@ -186,9 +181,9 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
                 probe.bundle(sample, bundle);
             },
         );
-        let (footprints, ready) = (probe.footprints, probe.ready);
+        let footprints = probe.footprints;
         if footprints > 0 {
-            core.pipeline.start(footprints, ready);
+            core.pipeline.start(footprints, &core.pending);
         }
         true
     }
@@ -237,7 +232,10 @@ struct Probe<'a, A, B> {
     l1_in_flight: &'a mut InFlight,
     shared: &'a mut Shared<B>,
     now: u64,
-    ready: u64,
+    /// Arrival of the last line of each footprint that missed.
+    pending: &'a mut Vec<u64>,
+    /// Lines that this thread had to ask for.
+    fetches: u64,
     footprints: u32,
 }
 
@@ -248,6 +246,8 @@ struct Misses {
     l1_secondary: u64,
     l2: u64,
     l2_secondary: u64,
+    /// When the last of the footprint's lines arrives.
+    ready: u64,
 }
 
 impl<A: Cache, B: Cache> Probe<'_, A, B> {
@@ -279,6 +279,9 @@ impl<A: Cache, B: Cache> Probe<'_, A, B> {
             hash = hash.wrapping_add(lane_hash);
             all_hit = misses.l1 + misses.l1_secondary == 0;
             if !all_hit {
+                if misses.ready > self.now {
+                    self.pending.push(misses.ready);
+                }
                 self.count(cell_index, &misses);
             }
         }
@@ -296,11 +299,21 @@ impl<A: Cache, B: Cache> Probe<'_, A, B> {
     fn request(&mut self, line: u32, misses: &mut Misses) {
         if let Some(arrival) = self.l1_in_flight.arrival(line) {
             misses.l1_secondary += 1;
-            self.ready = self.ready.max(arrival);
+            misses.ready = misses.ready.max(arrival);
             return;
         }
         self.tally.touch(line);
         misses.l1 += 1;
+        let tmu = &self.config.tmu;
+        let trip = self.fetches / u64::from(tmu.fetches_per_trip);
+        self.fetches += 1;
+        // Without penalties nothing loops, so there is no later trip to wait for.
+        let instant = tmu.l1_penalty_cycles == 0 && tmu.l2_penalty_cycles == 0;
+        let wait = if instant {
+            0
+        } else {
+            trip * u64::from(tmu.loop_cycles)
+        };
         let shared = &mut *self.shared;
         let in_l2 = if shared.l2.lookup(line) {
             self.now
@@ -309,7 +322,7 @@ impl<A: Cache, B: Cache> Probe<'_, A, B> {
             arrival
         } else {
             misses.l2 += 1;
-            let arrival = self.now + u64::from(self.config.tmu.l2_penalty_cycles);
+            let arrival = self.now + u64::from(tmu.l2_penalty_cycles);
             enter(
                 &mut shared.l2,
                 &mut shared.in_flight,
@@ -319,9 +332,9 @@ impl<A: Cache, B: Cache> Probe<'_, A, B> {
             );
             arrival
         };
-        let in_l1 = in_l2 + u64::from(self.config.tmu.l1_penalty_cycles);
+        let in_l1 = in_l2 + u64::from(tmu.l1_penalty_cycles) + wait;
         enter(self.l1, self.l1_in_flight, line, self.now, in_l1);
-        self.ready = self.ready.max(in_l1);
+        misses.ready = misses.ready.max(in_l1);
     }
 
     /// Counts a footprint that found lines missing.

@@ -14,37 +14,58 @@ pub enum Turn {
     Done,
 }
 
-/// Counters of a core's texture unit.
+/// Counters of a core's texture unit. Cycles are `useful + wasted + idle`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PipelineStats {
     /// Footprints filtered; one takes one cycle.
     pub useful: u64,
-    /// Issue slots taken by trips that failed.
+    /// Issue slots taken by footprints whose lines were not there.
     pub wasted: u64,
     /// Cycles in which no thread could enter.
     pub idle: u64,
-    /// Threads finished or in flight.
+    /// Threads started.
     pub threads: u64,
     /// Trips after the first.
     pub loops: u64,
 }
 
+impl PipelineStats {
+    /// Adds another core's counters.
+    pub fn add(&mut self, other: &Self) {
+        self.useful += other.useful;
+        self.wasted += other.wasted;
+        self.idle += other.idle;
+        self.threads += other.threads;
+        self.loops += other.loops;
+    }
+
+    /// Useful cycles over all cycles, 0 to 1.
+    #[must_use]
+    pub fn utilization(&self) -> f64 {
+        let cycles = self.useful + self.wasted + self.idle;
+        if cycles == 0 {
+            0.0
+        } else {
+            self.useful as f64 / cycles as f64
+        }
+    }
+}
+
 /// A thread on its way back to the first stage.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Looping {
     /// When it is there.
     back: u64,
-    /// When the last of its lines arrives.
-    ready: u64,
-    footprints: u32,
+    /// For each footprint that is not filtered yet, when the last of its lines arrives.
+    pending: Vec<u64>,
 }
 
 /// The pipeline of one core.
 ///
-/// A thread is a quad with all its footprints. Entering takes one cycle a footprint if every line
-/// is there. If any line is missing the thread is inactive for the rest of this trip: it has spent
-/// the slots of its tag probe, starts all its fetches at once, and is back at the first stage
-/// `loop_cycles` later, where it has precedence over new threads and is tried again.
+/// A thread is a quad with all its footprints. Those whose lines are there enter, one a cycle. The
+/// others are inactive for the rest of the trip: their tags have been checked for nothing, several
+/// a cycle. The thread is back at the first stage `loop_cycles` later, where it has precedence
+/// over new threads, and what is still pending is tried again.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     config: TmuConfig,
@@ -52,8 +73,12 @@ pub struct Pipeline {
     clock: u64,
     /// In order of return, since every loop is equally long.
     looping: VecDeque<Looping>,
+    /// Pending footprints in a retry slot that is not full: the next thread's retries share it.
+    open_slot: u32,
     drained: bool,
     stats: PipelineStats,
+    /// Lists of finished threads, for reuse.
+    spare: Vec<Vec<u64>>,
 }
 
 impl Pipeline {
@@ -64,8 +89,10 @@ impl Pipeline {
             config,
             clock: 0,
             looping: VecDeque::with_capacity(config.threads as usize),
+            open_slot: 0,
             drained: false,
             stats: PipelineStats::default(),
+            spare: Vec::new(),
         }
     }
 
@@ -87,7 +114,7 @@ impl Pipeline {
         self.drained = true;
     }
 
-    /// New threads may come, not before `cycle`.
+    /// New threads may come, not before `cycle`. Waiting until then is no idle time.
     pub fn resume(&mut self, cycle: u64) {
         self.drained = false;
         self.clock = self.clock.max(cycle);
@@ -113,34 +140,50 @@ impl Pipeline {
     }
 
     fn retry(&mut self) {
-        if let Some(thread) = self.looping.pop_front() {
+        if let Some(mut thread) = self.looping.pop_front() {
             self.stats.loops += 1;
-            self.enter(thread.footprints, thread.ready);
+            let before = thread.pending.len();
+            thread.pending.retain(|&ready| ready > self.clock);
+            let arrived = before - thread.pending.len();
+            self.trip(arrived as u64, thread.pending);
         }
     }
 
-    /// A new thread enters now; its lines are all there at `ready`.
+    /// A new thread enters now. `pending` has, for each of its `footprints` that misses, when the
+    /// last of its lines arrives.
     #[inline]
-    pub fn start(&mut self, footprints: u32, ready: u64) {
+    pub fn start(&mut self, footprints: u32, pending: &[u64]) {
         self.stats.threads += 1;
-        self.enter(footprints, ready);
+        let hits = u64::from(footprints) - pending.len() as u64;
+        if pending.is_empty() {
+            self.stats.useful += hits;
+            self.clock += hits;
+            return;
+        }
+        let mut own = self.spare.pop().unwrap_or_default();
+        own.clear();
+        own.extend_from_slice(pending);
+        self.trip(hits, own);
     }
 
-    #[inline]
-    fn enter(&mut self, footprints: u32, ready: u64) {
-        if ready <= self.clock {
-            self.stats.useful += u64::from(footprints);
-            self.clock += u64::from(footprints);
-        } else {
-            let slots = u64::from(footprints.div_ceil(self.config.probe_footprints));
-            self.looping.push_back(Looping {
-                back: self.clock + u64::from(self.config.loop_cycles),
-                ready,
-                footprints,
-            });
-            self.stats.wasted += slots;
-            self.clock += slots;
+    /// One trip: `hits` footprints are filtered, `pending` ones are not.
+    fn trip(&mut self, hits: u64, pending: Vec<u64>) {
+        let entered = self.clock;
+        self.stats.useful += hits;
+        self.clock += hits;
+        if pending.is_empty() {
+            self.spare.push(pending);
+            return;
         }
+        self.open_slot += pending.len() as u32;
+        let slots = u64::from(self.open_slot / self.config.retry_footprints);
+        self.open_slot %= self.config.retry_footprints;
+        self.stats.wasted += slots;
+        self.clock += slots;
+        self.looping.push_back(Looping {
+            back: entered + u64::from(self.config.loop_cycles),
+            pending,
+        });
     }
 }
 
@@ -153,11 +196,12 @@ mod tests {
         l2_penalty_cycles: 200,
         loop_cycles: 36,
         threads: 4,
-        probe_footprints: 8,
+        retry_footprints: 4,
+        fetches_per_trip: 2,
     };
 
-    /// Runs threads of (footprints, latency) one after another.
-    fn run(config: TmuConfig, threads: &[(u32, u64)]) -> (u64, PipelineStats) {
+    /// Runs threads of (hits, latencies of the misses) one after another.
+    fn run(config: TmuConfig, threads: &[(u32, &[u64])]) -> (u64, PipelineStats) {
         let mut pipeline = Pipeline::new(config);
         let mut threads = threads.iter();
         loop {
@@ -165,8 +209,10 @@ mod tests {
                 Turn::Looped => {}
                 Turn::Done => return (pipeline.clock(), pipeline.stats()),
                 Turn::Free => match threads.next() {
-                    Some(&(footprints, latency)) => {
-                        pipeline.start(footprints, pipeline.clock() + latency);
+                    Some((hits, latencies)) => {
+                        let now = pipeline.clock();
+                        let pending: Vec<u64> = latencies.iter().map(|l| now + l).collect();
+                        pipeline.start(hits + pending.len() as u32, &pending);
                     }
                     None => pipeline.drain(),
                 },
@@ -176,7 +222,7 @@ mod tests {
 
     #[test]
     fn threads_that_hit_take_a_cycle_a_footprint() {
-        let (cycles, stats) = run(CONFIG, &[(16, 0), (24, 0)]);
+        let (cycles, stats) = run(CONFIG, &[(16, &[]), (24, &[])]);
         assert_eq!(
             (cycles, stats.useful, stats.wasted, stats.idle),
             (40, 40, 0, 0)
@@ -184,25 +230,37 @@ mod tests {
     }
 
     #[test]
-    fn an_l1_miss_costs_one_loop() {
-        let (cycles, stats) = run(CONFIG, &[(16, 20)]);
-        assert_eq!((stats.loops, stats.wasted), (1, 2));
-        assert_eq!(cycles, 36 + 16);
+    fn an_l1_miss_of_a_quad_costs_one_slot_and_one_loop() {
+        let (cycles, stats) = run(CONFIG, &[(12, &[20; 4])]);
+        assert_eq!((stats.useful, stats.loops, stats.wasted), (16, 1, 1));
+        assert_eq!(cycles, 36 + 4);
     }
 
     #[test]
     fn an_l2_miss_loops_until_memory_has_answered() {
-        let (cycles, stats) = run(CONFIG, &[(16, 220)]);
-        // Back at cycles 36, 72 ... 252, the first after 220; two slots for each failed trip.
-        assert_eq!((stats.loops, stats.wasted), (7, 14));
-        assert_eq!(cycles, 252 + 16);
+        let (cycles, stats) = run(CONFIG, &[(12, &[220; 4])]);
+        // Back at cycles 36, 72 ... 252, the first after 220; a slot for each failed trip.
+        assert_eq!((stats.loops, stats.wasted), (7, 7));
+        assert_eq!(cycles, 252 + 4);
+    }
+
+    #[test]
+    fn what_has_arrived_is_not_tried_again() {
+        let (cycles, stats) = run(CONFIG, &[(0, &[20, 20, 20, 20, 220, 220, 220, 220])]);
+        assert_eq!((stats.loops, stats.wasted), (7, 2 + 6));
+        assert_eq!(cycles, 252 + 4);
+    }
+
+    #[test]
+    fn single_misses_of_several_threads_share_a_retry_slot() {
+        let (_, stats) = run(CONFIG, &[(1, &[20]), (1, &[20]), (1, &[20]), (1, &[20])]);
+        assert_eq!((stats.loops, stats.wasted), (4, 1));
     }
 
     #[test]
     fn other_threads_hide_the_latency() {
-        let (cycles, stats) = run(CONFIG, &[(16, 20), (64, 0)]);
-        assert_eq!(cycles, 2 + 64 + 16);
-        assert_eq!(stats.idle, 0);
+        let (cycles, stats) = run(CONFIG, &[(12, &[20; 4]), (64, &[])]);
+        assert_eq!((cycles, stats.idle), (12 + 1 + 64 + 4, 0));
     }
 
     #[test]
@@ -211,15 +269,16 @@ mod tests {
             threads: 1,
             ..CONFIG
         };
-        let (cycles, stats) = run(config, &[(8, 20), (8, 0)]);
-        assert_eq!(cycles, 36 + 8 + 8);
-        assert_eq!(stats.idle, 35);
+        let (cycles, stats) = run(config, &[(4, &[20; 4]), (8, &[])]);
+        assert_eq!(cycles, 36 + 4 + 8);
+        assert_eq!(stats.idle, 36 - 4 - 1);
     }
 
     #[test]
     fn every_cycle_is_useful_wasted_or_idle() {
-        let threads: Vec<(u32, u64)> = (0..500)
-            .map(|i| (1 + i * 7 % 40, u64::from(i % 3) * 110))
+        let latencies = [[20; 3], [220; 3], [40; 3]];
+        let threads: Vec<(u32, &[u64])> = (0..500)
+            .map(|i| (i as u32 * 7 % 40, &latencies[i % 3][..i % 4]))
             .collect();
         let (cycles, stats) = run(CONFIG, &threads);
         assert_eq!(cycles, stats.useful + stats.wasted + stats.idle);
