@@ -147,7 +147,10 @@ impl CacheConfig {
         }
         let bytes_per_set = u64::from(self.ways) * u64::from(line_bytes);
         let sets = self.size_bytes / bytes_per_set;
-        if !self.size_bytes.is_multiple_of(bytes_per_set) || !sets.is_power_of_two() || sets > 1 << 24 {
+        if !self.size_bytes.is_multiple_of(bytes_per_set)
+            || !sets.is_power_of_two()
+            || sets > 1 << 24
+        {
             return Err(ConfigError::Sets {
                 level,
                 size: format_bytes(self.size_bytes),
