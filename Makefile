@@ -6,12 +6,13 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo test lint build mesa golden paper clean
+.PHONY: demo test lint build deps golden clean
 
-demo: mesa build
+demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
 
-test: mesa
+test:
+	@scripts/install-deps.sh test
 	@CARGO="$(CARGO)" scripts/test.sh
 
 lint:
@@ -21,12 +22,12 @@ lint:
 build:
 	$(CARGO) build --release --locked -p tracegen -p replay
 
-# lavapipe is the only thing needed from outside Cargo.
-mesa:
-	@scripts/install-mesa.sh
+# lavapipe is the only thing that the programs need from outside Cargo.
+deps:
+	@scripts/install-deps.sh
 
 # Rewrites the golden traces and results; review the diff.
-golden: mesa build
+golden: deps build
 	scripts/golden.sh
 
 clean:

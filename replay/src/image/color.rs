@@ -1,7 +1,7 @@
 //! Colour spaces of the error metrics: sRGB, CIE XYZ, CIELAB and the opponent space YCxCz.
 
 /// Reciprocal of the D65 reference white in XYZ (FLIP's, from the sRGB primaries).
-const INVERSE_WHITE: [f32; 3] = [1.052_156_9, 1.0, 0.918_357_67];
+const INVERSE_WHITE: [f32; 3] = [1.052_156_9, 1.0, 0.918_357_7];
 
 /// Linear value of an sRGB-encoded one, both 0 to 1.
 #[must_use]
@@ -40,7 +40,7 @@ pub fn xyz_from_linear([r, g, b]: [f32; 3]) -> [f32; 3] {
     [
         0.412_386_56 * r + 0.357_591_49 * g + 0.180_450_49 * b,
         0.212_636_82 * r + 0.715_182_98 * g + 0.072_180_2 * b,
-        0.019_330_62 * r + 0.119_197_16 * g + 0.950_372_59 * b,
+        0.019_330_62 * r + 0.119_197_16 * g + 0.950_372_6 * b,
     ]
 }
 

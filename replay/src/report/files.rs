@@ -1,5 +1,6 @@
 //! Output files appear whole or not at all.
 
+use formats::container::AtomicFile;
 use std::io::Write;
 use std::path::Path;
 
@@ -14,17 +15,9 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
             .filter(|p| !p.as_os_str().is_empty())
             .unwrap_or(Path::new("."));
         std::fs::create_dir_all(folder)?;
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
+        let mut file = AtomicFile::create(path)?;
         file.write_all(bytes)?;
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // Temporary files are private; a result is not a secret.
-            file.as_file()
-                .set_permissions(std::fs::Permissions::from_mode(0o644))?;
-        }
-        file.persist(path).map_err(|e| e.error)?;
-        Ok(())
+        file.persist()
     };
     write().map_err(|e| anyhow::anyhow!("{}: cannot write: {e}", path.display()))
 }

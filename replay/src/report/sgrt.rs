@@ -69,7 +69,7 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
         Section::new("Units, cores and memory", hardware(entries)),
     ];
     for entry in entries {
-        let scene = &entry.report.trace.scene;
+        let scene = tables::scene_name(&entry.report);
         if let Some(pictures) = &entry.pictures {
             out.push(Section::new(
                 format!("Pictures: {scene}"),
@@ -115,15 +115,19 @@ pub fn text(entries: &[Entry]) -> String {
         out.push_str(table.trim_end_matches('\n'));
         out.push_str("\n\n");
     };
+    part("Stereo reprojection", tables::rule_line(entries));
     part(
         "Performance and energy",
         tables::performance(entries).text(),
     );
+    if let Some(line) = tables::mean_reuse_line(entries) {
+        part("Average reuse", line);
+    }
     part("Reuse and image error", tables::accuracy(entries).text());
     part("Right pixels by class", tables::classes(entries).text());
     part("G-buffer traffic", tables::traffic(entries).text());
     for entry in entries {
-        let scene = &entry.report.trace.scene;
+        let scene = tables::scene_name(&entry.report);
         if !entry.report.curve.is_empty() {
             let title = format!("Cycles against error: {scene}");
             part(&title, tables::curve(&entry.report).text());
@@ -141,6 +145,8 @@ pub fn text(entries: &[Entry]) -> String {
 fn performance(entries: &[Entry]) -> Result<Markup, PlotError> {
     Ok(html! {
         (charts::ratios(entries)?)
+        p { (tables::rule_line(entries)) "." }
+        @if let Some(line) = tables::mean_reuse_line(entries) { p { (line) "." } }
         (tables::performance(entries).markup())
         p {
             "The paper's average reuse is " (paper::REUSE_PCT) " %, its units' work falls by about "

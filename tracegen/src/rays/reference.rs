@@ -190,8 +190,8 @@ impl TestMesh {
 /// What the reference says of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// Hits at this distance.
-    Hit(f64),
+    /// Hits at this distance, or at an unsure one where a nearer triangle is only grazed.
+    Hit(Option<f64>),
     /// Misses.
     Miss,
     /// The answer hangs on less than the `f32` mesh's rounding.
@@ -262,14 +262,14 @@ pub fn brute_force_f64(
     }
     match nearest {
         // A hit that only grazes: covered here, but the rounded mesh may shrink away from it.
-        Some(t) if grazes_silhouette(mesh, origin, direction, tolerance) => {
+        Some(_) if grazes_silhouette(mesh, origin, direction, tolerance) => {
             if interior_hits(mesh, origin, direction, tolerance) {
-                Verdict::Hit(t)
+                Verdict::Hit(None)
             } else {
                 Verdict::Borderline
             }
         }
-        Some(t) => Verdict::Hit(t),
+        Some(t) => Verdict::Hit(Some(t)),
         None if doubtful => Verdict::Borderline,
         None => Verdict::Miss,
     }

@@ -14,11 +14,44 @@ pub fn scene_name(report: &Report) -> String {
     name.split('.').next().unwrap_or(name).to_owned()
 }
 
-fn both(report: &Report) -> [(String, &Outcome); 2] {
-    [
-        (report.config.rule.to_string(), &report.result),
-        ("none (plain reuse)".to_owned(), &report.plain),
-    ]
+/// Short names of the two runs: rules can be long, and [`rule_line`] says which one it is.
+fn both(report: &Report) -> [(&'static str, &Outcome); 2] {
+    [("chosen", &report.result), ("plain", &report.plain)]
+}
+
+/// Which rule and level of reuse the rows called "chosen" have.
+#[must_use]
+pub fn rule_line(entries: &[Entry]) -> String {
+    entries.first().map_or_else(String::new, |entry| {
+        let config = &entry.report.config;
+        format!(
+            "chosen: rule {}, reuse of {}; plain: rule none, every arrival reused as it is",
+            config.rule,
+            reuse_name(config.reuse)
+        )
+    })
+}
+
+/// Mean reuse over the traces that stand for scenes of the paper, chosen and plain.
+#[must_use]
+pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
+    let of_paper: Vec<&Report> = entries
+        .iter()
+        .map(|e| &e.report)
+        .filter(|r| r.paper.is_some())
+        .collect();
+    let count = of_paper.len();
+    let mean =
+        |pct: fn(&Report) -> f64| of_paper.iter().map(|r| pct(r)).sum::<f64>() / count as f64;
+    (count > 0).then(|| {
+        format!(
+            "right pixels reused, mean of {count} stand-ins: {:.2} % chosen, {:.2} % plain; \
+             paper {:.2} %",
+            mean(|r| r.result.reuse_pct),
+            mean(|r| r.plain.reuse_pct),
+            crate::sgrt::paper::REUSE_PCT
+        )
+    })
 }
 
 fn reuse_name(reuse: Reuse) -> &'static str {
@@ -49,7 +82,7 @@ fn by_rule(
     for entry in entries {
         table.begin_group();
         for (rule, outcome) in both(&entry.report) {
-            let mut row = vec![scene_name(&entry.report), rule];
+            let mut row = vec![scene_name(&entry.report), rule.to_owned()];
             row.extend(cells(&entry.report, outcome));
             table.push(row);
         }
@@ -60,7 +93,6 @@ fn by_rule(
 /// The ratios beside the paper's.
 pub fn performance(entries: &[Entry]) -> Table {
     let columns = vec![
-        Column::text("reused"),
         Column::number("reuse", "%"),
         Column::number("performance", "ratio"),
         Column::number("units alone", "ratio"),
@@ -76,7 +108,6 @@ pub fn performance(entries: &[Entry]) -> Table {
         let paper = report.paper.as_ref();
         let or_dash = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2}"));
         vec![
-            reuse_name(report.config.reuse).to_owned(),
             format!("{:.2}", o.reuse_pct),
             format!("{:.2}", o.relative_performance),
             format!("{:.2}", o.tni_relative_performance),
@@ -147,7 +178,7 @@ pub fn classes(entries: &[Entry]) -> Table {
             for (class, counts) in rows {
                 table.push(vec![
                     scene_name(&entry.report),
-                    rule.clone(),
+                    rule.to_owned(),
                     class.to_owned(),
                     whole(counts.pixels),
                     format!("{:.2}", c.pct(counts.pixels)),
@@ -230,12 +261,11 @@ pub fn energy(entries: &[Entry]) -> Table {
         table.begin_group();
         let o = &entry.report.result;
         let whole = o.reference_energy.total();
-        let rule = entry.report.config.rule.to_string();
         for (name, e) in [
-            ("both eyes in full".to_owned(), &o.reference_energy),
-            (rule, &o.energy),
+            ("both eyes in full", &o.reference_energy),
+            ("chosen", &o.energy),
         ] {
-            let mut row = vec![scene_name(&entry.report), name];
+            let mut row = vec![scene_name(&entry.report), name.to_owned()];
             let parts = [
                 e.tni_pj,
                 e.srp_pj,

@@ -102,6 +102,6 @@ fn json_holds_the_agreed_fields() {
 #[test]
 fn the_terminal_tables_name_scene_and_rule() {
     let text = text(&[entry()]);
-    assert!(text.contains("teapot") && text.contains("none (plain reuse)"));
+    assert!(text.contains("teapot") && text.contains(crate::sgrt::DEFAULT_RULE));
     assert!(text.ends_with('\n') && !text.ends_with("\n\n"));
 }

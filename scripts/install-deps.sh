@@ -1,6 +1,7 @@
 #!/bin/sh
-# Installs Mesa's lavapipe (a Vulkan driver that needs no GPU) where it is missing and apt can be
-# used; otherwise says what to install.
+# Installs what Cargo cannot, where it is missing and apt can be used; otherwise says what to
+# install. Always lavapipe (a Vulkan driver that needs no GPU); with `test` also a C++ compiler,
+# which the reference implementation of FLIP in the tests needs.
 set -eu
 
 has_lavapipe() {
@@ -12,12 +13,17 @@ has_lavapipe() {
 has_loader() { ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1'; }
 
 PATH="$PATH:/sbin:/usr/sbin"
-if has_lavapipe && has_loader; then
-    exit 0
+packages=""
+if ! has_lavapipe || ! has_loader; then
+    packages="mesa-vulkan-drivers libvulkan1"
 fi
-packages="mesa-vulkan-drivers libvulkan1"
+if [ "${1:-}" = test ] && ! command -v "${CXX:-c++}" >/dev/null 2>&1; then
+    packages="$packages g++"
+fi
+[ -n "$packages" ] || exit 0
+
 if ! command -v apt-get >/dev/null 2>&1; then
-    echo "lavapipe is missing: install your distribution's Mesa Vulkan drivers (Debian: $packages)" >&2
+    echo "missing (by their Debian names): $packages" >&2
     exit 2
 fi
 if [ "$(id -u)" = 0 ]; then
@@ -25,7 +31,7 @@ if [ "$(id -u)" = 0 ]; then
 elif command -v sudo >/dev/null 2>&1; then
     sudo="sudo"
 else
-    echo "lavapipe is missing and this user may not install it: apt-get install $packages" >&2
+    echo "missing, and this user may not install them: apt-get install $packages" >&2
     exit 2
 fi
 echo "installing $packages" >&2
