@@ -190,151 +190,208 @@ impl TestMesh {
 /// What the reference says of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// Hits at this distance, or at an unsure one where a nearer triangle is only grazed.
-    Hit(Option<f64>),
+    /// Hits at this distance give or take what rounding the mesh may shift it, or at an unsure
+    /// one where a nearer triangle is only grazed.
+    Hit(Option<(f64, f64)>),
     /// Misses.
     Miss,
     /// The answer hangs on less than the `f32` mesh's rounding.
     Borderline,
 }
 
-/// The `f64` reference for a ray without an end.
-///
-/// `tolerance` is the displacement, in the mesh's units, that rounding may cause.
-#[must_use]
-pub fn brute_force_f64(
-    mesh: &TestMesh,
-    origin: DVec3,
+/// The triangles of a mesh that a line may pass, each within a sphere.
+pub struct Reference<'a> {
+    mesh: &'a TestMesh,
+    spheres: Vec<(DVec3, f64)>,
+}
+
+impl<'a> Reference<'a> {
+    /// Prepares a mesh.
+    #[must_use]
+    pub fn new(mesh: &'a TestMesh) -> Self {
+        let spheres = (0..mesh.triangles.len())
+            .map(|t| {
+                let v = mesh.corners(t);
+                let center = (v[0] + v[1] + v[2]) / 3.0;
+                let radius = v.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+                (center, radius)
+            })
+            .collect();
+        Self { mesh, spheres }
+    }
+
+    /// The answer for a ray without an end.
+    ///
+    /// `tolerance` is the displacement, in the mesh's units, that rounding may cause.
+    #[must_use]
+    pub fn verdict(&self, origin: DVec3, direction: DVec3, tolerance: f64) -> Verdict {
+        let near = self.near(origin, direction.normalize(), tolerance);
+        let nearest = near.hits().min_by(f64::total_cmp);
+        match nearest {
+            // A hit that only grazes: covered here, but the rounded mesh may shrink away from it.
+            Some(_) if near.grazes_silhouette() => {
+                if near.hits_inside() {
+                    Verdict::Hit(None)
+                } else {
+                    Verdict::Borderline
+                }
+            }
+            Some(t) => Verdict::Hit(Some((t, near.shift()))),
+            None if near.is_doubtful() => Verdict::Borderline,
+            None => Verdict::Miss,
+        }
+    }
+
+    fn near(&self, origin: DVec3, direction: DVec3, tolerance: f64) -> Near {
+        let may_pass = |(center, radius): &(DVec3, f64)| {
+            let to = *center - origin;
+            let reach = radius * 1.000_001 + tolerance;
+            let along = to.dot(direction);
+            // The difference of squares loses at most about 1e-13 of them.
+            to.length_squared() * (1.0 - 1e-12) - along * along <= reach * reach
+        };
+        let triangles = self
+            .spheres
+            .iter()
+            .enumerate()
+            .filter(|(_, sphere)| may_pass(sphere))
+            .map(|(t, _)| {
+                let corners = self.mesh.corners(t).map(|v| v - origin);
+                Candidate::new(self.mesh.triangles[t], corners, direction)
+            })
+            .collect();
+        Near {
+            triangles,
+            direction,
+            tolerance,
+        }
+    }
+}
+
+/// A triangle relative to a ray's origin.
+struct Candidate {
+    index: [u32; 3],
+    corners: [DVec3; 3],
+    /// Signed volumes of the line with each edge.
+    volumes: [f64; 3],
+    /// Cosine between normal and line.
+    slope: f64,
+    /// Where the line meets the plane.
+    distance: f64,
+}
+
+impl Candidate {
+    fn new(index: [u32; 3], corners: [DVec3; 3], direction: DVec3) -> Self {
+        // With the vertices in ascending order: neighbours get the same bits.
+        let volumes = [(1, 2), (2, 0), (0, 1)].map(|(p, q)| {
+            if index[p] < index[q] {
+                corners[p].cross(corners[q]).dot(direction)
+            } else {
+                -corners[q].cross(corners[p]).dot(direction)
+            }
+        });
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let slope = normal.dot(direction);
+        Self {
+            index,
+            corners,
+            volumes,
+            slope,
+            distance: normal.dot(a) / slope,
+        }
+    }
+
+    /// True where the line passes through, edges included.
+    fn covers(&self) -> bool {
+        let v = &self.volumes;
+        (v.iter().all(|x| *x >= 0.0) || v.iter().all(|x| *x <= 0.0)) && self.slope != 0.0
+    }
+
+    /// How far the ray's origin is from the plane, negative where the plane lies behind it.
+    fn height(&self) -> f64 {
+        self.distance * self.slope.abs()
+    }
+
+    /// True where the line passes an edge within the tolerance.
+    fn edge_near(&self, direction: DVec3, tolerance: f64) -> bool {
+        // Seen along the line, the line is a point: its distance from each edge.
+        let flat = self.corners.map(|p| p - direction * p.dot(direction));
+        (0..3).any(|i| {
+            let (p, q) = (flat[i], flat[(i + 1) % 3]);
+            let along = q - p;
+            let length2 = along.length_squared();
+            let s = if length2 > 0.0 {
+                (-p.dot(along) / length2).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            (p + along * s).length() < tolerance
+        })
+    }
+}
+
+/// The triangles near a ray's line.
+struct Near {
+    triangles: Vec<Candidate>,
     direction: DVec3,
     tolerance: f64,
-) -> Verdict {
-    let direction = direction.normalize();
-    let mut nearest: Option<f64> = None;
-    let mut doubtful = false;
-    for t in 0..mesh.triangles.len() {
-        let index = mesh.triangles[t];
-        let [a, b, c] = mesh.corners(t).map(|v| v - origin);
-        if far_from_line(&[a, b, c], direction, tolerance) {
-            continue;
-        }
-        // Volume with the vertices in ascending order: neighbours get the same bits.
-        let edge = |p: DVec3, q: DVec3, ip: u32, iq: u32| {
-            if ip < iq {
-                p.cross(q).dot(direction)
-            } else {
-                -q.cross(p).dot(direction)
-            }
-        };
-        let volumes = [
-            edge(b, c, index[1], index[2]),
-            edge(c, a, index[2], index[0]),
-            edge(a, b, index[0], index[1]),
-        ];
-        let inside = volumes.iter().all(|v| *v >= 0.0) || volumes.iter().all(|v| *v <= 0.0);
-        let normal = (b - a).cross(c - a);
-        let slope = normal.dot(direction);
-        let distance = normal.dot(a) / slope;
-        // Distance from the line to the nearest edge line, as the volumes see it.
-        let clearance = [(b, c), (c, a), (a, b)]
+}
+
+impl Near {
+    fn hits(&self) -> impl Iterator<Item = f64> {
+        self.triangles
             .iter()
-            .zip(volumes)
-            .map(|((p, q), v)| {
-                let side = (*q - *p).cross(direction).length();
-                if side > 0.0 {
-                    v.abs() / side
-                } else {
-                    f64::INFINITY
-                }
-            })
-            .fold(f64::INFINITY, f64::min);
-        let ahead = a.dot(direction).max(b.dot(direction)).max(c.dot(direction)) > 0.0;
-        if inside && slope != 0.0 {
-            if distance > tolerance {
-                nearest = Some(nearest.map_or(distance, |n| n.min(distance)));
-            } else if distance > -tolerance {
-                doubtful = true;
+            .filter(|t| t.covers() && t.height() > self.tolerance)
+            .map(|t| t.distance)
+    }
+
+    /// True where the ray starts on a triangle, or passes just outside of one that lies ahead.
+    fn is_doubtful(&self) -> bool {
+        self.triangles.iter().any(|t| {
+            if t.covers() {
+                return t.height().abs() <= self.tolerance;
             }
-        } else if ahead && clearance < tolerance && near_triangle(&[a, b, c], direction, tolerance)
-        {
-            // Just outside this triangle; harmless when a neighbour covers the line.
-            doubtful = true;
-        }
+            let ahead = t.corners.iter().any(|p| p.dot(self.direction) > 0.0);
+            ahead && t.edge_near(self.direction, self.tolerance)
+        })
     }
-    match nearest {
-        // A hit that only grazes: covered here, but the rounded mesh may shrink away from it.
-        Some(_) if grazes_silhouette(mesh, origin, direction, tolerance) => {
-            if interior_hits(mesh, origin, direction, tolerance) {
-                Verdict::Hit(None)
-            } else {
-                Verdict::Borderline
+
+    /// How far a hit moves along the line when its triangle moves by the tolerance: that over the
+    /// cosine, of the most slanted triangle that the line may be on.
+    fn shift(&self) -> f64 {
+        self.triangles
+            .iter()
+            .filter(|t| t.covers() || t.edge_near(self.direction, self.tolerance))
+            .map(|t| self.tolerance / t.slope.abs())
+            .fold(0.0, f64::max)
+    }
+
+    /// True where the line passes within the tolerance of an edge between a front and a back face.
+    fn grazes_silhouette(&self) -> bool {
+        let mut facing = std::collections::BTreeMap::<_, Vec<f64>>::new();
+        let edge_near = |t: &&Candidate| t.edge_near(self.direction, self.tolerance);
+        for t in self.triangles.iter().filter(edge_near) {
+            for i in 0..3 {
+                let (p, q) = (t.index[i], t.index[(i + 1) % 3]);
+                facing
+                    .entry((p.min(q), p.max(q)))
+                    .or_default()
+                    .push(t.slope);
             }
         }
-        Some(t) => Verdict::Hit(Some(t)),
-        None if doubtful => Verdict::Borderline,
-        None => Verdict::Miss,
+        facing
+            .values()
+            .any(|s| s.len() == 2 && (s[0] * s[1] <= 0.0 || s[0].abs().min(s[1].abs()) < 1e-6))
     }
-}
 
-/// True where the line misses even the sphere about a triangle.
-fn far_from_line(v: &[DVec3; 3], direction: DVec3, tolerance: f64) -> bool {
-    let center = (v[0] + v[1] + v[2]) / 3.0;
-    let radius = v.iter().map(|p| (*p - center).length()).fold(0.0, f64::max);
-    let across = center - direction * center.dot(direction);
-    across.length() > radius * 1.000_001 + tolerance
-}
-
-fn near_triangle(v: &[DVec3; 3], direction: DVec3, tolerance: f64) -> bool {
-    // Project along the ray: distance of the origin from the triangle in the plane across it.
-    let flat = v.map(|p| p - direction * p.dot(direction));
-    (0..3).any(|i| {
-        let (p, q) = (flat[i], flat[(i + 1) % 3]);
-        let along = q - p;
-        let s = if along.length_squared() > 0.0 {
-            (-p.dot(along) / along.length_squared()).clamp(0.0, 1.0)
-        } else {
-            0.0
-        };
-        (p + along * s).length() < tolerance
-    })
-}
-
-/// True where the line passes within the tolerance of an edge between a front and a back face.
-fn grazes_silhouette(mesh: &TestMesh, origin: DVec3, direction: DVec3, tolerance: f64) -> bool {
-    let mut facing = std::collections::BTreeMap::new();
-    for (t, index) in mesh.triangles.iter().enumerate() {
-        let corners = mesh.corners(t).map(|v| v - origin);
-        if far_from_line(&corners, direction, tolerance)
-            || !near_triangle(&corners, direction, tolerance)
-        {
-            continue;
-        }
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let slope = normal.dot(direction) / normal.length();
-        for i in 0..3 {
-            let (p, q) = (index[i], index[(i + 1) % 3]);
-            let key = (p.min(q), p.max(q));
-            let entry: &mut Vec<f64> = facing.entry(key).or_default();
-            entry.push(slope);
-        }
+    /// True where the line passes through a triangle at more than the tolerance from its edges.
+    fn hits_inside(&self) -> bool {
+        self.triangles.iter().any(|t| {
+            let clear = !t.edge_near(self.direction, self.tolerance);
+            t.covers() && t.height() > self.tolerance && clear
+        })
     }
-    facing
-        .values()
-        .any(|s| s.len() == 2 && (s[0] * s[1] <= 0.0 || s[0].abs().min(s[1].abs()) < 1e-6))
-}
-
-/// True where the line passes through a triangle at more than the tolerance from its edges.
-fn interior_hits(mesh: &TestMesh, origin: DVec3, direction: DVec3, tolerance: f64) -> bool {
-    (0..mesh.triangles.len()).any(|t| {
-        let v = mesh.corners(t).map(|v| v - origin);
-        if far_from_line(&v, direction, tolerance) {
-            return false;
-        }
-        let volumes = [(1, 2), (2, 0), (0, 1)].map(|(p, q)| v[p].cross(v[q]).dot(direction));
-        let inside = volumes.iter().all(|x| *x > 0.0) || volumes.iter().all(|x| *x < 0.0);
-        let normal = (v[1] - v[0]).cross(v[2] - v[0]);
-        let distance = normal.dot(v[0]) / normal.dot(direction);
-        inside && distance > tolerance && !near_triangle(&v, direction, tolerance)
-    })
 }
 
 /// The traversal's answer without a tree: every triangle by the traversal's own tests.
