@@ -6,7 +6,11 @@ log=$(mktemp)
 status=$(mktemp)
 trap 'rm -f "$log" "$status"' EXIT
 # A plain sh has no pipefail: the status travels through a file.
-{ "${CARGO:-cargo}" test --release --workspace --locked --no-fail-fast 2>&1; echo $? >"$status"; } | tee "$log"
+{
+    code=0
+    "${CARGO:-cargo}" test --release --workspace --locked --no-fail-fast 2>&1 || code=$?
+    echo "$code" >"$status"
+} | tee "$log"
 awk '/^test result:/ { passed += $4; failed += $6; ignored += $8 }
      END { printf "%d passed, %d failed, %d skipped\n", passed, failed, ignored }' "$log"
 exit "$(cat "$status")"

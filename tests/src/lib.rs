@@ -56,7 +56,10 @@ pub fn real_scene(relative: &str) -> Option<PathBuf> {
     if path.exists() {
         Some(path)
     } else {
-        eprintln!("SKIPPED: {} is absent (set PARALLAX_SCENES)", path.display());
+        eprintln!(
+            "SKIPPED: {} is absent (set PARALLAX_SCENES)",
+            path.display()
+        );
         None
     }
 }

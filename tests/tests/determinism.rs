@@ -6,7 +6,16 @@ use std::path::Path;
 
 fn capture(output: &Path, lp_num_threads: Option<&str>) -> Vec<u8> {
     let mut command = program("tracegen");
-    command.args(["raster", "atrium-shadows", "--size", "160x180", "--no-plain", "-o"]).arg(output);
+    command
+        .args([
+            "raster",
+            "atrium-shadows",
+            "--size",
+            "160x180",
+            "--no-plain",
+            "-o",
+        ])
+        .arg(output);
     if let Some(threads) = lp_num_threads {
         command.env("LP_NUM_THREADS", threads);
     }
@@ -18,10 +27,16 @@ fn capture(output: &Path, lp_num_threads: Option<&str>) -> Vec<u8> {
 fn a_capture_has_the_same_bytes_over_runs_and_driver_threads() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let first = capture(&folder.path().join("first.textrace"), None);
-    assert!(first == capture(&folder.path().join("second.textrace"), None), "two runs differ");
+    assert!(
+        first == capture(&folder.path().join("second.textrace"), None),
+        "two runs differ"
+    );
     for threads in ["0", "2"] {
         let path = folder.path().join(format!("lp{threads}.textrace"));
-        assert!(first == capture(&path, Some(threads)), "LP_NUM_THREADS={threads} differs");
+        assert!(
+            first == capture(&path, Some(threads)),
+            "LP_NUM_THREADS={threads} differs"
+        );
     }
 }
 
@@ -30,12 +45,15 @@ fn a_replay_prints_the_same_bytes_over_threads() {
     let trace = root().join("traces/jungle.textrace");
     for mode in ["timed", "functional"] {
         let run = |threads: &str| {
-            run_ok(
-                program("replay")
-                    .arg("run")
-                    .arg(&trace)
-                    .args(["--order", "z2-sta", "--mode", mode, "--threads", threads, "--json"]),
-            )
+            run_ok(program("replay").arg("run").arg(&trace).args([
+                "--order",
+                "z2-sta",
+                "--mode",
+                mode,
+                "--threads",
+                threads,
+                "--json",
+            ]))
             .stdout
         };
         assert_eq!(run("1"), run("2"), "{mode}");
@@ -46,7 +64,13 @@ fn a_replay_prints_the_same_bytes_over_threads() {
 fn the_paper_table_has_the_same_bytes_over_threads() {
     let trace = root().join("traces/atrium-shadows.textrace");
     let paper = |threads: &str| {
-        run_ok(program("replay").arg("paper").arg(&trace).args(["--threads", threads, "--json"])).stdout
+        run_ok(
+            program("replay")
+                .arg("paper")
+                .arg(&trace)
+                .args(["--threads", threads, "--json"]),
+        )
+        .stdout
     };
     assert_eq!(paper("1"), paper("2"));
 }

@@ -10,11 +10,35 @@ const TEXTRACE_RUNS: &[(&str, &[&str])] = &[
     ("morton-timed", &["--order", "morton", "--mode", "timed"]),
     ("z2-lrta-timed", &["--order", "z2-lrta", "--mode", "timed"]),
     ("z2-sta-timed", &["--order", "z2-sta", "--mode", "timed"]),
-    ("z2-sta-merge-functional", &["--order", "z2-sta-merge", "--mode", "functional"]),
-    ("scanline-functional", &["--order", "scanline", "--mode", "functional"]),
-    ("zig-zag-functional-16k", &["--order", "zig-zag", "--mode", "functional", "--l1", "16KiB", "--l2", "256KiB"]),
-    ("hilbert-functional", &["--order", "hilbert", "--mode", "functional"]),
-    ("random-functional", &["--order", "random", "--mode", "functional"]),
+    (
+        "z2-sta-merge-functional",
+        &["--order", "z2-sta-merge", "--mode", "functional"],
+    ),
+    (
+        "scanline-functional",
+        &["--order", "scanline", "--mode", "functional"],
+    ),
+    (
+        "zig-zag-functional-16k",
+        &[
+            "--order",
+            "zig-zag",
+            "--mode",
+            "functional",
+            "--l1",
+            "16KiB",
+            "--l2",
+            "256KiB",
+        ],
+    ),
+    (
+        "hilbert-functional",
+        &["--order", "hilbert", "--mode", "functional"],
+    ),
+    (
+        "random-functional",
+        &["--order", "random", "--mode", "functional"],
+    ),
 ];
 
 fn golden_traces(extension: &str) -> Vec<PathBuf> {
@@ -49,8 +73,17 @@ fn every_golden_texture_trace_replays_to_its_golden_result() {
     assert!(traces.len() >= 3, "golden traces are missing: {traces:?}");
     for trace in traces {
         for (name, options) in TEXTRACE_RUNS {
-            let output = run_ok(program("replay").arg("run").arg(&trace).args(*options).arg("--json"));
-            compare(&trace.with_extension("golden").join(format!("{name}.json")), &output.stdout);
+            let output = run_ok(
+                program("replay")
+                    .arg("run")
+                    .arg(&trace)
+                    .args(*options)
+                    .arg("--json"),
+            );
+            compare(
+                &trace.with_extension("golden").join(format!("{name}.json")),
+                &output.stdout,
+            );
         }
     }
 }
@@ -67,7 +100,10 @@ fn golden_traces_together_stay_below_ten_megabytes() {
 
 #[test]
 fn every_golden_trace_is_valid_and_has_its_recipe() {
-    for trace in golden_traces("textrace").into_iter().chain(golden_traces("raytrace")) {
+    for trace in golden_traces("textrace")
+        .into_iter()
+        .chain(golden_traces("raytrace"))
+    {
         run_ok(program("replay").arg("validate").arg(&trace));
         let recipe = trace.with_extension("recipe");
         assert!(recipe.exists(), "{} is missing", recipe.display());

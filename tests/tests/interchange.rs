@@ -22,7 +22,17 @@ fn convert(granularity: &str) -> Vec<u64> {
     let trace = root().join("traces/atrium-shadows.textrace");
     let output = run_ok(
         program("replay")
-            .args(["convert", "--to", "din", "--granularity", granularity, "--order", "morton", "-o", "-"])
+            .args([
+                "convert",
+                "--to",
+                "din",
+                "--granularity",
+                granularity,
+                "--order",
+                "morton",
+                "-o",
+                "-",
+            ])
             .arg(trace),
     );
     parse_din(&String::from_utf8(output.stdout).expect("din is text"))
@@ -31,7 +41,11 @@ fn convert(granularity: &str) -> Vec<u64> {
 fn run(options: &[&str]) -> Value {
     let trace = root().join("traces/atrium-shadows.textrace");
     let output = run_ok(
-        program("replay").arg("run").arg(trace).args(["--order", "morton", "--json"]).args(options),
+        program("replay")
+            .arg("run")
+            .arg(trace)
+            .args(["--order", "morton", "--json"])
+            .args(options),
     );
     serde_json::from_slice(&output.stdout).expect("one JSON object")
 }
@@ -75,8 +89,14 @@ fn a_plain_lru_cache_fed_with_din_misses_as_often_as_run() {
     let addresses = convert("line");
     for (l1_kib, ways) in [(8, 4_usize), (16, 4), (8, 1), (4, 8)] {
         let result = &run(&[
-            "--mode", "functional", "--cores", "1",
-            "--l1", &format!("{l1_kib}KiB"), "--l1-ways", &ways.to_string(),
+            "--mode",
+            "functional",
+            "--cores",
+            "1",
+            "--l1",
+            &format!("{l1_kib}KiB"),
+            "--l1-ways",
+            &ways.to_string(),
         ])["result"];
         assert_eq!(
             result["l1"]["line_misses"],
