@@ -236,7 +236,7 @@ fn recorded_arguments(arguments: impl Iterator<Item = String>) -> Vec<String> {
         let name = argument.split('=').next().unwrap_or_default();
         if LEFT_OUT.contains(&name) {
             skip = !argument.contains('=');
-        } else if !(argument.starts_with("-o") && !argument.starts_with("--")) {
+        } else if !argument.starts_with("-o") {
             kept.push(argument);
         }
     }

@@ -109,7 +109,7 @@ impl Subject {
     }
 
     fn ray(&self, i: u64, random: &mut Random) -> Ray {
-        let inside = i % 4 == 0;
+        let inside = i.is_multiple_of(4);
         let origin = if inside && self.convex {
             random.in_ball() * 5.0
         } else if inside {
