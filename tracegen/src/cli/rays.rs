@@ -70,13 +70,11 @@ pub fn run(args: RaysArgs) -> anyhow::Result<()> {
             args.scene.camera.frames
         );
     }
-    if let Some(image) = &args.image {
-        if *image == args.output {
-            bail!(
-                "--image and --output name the same file, {}",
-                image.display()
-            );
-        }
+    if args.image.as_ref() == Some(&args.output) {
+        bail!(
+            "--image and --output name the same file, {}",
+            args.output.display()
+        );
     }
     if let Some(threads) = args.threads {
         // The global pool serves scene loading and texture pyramids, too.
