@@ -69,7 +69,7 @@ pub struct PreparedRay {
 impl PreparedRay {
     /// Prepares a valid ray for a scene with these bounds.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn new(ray: &Ray, bounds: (Vec3, Vec3)) -> Self {
         let d = ray.direction.to_array();
         let size = ray.direction.abs();
@@ -122,7 +122,7 @@ impl PreparedRay {
     ///
     /// Every operation is monotonic, so a box inside another never enters earlier or leaves later.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn slab(&self, min: [f32; 3], max: [f32; 3]) -> (f32, f32) {
         let mut near = f32::MIN;
         let mut far = f32::MAX;
@@ -168,7 +168,7 @@ impl PreparedRay {
     /// slabs: no enclosing box can start behind it, so every traversal order and tree finds the
     /// same nearest triangle, bit for bit.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn distance(&self, v: &[[f32; 3]; 3]) -> Option<f32> {
         let [v0, v1, v2] = [to_f64(v[0]), to_f64(v[1]), to_f64(v[2])];
         let normal = (v1 - v0).cross(v2 - v0);

@@ -91,24 +91,38 @@ impl Width for Two {
     ) -> Option<Child> {
         let node = &bvh.nodes2[node as usize];
         let (near, mask) = K::step2(ray, node, t_max);
-        // Branches beat selects here: a guessed child is fetched while its box is still tested.
+        // Nested tests rather than a match, which would become a jump table.
         let [left, right] = node.children;
-        match mask {
-            0 => None,
-            1 => Some(left),
-            2 => Some(right),
-            _ => {
+        if mask & 1 != 0 {
+            if mask & 2 != 0 {
                 let (nearer, pushed) = if near[0] <= near[1] {
                     (left, pack(near[1], right))
                 } else {
+                    keep_branch();
                     (right, pack(near[0], left))
                 };
                 stack[*top] = pushed;
                 *top += 1;
                 Some(nearer)
+            } else {
+                keep_branch();
+                Some(left)
             }
+        } else if mask & 2 != 0 {
+            Some(right)
+        } else {
+            None
         }
     }
+}
+
+/// Keeps a two-way choice a branch. A compiler's select (or, for four cases, a jump table) makes
+/// the next node's address wait for the box test, where a predicted branch fetches it meanwhile:
+/// measured to gain a tenth in the binary tree.
+#[inline(always)]
+fn keep_branch() {
+    // SAFETY: the assembly is empty; it has no effect but to be there.
+    unsafe { std::arch::asm!("", options(nomem, nostack, preserves_flags)) }
 }
 
 /// The eight-wide tree.
@@ -130,19 +144,37 @@ impl Width for Eight {
         if mask == 0 {
             return None;
         }
-        let mut next = || {
-            let lane = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            (pack(lanes.0[lane & 7], node.children[lane & 7]), mask != 0)
-        };
-        let (mut nearest, mut more) = next();
-        // Insertion keeps the pushed entries nearest on top.
+        let first = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let child = node.children[first];
+        if mask == 0 {
+            return Some(child);
+        }
+        let near = lanes.0[first];
+        let second = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let (near1, child1) = (lanes.0[second], node.children[second]);
         let base = *top;
-        while more {
-            let entry;
-            (entry, more) = next();
-            let (kept, pushed) = (nearest.min(entry), nearest.max(entry));
-            nearest = kept;
+        if mask == 0 {
+            *top = base + 1;
+            if near <= near1 {
+                stack[base] = pack(near1, child1);
+                return Some(child);
+            }
+            keep_branch();
+            stack[base] = pack(near, child);
+            return Some(child1);
+        }
+        let (e0, e1) = (pack(near, child), pack(near1, child1));
+        let mut nearest = e0.min(e1);
+        stack[base] = e0.max(e1);
+        *top = base + 1;
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 7;
+            mask &= mask - 1;
+            let entry = pack(lanes.0[lane], node.children[lane]);
+            let pushed = nearest.max(entry);
+            nearest = nearest.min(entry);
             let mut at = *top;
             *top += 1;
             while at > base && stack[at - 1] < pushed {
@@ -155,7 +187,7 @@ impl Width for Eight {
     }
 }
 
-/// Walks a tree from the root. `leaf` tests a leaf, returns the new `t_max`, or `None` to stop.
+/// Walks a tree from the root.
 #[inline(always)]
 fn walk<K: Kernel, W: Width, C: Counter>(
     bvh: &Bvh,
@@ -163,7 +195,7 @@ fn walk<K: Kernel, W: Width, C: Counter>(
     mut t_max: f32,
     stack: &mut TraversalStack,
     counter: &mut C,
-    mut leaf: impl FnMut(&mut C, Child) -> Option<f32>,
+    leaf: &mut impl LeafTest<K, C>,
 ) {
     if stack.entries.len() < bvh.stack_size() {
         stack.entries.resize(bvh.stack_size(), 0);
@@ -173,7 +205,7 @@ fn walk<K: Kernel, W: Width, C: Counter>(
     let mut at = Child(0);
     loop {
         let next = if at.is_leaf() {
-            match leaf(counter, at) {
+            match leaf.test(ray, counter, at) {
                 Some(shorter) => t_max = shorter,
                 None => return,
             }
@@ -198,6 +230,105 @@ fn walk<K: Kernel, W: Width, C: Counter>(
     }
 }
 
+/// What happens at a leaf. Methods rather than closures: a closure that is not inlined would be
+/// compiled without the instructions of its traversal.
+trait LeafTest<K: Kernel, C: Counter> {
+    /// Tests a leaf and returns the new `t_max`, or `None` to stop.
+    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32>;
+}
+
+struct Closest<'a, A> {
+    bvh: &'a Bvh,
+    prepared: &'a PreparedRay,
+    alpha: &'a A,
+    best: Option<RayHit>,
+}
+
+impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
+    #[inline(always)]
+    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32> {
+        let (first, count) = leaf.leaf_range();
+        let blocks = &self.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
+        counter.triangles(blocks[0].first_slot, count);
+        for block in blocks {
+            let mut mask = K::lines_hit(ray, self.prepared, block);
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
+                mask &= mask - 1;
+                let vertices = block.triangle(lane);
+                let Some(t) = self.prepared.distance(&vertices) else {
+                    continue;
+                };
+                let primitive = block.primitives[lane] & !MASKED;
+                if self
+                    .best
+                    .is_some_and(|b| (t, primitive) >= (b.t, b.primitive))
+                {
+                    continue;
+                }
+                if block.primitives[lane] & MASKED != 0 {
+                    counter.alpha();
+                    if !self
+                        .alpha
+                        .opaque(primitive, barycentrics(&self.prepared.ray, &vertices))
+                    {
+                        continue;
+                    }
+                }
+                self.best = Some(RayHit {
+                    t,
+                    primitive,
+                    vertices,
+                });
+            }
+        }
+        Some(self.best.map_or(self.prepared.ray.t_max, |b| b.t))
+    }
+}
+
+struct AnyHit<'a, A> {
+    bvh: &'a Bvh,
+    prepared: &'a PreparedRay,
+    alpha: &'a A,
+    blocked: bool,
+}
+
+impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
+    #[inline(always)]
+    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32> {
+        let (first, count) = leaf.leaf_range();
+        let blocks = &self.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
+        let mut tested = 0;
+        for block in blocks {
+            let mut mask = K::lines_hit(ray, self.prepared, block);
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
+                mask &= mask - 1;
+                let vertices = block.triangle(lane);
+                if self.prepared.distance(&vertices).is_none() {
+                    continue;
+                }
+                if block.primitives[lane] & MASKED != 0 {
+                    counter.alpha();
+                    let primitive = block.primitives[lane] & !MASKED;
+                    if !self
+                        .alpha
+                        .opaque(primitive, barycentrics(&self.prepared.ray, &vertices))
+                    {
+                        continue;
+                    }
+                }
+                counter.triangles(blocks[0].first_slot, tested + lane as u32 + 1);
+                self.blocked = true;
+                return None;
+            }
+            tested += BLOCK as u32;
+        }
+        counter.triangles(blocks[0].first_slot, count);
+        Some(self.prepared.ray.t_max)
+    }
+}
+
 /// The nearest triangle, the lowest primitive number among equally near ones.
 #[inline(always)]
 pub(super) fn closest<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
@@ -209,40 +340,14 @@ pub(super) fn closest<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
 ) -> Option<RayHit> {
     let prepared = PreparedRay::new(ray, bvh.bounds);
     let loaded = K::load(&prepared);
-    let mut best: Option<RayHit> = None;
-    walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, |counter, leaf| {
-        let (first, count) = leaf.leaf_range();
-        let blocks = &bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
-        counter.triangles(blocks[0].first_slot, count);
-        for block in blocks {
-            let mut mask = K::lines_hit(&loaded, &prepared, block);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
-                mask &= mask - 1;
-                let vertices = block.triangle(lane);
-                let Some(t) = prepared.distance(&vertices) else {
-                    continue;
-                };
-                let primitive = block.primitives[lane] & !MASKED;
-                if best.is_some_and(|b| (t, primitive) >= (b.t, b.primitive)) {
-                    continue;
-                }
-                if block.primitives[lane] & MASKED != 0 {
-                    counter.alpha();
-                    if !alpha.opaque(primitive, barycentrics(ray, &vertices)) {
-                        continue;
-                    }
-                }
-                best = Some(RayHit {
-                    t,
-                    primitive,
-                    vertices,
-                });
-            }
-        }
-        Some(best.map_or(ray.t_max, |b| b.t))
-    });
-    best
+    let mut leaf = Closest {
+        bvh,
+        prepared: &prepared,
+        alpha,
+        best: None,
+    };
+    walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
+    leaf.best
 }
 
 /// True where something blocks the ray. Counts the triangles up to the first that does.
@@ -256,35 +361,12 @@ pub(super) fn occluded<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
 ) -> bool {
     let prepared = PreparedRay::new(ray, bvh.bounds);
     let loaded = K::load(&prepared);
-    let mut blocked = false;
-    walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, |counter, leaf| {
-        let (first, count) = leaf.leaf_range();
-        let blocks = &bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
-        let mut tested = 0;
-        for block in blocks {
-            let mut mask = K::lines_hit(&loaded, &prepared, block);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
-                mask &= mask - 1;
-                let vertices = block.triangle(lane);
-                if prepared.distance(&vertices).is_none() {
-                    continue;
-                }
-                if block.primitives[lane] & MASKED != 0 {
-                    counter.alpha();
-                    let primitive = block.primitives[lane] & !MASKED;
-                    if !alpha.opaque(primitive, barycentrics(ray, &vertices)) {
-                        continue;
-                    }
-                }
-                counter.triangles(blocks[0].first_slot, tested + lane as u32 + 1);
-                blocked = true;
-                return None;
-            }
-            tested += BLOCK as u32;
-        }
-        counter.triangles(blocks[0].first_slot, count);
-        Some(ray.t_max)
-    });
-    blocked
+    let mut leaf = AnyHit {
+        bvh,
+        prepared: &prepared,
+        alpha,
+        blocked: false,
+    };
+    walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
+    leaf.blocked
 }
