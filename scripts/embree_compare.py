@@ -24,7 +24,7 @@ STREAMS = ["primary", "shadow", "mirror", "diffuse"]
 
 
 def ours(bench, scene, folder=None):
-    command = [bench, scene, "--json", "--rounds", "1"] + (["--dump", folder] if folder else [])
+    command = [bench, scene, "--json", "--rounds", "1", "--size", "1024"] + (["--dump", folder] if folder else [])
     out = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return {row["stream"]: row for row in map(json.loads, out.splitlines())}
 

@@ -155,3 +155,51 @@ fn a_scene_with_a_nan_position_names_the_place() {
     );
     assert!(!out.exists());
 }
+
+#[test]
+fn a_damaged_ray_trace_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let bytes = fs::read(root().join("traces/teapot-rays.raytrace")).expect("golden trace");
+    let path = folder.path().join("damaged.raytrace");
+    for keep in [0, 7, 63, 1000, bytes.len() - 1] {
+        fs::write(&path, &bytes[..keep]).expect("temporary file");
+        refuse(
+            program("replay").arg("reproject").arg(&path),
+            &["damaged.raytrace"],
+        );
+    }
+    let mut flipped = bytes.clone();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 0x10;
+    fs::write(&path, flipped).expect("temporary file");
+    refuse(
+        program("replay").arg("reproject").arg(&path),
+        &["damaged.raytrace"],
+    );
+    let texture_trace = root().join("traces/atrium.textrace");
+    refuse(
+        program("replay").arg("reproject").arg(texture_trace),
+        &["atrium.textrace"],
+    );
+    refuse(
+        program("replay")
+            .arg("reproject")
+            .arg(root().join("traces/teapot-rays.raytrace"))
+            .args(["--rule", "depht=0.02"]),
+        &["depht"],
+    );
+}
+
+#[test]
+fn a_missing_scene_leaves_no_ray_trace_behind() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("none.raytrace");
+    refuse(
+        program("tracegen")
+            .args(["rays", "no-such.gltf", "-o"])
+            .arg(&path),
+        &["no-such.gltf"],
+    );
+    let left = fs::read_dir(folder.path()).expect("folder").count();
+    assert_eq!(left, 0, "something was left behind");
+}

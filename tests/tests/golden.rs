@@ -41,6 +41,16 @@ const TEXTRACE_RUNS: &[(&str, &[&str])] = &[
     ),
 ];
 
+/// The same for ray traces.
+const RAYTRACE_RUNS: &[(&str, &[&str])] = &[
+    ("default", &[]),
+    ("plain", &["--rule", "none"]),
+    (
+        "shadows-reused",
+        &["--rule", "row+triangle", "--reuse", "shadow"],
+    ),
+];
+
 fn golden_traces(extension: &str) -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = fs::read_dir(root().join("traces"))
         .expect("traces/ exists")
@@ -80,6 +90,23 @@ fn every_golden_texture_trace_replays_to_its_golden_result() {
                     .args(*options)
                     .arg("--json"),
             );
+            compare(
+                &trace.with_extension("golden").join(format!("{name}.json")),
+                &output.stdout,
+            );
+        }
+    }
+}
+
+#[test]
+fn every_golden_ray_trace_reprojects_to_its_golden_result() {
+    let traces = golden_traces("raytrace");
+    assert!(traces.len() >= 2, "golden traces are missing: {traces:?}");
+    for trace in traces {
+        for (name, options) in RAYTRACE_RUNS {
+            let mut command = program("replay");
+            command.arg("reproject").arg(&trace).args(*options);
+            let output = run_ok(command.arg("--json"));
             compare(
                 &trace.with_extension("golden").join(format!("{name}.json")),
                 &output.stdout,
