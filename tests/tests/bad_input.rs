@@ -108,18 +108,16 @@ fn an_unknown_key_in_a_sweep_is_refused() {
 #[test]
 fn a_missing_scene_leaves_no_trace_behind() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let out = folder.path().join("out.textrace");
-    refuse(
-        program("tracegen")
-            .args(["raster", "no-such.gltf", "-o"])
-            .arg(&out),
-        &["no-such.gltf"],
-    );
-    assert_eq!(
-        fs::read_dir(folder.path()).expect("folder").count(),
-        0,
-        "something was left behind"
-    );
+    for (subcommand, out) in [("raster", "out.textrace"), ("rays", "out.raytrace")] {
+        refuse(
+            program("tracegen")
+                .args([subcommand, "no-such.gltf", "-o"])
+                .arg(folder.path().join(out)),
+            &["no-such.gltf"],
+        );
+        let left = fs::read_dir(folder.path()).expect("folder").count();
+        assert_eq!(left, 0, "{subcommand} left something behind");
+    }
 }
 
 #[test]
@@ -188,18 +186,4 @@ fn a_damaged_ray_trace_is_refused() {
             .args(["--rule", "depht=0.02"]),
         &["depht"],
     );
-}
-
-#[test]
-fn a_missing_scene_leaves_no_ray_trace_behind() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("none.raytrace");
-    refuse(
-        program("tracegen")
-            .args(["rays", "no-such.gltf", "-o"])
-            .arg(&path),
-        &["no-such.gltf"],
-    );
-    let left = fs::read_dir(folder.path()).expect("folder").count();
-    assert_eq!(left, 0, "something was left behind");
 }

@@ -154,6 +154,7 @@ impl Width for Eight {
         let second = mask.trailing_zeros() as usize & 7;
         mask &= mask - 1;
         let (near1, child1) = (lanes.0[second], node.children[second]);
+        // One or two hit children, most of the cases, need no sorting.
         let base = *top;
         if mask == 0 {
             *top = base + 1;
@@ -165,6 +166,7 @@ impl Width for Eight {
             stack[base] = pack(near, child);
             return Some(child1);
         }
+        // Insertion keeps the pushed entries nearest on top.
         let (e0, e1) = (pack(near, child), pack(near1, child1));
         let mut nearest = e0.min(e1);
         stack[base] = e0.max(e1);
