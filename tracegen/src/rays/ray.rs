@@ -28,15 +28,19 @@ impl Ray {
         }
     }
 
-    /// False where a coordinate is not finite or the direction is zero: such a ray hits nothing.
+    /// False where a coordinate is not finite, the direction is zero or the origin lies beyond
+    /// [`LARGEST_COORDINATE`]: such a ray hits nothing.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        self.origin.is_finite()
+        self.origin.abs().max_element() <= LARGEST_COORDINATE
             && self.direction.is_finite()
             && self.direction != Vec3::ZERO
             && self.t_max >= self.t_min
     }
 }
+
+/// Triangles and rays that reach farther are left out: up to here no slab distance overflows.
+pub const LARGEST_COORDINATE: f32 = 1e18;
 
 /// Relative error of the sheared coordinates that a slab must cover (section 3.3 of the paper).
 const SLAB_EPSILON: f32 = 5.0 / (1 << 24) as f32;
@@ -56,14 +60,15 @@ pub struct PreparedRay {
     pub shear: [f32; 2],
     /// 1 where the direction is negative along the axis.
     pub negative: [usize; 3],
-    /// Origin as the near planes see it: moved so that slabs start earlier.
-    pub near_origin: [f32; 3],
-    /// Origin as the far planes see it: moved so that slabs end later.
-    pub far_origin: [f32; 3],
     /// Reciprocal direction, rounded towards an earlier entry.
     pub near_reciprocal: [f32; 3],
     /// Reciprocal direction, rounded towards a later exit.
     pub far_reciprocal: [f32; 3],
+    /// Origin, moved so that slabs start earlier, times the near reciprocal: a near plane's
+    /// distance is `plane * near_reciprocal - near_offset`.
+    pub near_offset: [f32; 3],
+    /// Origin, moved so that slabs end later, times the far reciprocal.
+    pub far_offset: [f32; 3],
 }
 
 impl PreparedRay {
@@ -94,14 +99,15 @@ impl PreparedRay {
             axes: [kx, ky, kz],
             shear: [d[kx] / d[kz], d[ky] / d[kz]],
             negative: [0; 3],
-            near_origin: origin,
-            far_origin: origin,
             near_reciprocal: [0.0; 3],
             far_reciprocal: [0.0; 3],
+            near_offset: [0.0; 3],
+            far_offset: [0.0; 3],
         };
         for axis in 0..3 {
-            // Twice the bound: the additions below round too.
-            let pad = 2.0 * SLAB_EPSILON * (reach.to_array()[axis] + reach_z);
+            // Twice the paper's bound, and what the moved origin and its product lose by rounding.
+            let pad = 2.0 * SLAB_EPSILON * (reach.to_array()[axis] + reach_z)
+                + 2.0 * f32::EPSILON * origin[axis].abs();
             let direction = if d[axis].abs() < LEAST_DIRECTION {
                 LEAST_DIRECTION.copysign(d[axis])
             } else {
@@ -110,12 +116,28 @@ impl PreparedRay {
             let reciprocal = 1.0 / direction;
             let toward = pad.copysign(direction);
             prepared.negative[axis] = usize::from(direction < 0.0);
-            prepared.near_origin[axis] = origin[axis] + toward;
-            prepared.far_origin[axis] = origin[axis] - toward;
-            prepared.near_reciprocal[axis] = reciprocal * (1.0 - 2.0 * f32::EPSILON);
-            prepared.far_reciprocal[axis] = reciprocal * (1.0 + 2.0 * f32::EPSILON);
+            let near = reciprocal * (1.0 - 2.0 * f32::EPSILON);
+            let far = reciprocal * (1.0 + 2.0 * f32::EPSILON);
+            prepared.near_reciprocal[axis] = near;
+            prepared.far_reciprocal[axis] = far;
+            prepared.near_offset[axis] = (origin[axis] + toward) * near;
+            prepared.far_offset[axis] = (origin[axis] - toward) * far;
         }
         prepared
+    }
+
+    /// Distance at which a box's near plane on this axis is passed, never too late.
+    #[must_use]
+    #[inline(always)]
+    pub fn near_distance(&self, axis: usize, plane: f32) -> f32 {
+        plane.mul_add(self.near_reciprocal[axis], -self.near_offset[axis])
+    }
+
+    /// Distance at which a box's far plane on this axis is passed, never too early.
+    #[must_use]
+    #[inline(always)]
+    pub fn far_distance(&self, axis: usize, plane: f32) -> f32 {
+        plane.mul_add(self.far_reciprocal[axis], -self.far_offset[axis])
     }
 
     /// Entry and exit of a box along the whole line; entry is later than exit where it misses.
@@ -132,8 +154,8 @@ impl PreparedRay {
             } else {
                 (min[axis], max[axis])
             };
-            near = near.max((enter - self.near_origin[axis]) * self.near_reciprocal[axis]);
-            far = far.min((leave - self.far_origin[axis]) * self.far_reciprocal[axis]);
+            near = near.max(self.near_distance(axis, enter));
+            far = far.min(self.far_distance(axis, leave));
         }
         (near, far)
     }

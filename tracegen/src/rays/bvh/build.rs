@@ -1,28 +1,33 @@
 //! Builds the binary tree with obvhs and lays both trees out for traversal.
 
+use super::collapse::{BLOCK_COST, MAX_TRIANGLES, collapse};
 use super::node::{BLOCK, Block, Child, MASKED, Node2, Node8};
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use std::time::Duration;
 
-/// Pinned settings. The presets limit PLOC's search near the leaves, which makes trees of regular
-/// tessellations four times as costly; counts of two traces are only comparable when the builder
-/// is the same. Reinsertion of every node costs three times the build and saves a tenth of the steps;
-/// leaves of up to two blocks save memory, and so time, on large scenes.
+/// Pinned settings: counts of two traces are only comparable when the builder is the same. The
+/// presets limit PLOC's search near the leaves, which makes trees of regular tessellations four
+/// times as costly. Leaves are made by [`collapse`], not by obvhs.
 const SETTINGS: BvhBuildParams = BvhBuildParams {
     pre_split: false,
     ploc_search_distance: PlocSearchDistance::Medium,
     search_depth_threshold: 0,
     reinsertion_batch_ratio: 1.0,
-    post_collapse_reinsertion_batch_ratio_multiplier: 1.0,
+    post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
     sort_precision: SortPrecision::U64,
-    max_prims_per_leaf: 8,
-    collapse_traversal_cost: 3.0,
+    max_prims_per_leaf: 1,
+    collapse_traversal_cost: 1.0,
 };
+
+/// Rounds of reinsertion over the collapsed tree, each of every node: they take a twentieth off
+/// the steps on the meadow, and further rounds a hundredth.
+const REINSERTIONS_AFTER_COLLAPSE: u32 = 2;
 
 /// The settings by name, for the trace.
 #[must_use]
@@ -38,23 +43,20 @@ pub fn settings() -> Vec<(String, String)> {
             "reinsertion_batch_ratio",
             s.reinsertion_batch_ratio.to_string(),
         ),
-        (
-            "post_collapse_reinsertion_batch_ratio_multiplier",
-            s.post_collapse_reinsertion_batch_ratio_multiplier
-                .to_string(),
-        ),
         ("sort_bits", "64".to_owned()),
-        ("max_triangles_per_leaf", s.max_prims_per_leaf.to_string()),
+        ("max_triangles_per_leaf", MAX_TRIANGLES.to_string()),
+        ("triangles_per_block", BLOCK.to_string()),
+        ("block_cost_steps", BLOCK_COST.to_string()),
         (
-            "collapse_traversal_cost",
-            s.collapse_traversal_cost.to_string(),
+            "reinsertions_after_collapse",
+            REINSERTIONS_AFTER_COLLAPSE.to_string(),
         ),
     ]
     .map(|(name, value)| (name.to_owned(), value))
     .to_vec()
 }
 
-/// A tree in obvhs's form: every inner node is followed by both children.
+/// A tree in obvhs's form: every inner node's children are next to each other.
 pub(super) fn build_binary(triangles: &[[[f32; 3]; 3]]) -> Bvh2 {
     let boxes: Vec<Aabb> = triangles
         .iter()
@@ -63,7 +65,12 @@ pub(super) fn build_binary(triangles: &[[[f32; 3]; 3]]) -> Bvh2 {
             Aabb::new(a.min(b).min(c), a.max(b).max(c))
         })
         .collect();
-    build_bvh2(&boxes, SETTINGS, &mut Duration::default())
+    let mut tree = collapse(&build_bvh2(&boxes, SETTINGS, &mut Duration::default()));
+    let mut optimizer = ReinsertionOptimizer::default();
+    for _ in 0..REINSERTIONS_AFTER_COLLAPSE {
+        optimizer.run(&mut tree, 1.0, None);
+    }
+    tree
 }
 
 /// What laying out produces.

@@ -4,22 +4,27 @@
 //! boxes, the unit in which T&I unit 2.0 works and in which traces count, and an eight-wide one
 //! for speed. Both find the same hits, bit for bit.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 mod build;
+mod collapse;
 pub mod count;
 mod kernel;
+mod leaf;
 pub mod node;
 mod traverse;
 
 #[cfg(test)]
 mod tests;
 
-use crate::rays::ray::Ray;
+use crate::rays::ray::{LARGEST_COORDINATE, Ray};
 use count::Counter;
 use formats::raytrace::{BvhSummary, TraversalKind};
 use glam::Vec3;
 use kernel::{Kernel, Scalar};
+pub use leaf::{AllOpaque, AlphaTest, RayHit};
 use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
-pub use traverse::{AllOpaque, AlphaTest, RayHit, TraversalStack};
+pub use traverse::TraversalStack;
 use traverse::{Eight, Two, Width, closest, occluded};
 
 /// A triangle that cannot be put into the hierarchy.
@@ -49,7 +54,7 @@ impl Instructions {
     #[must_use]
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if kernel::Avx2::available() {
+        if avx2::Avx2::available() {
             return Self::Avx2;
         }
         Self::Scalar
@@ -71,8 +76,8 @@ pub struct Bvh {
 }
 
 impl Bvh {
-    /// Builds the trees. Triangles with a coordinate that is not finite are left out; they can't
-    /// be hit. `masked` says of a triangle's number whether its material has an alpha mask.
+    /// Builds the trees. Triangles with a coordinate that is not finite, or beyond
+    /// [`LARGEST_COORDINATE`], are left out; they can't be hit. `masked` says of a triangle's number whether its material has an alpha mask.
     ///
     /// # Errors
     /// There are more triangles than node references can number.
@@ -90,7 +95,11 @@ impl Bvh {
         let (kept, numbers): (Vec<_>, Vec<u32>) = triangles
             .iter()
             .zip(0u32..)
-            .filter(|(t, _)| t.iter().flatten().all(|x| x.is_finite()))
+            .filter(|(t, _)| {
+                t.as_flattened()
+                    .iter()
+                    .all(|x| x.abs() <= LARGEST_COORDINATE)
+            })
             .map(|(t, n)| (*t, if masked(n) { n | MASKED } else { n }))
             .unzip();
         let points = || kept.iter().flatten().map(|p| Vec3::from(*p));
@@ -131,7 +140,7 @@ impl Bvh {
             TraversalKind::Bvh8 => (self.nodes8.len(), self.depth8, size_of::<Node8>()),
         };
         BvhSummary {
-            builder: "obvhs 0.4 ploc+reinsertion".to_owned(),
+            builder: "obvhs 0.4 ploc+reinsertion, leaves by blocks".to_owned(),
             settings: build::settings(),
             traversal,
             triangles: self.triangles,
@@ -242,7 +251,7 @@ fn closest_avx2<W: Width, C: Counter, A: AlphaTest>(
     counter: &mut C,
     alpha: &A,
 ) -> Option<RayHit> {
-    closest::<kernel::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
+    closest::<avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
 }
 
 /// See [`closest_avx2`].
@@ -255,5 +264,5 @@ fn occluded_avx2<W: Width, C: Counter, A: AlphaTest>(
     counter: &mut C,
     alpha: &A,
 ) -> bool {
-    occluded::<kernel::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
+    occluded::<avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
 }

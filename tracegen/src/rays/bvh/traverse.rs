@@ -3,36 +3,9 @@
 use super::Bvh;
 use super::count::Counter;
 use super::kernel::{Kernel, Lanes8};
-use super::node::{BLOCK, Child, MASKED};
-use crate::rays::ray::{PreparedRay, Ray, barycentrics};
-
-/// Where a ray meets a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RayHit {
-    /// Distance in units of the ray's direction.
-    pub t: f32,
-    /// Primitive number.
-    pub primitive: u32,
-    /// The triangle's vertices.
-    pub vertices: [[f32; 3]; 3],
-}
-
-/// Decides at a masked triangle whether a ray stops there.
-pub trait AlphaTest {
-    /// True where the triangle is opaque at these weights of its second and third vertex.
-    fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool;
-}
-
-/// Every triangle stops every ray.
-#[derive(Clone, Copy, Debug)]
-pub struct AllOpaque;
-
-impl AlphaTest for AllOpaque {
-    #[inline(always)]
-    fn opaque(&self, _: u32, _: [f32; 2]) -> bool {
-        true
-    }
-}
+use super::leaf::{AlphaTest, AnyHit, Closest, LeafTest, RayHit};
+use super::node::Child;
+use crate::rays::ray::{PreparedRay, Ray};
 
 /// Nodes to visit; kept between rays to spare the allocation.
 #[derive(Clone, Debug, Default)]
@@ -52,9 +25,9 @@ impl TraversalStack {
     }
 }
 
+/// A stack entry; `near` is not negative, or has been negated.
 #[inline(always)]
 fn pack(near: f32, child: Child) -> u64 {
-    // Clearing the sign turns a -0 into the 0 it stands for.
     u64::from(near.to_bits() & 0x7FFF_FFFF) << 32 | u64::from(child.0)
 }
 
@@ -65,6 +38,10 @@ fn unpack(entry: u64) -> (f32, Child) {
 
 /// Which tree is walked.
 pub trait Width {
+    /// Whether leaf tests are kept out of the loop. The binary step is short enough to live in
+    /// registers then; the eight-wide one is not, and loses by the call.
+    const LEAVES_APART: bool;
+
     /// Visits an inner node: pushes its hit children but for the nearest, which it returns.
     fn visit<K: Kernel>(
         bvh: &Bvh,
@@ -80,6 +57,8 @@ pub trait Width {
 pub struct Two;
 
 impl Width for Two {
+    const LEAVES_APART: bool = true;
+
     #[inline(always)]
     fn visit<K: Kernel>(
         bvh: &Bvh,
@@ -90,16 +69,16 @@ impl Width for Two {
         top: &mut usize,
     ) -> Option<Child> {
         let node = &bvh.nodes2[node as usize];
-        let (near, mask) = K::step2(ray, node, t_max);
+        let (minus_near, mask) = K::step2(ray, node, t_max);
         // Nested tests rather than a match, which would become a jump table.
         let [left, right] = node.children;
         if mask & 1 != 0 {
             if mask & 2 != 0 {
-                let (nearer, pushed) = if near[0] <= near[1] {
-                    (left, pack(near[1], right))
+                let (nearer, pushed) = if minus_near[0] >= minus_near[1] {
+                    (left, pack(minus_near[1], right))
                 } else {
                     keep_branch();
-                    (right, pack(near[0], left))
+                    (right, pack(minus_near[0], left))
                 };
                 stack[*top] = pushed;
                 *top += 1;
@@ -129,6 +108,8 @@ fn keep_branch() {
 pub struct Eight;
 
 impl Width for Eight {
+    const LEAVES_APART: bool = false;
+
     #[inline(always)]
     fn visit<K: Kernel>(
         bvh: &Bvh,
@@ -207,7 +188,12 @@ fn walk<K: Kernel, W: Width, C: Counter>(
     let mut at = Child(0);
     loop {
         let next = if at.is_leaf() {
-            match leaf.test(ray, counter, at) {
+            let tested = if W::LEAVES_APART {
+                K::leaf_apart(leaf, ray, counter, at)
+            } else {
+                leaf.test(ray, counter, at)
+            };
+            match tested {
                 Some(shorter) => t_max = shorter,
                 None => return,
             }
@@ -229,105 +215,6 @@ fn walk<K: Kernel, W: Width, C: Counter>(
                 }
             },
         };
-    }
-}
-
-/// What happens at a leaf. Methods rather than closures: a closure that is not inlined would be
-/// compiled without the instructions of its traversal.
-trait LeafTest<K: Kernel, C: Counter> {
-    /// Tests a leaf and returns the new `t_max`, or `None` to stop.
-    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32>;
-}
-
-struct Closest<'a, A> {
-    bvh: &'a Bvh,
-    prepared: &'a PreparedRay,
-    alpha: &'a A,
-    best: Option<RayHit>,
-}
-
-impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
-    #[inline(always)]
-    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32> {
-        let (first, count) = leaf.leaf_range();
-        let blocks = &self.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
-        counter.triangles(blocks[0].first_slot, count);
-        for block in blocks {
-            let mut mask = K::lines_hit(ray, self.prepared, block);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
-                mask &= mask - 1;
-                let vertices = block.triangle(lane);
-                let Some(t) = self.prepared.distance(&vertices) else {
-                    continue;
-                };
-                let primitive = block.primitives[lane] & !MASKED;
-                if self
-                    .best
-                    .is_some_and(|b| (t, primitive) >= (b.t, b.primitive))
-                {
-                    continue;
-                }
-                if block.primitives[lane] & MASKED != 0 {
-                    counter.alpha();
-                    if !self
-                        .alpha
-                        .opaque(primitive, barycentrics(&self.prepared.ray, &vertices))
-                    {
-                        continue;
-                    }
-                }
-                self.best = Some(RayHit {
-                    t,
-                    primitive,
-                    vertices,
-                });
-            }
-        }
-        Some(self.best.map_or(self.prepared.ray.t_max, |b| b.t))
-    }
-}
-
-struct AnyHit<'a, A> {
-    bvh: &'a Bvh,
-    prepared: &'a PreparedRay,
-    alpha: &'a A,
-    blocked: bool,
-}
-
-impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
-    #[inline(always)]
-    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32> {
-        let (first, count) = leaf.leaf_range();
-        let blocks = &self.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
-        let mut tested = 0;
-        for block in blocks {
-            let mut mask = K::lines_hit(ray, self.prepared, block);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
-                mask &= mask - 1;
-                let vertices = block.triangle(lane);
-                if self.prepared.distance(&vertices).is_none() {
-                    continue;
-                }
-                if block.primitives[lane] & MASKED != 0 {
-                    counter.alpha();
-                    let primitive = block.primitives[lane] & !MASKED;
-                    if !self
-                        .alpha
-                        .opaque(primitive, barycentrics(&self.prepared.ray, &vertices))
-                    {
-                        continue;
-                    }
-                }
-                counter.triangles(blocks[0].first_slot, tested + lane as u32 + 1);
-                self.blocked = true;
-                return None;
-            }
-            tested += BLOCK as u32;
-        }
-        counter.triangles(blocks[0].first_slot, count);
-        Some(self.prepared.ray.t_max)
     }
 }
 
