@@ -1,10 +1,11 @@
 //! Speed of the counting traversal: `cargo bench -p tracegen --bench rays -- SCENE [--dump DIR]`.
 //!
 //! Four streams of single rays (primary, shadow, mirror, diffuse) over a scene's triangles, walked
-//! by both trees with and without counters, by one thread and by two. The variants take turns, and
-//! each figure is the best of its rounds, so that a busy machine disturbs them alike; one thread's
-//! figures are in its own processor time, two threads' in wall time. `--dump`
-//! writes triangles and rays as plain little-endian floats for scripts/embree_compare.py.
+//! by both trees with and without counters, by one thread and by two. Streams are timed in slices
+//! and the variants take turns at each: a rate is that of every slice's best round, so that a busy
+//! moment costs one slice of one round. Two threads take whole streams; their gain is the best
+//! round's wall time against one thread's. `--dump` writes triangles and rays as plain
+//! little-endian floats for scripts/embree_compare.py.
 
 use formats::raytrace::{EyeCamera, TraversalKind};
 use glam::Vec3;
@@ -49,7 +50,7 @@ fn options() -> anyhow::Result<Options> {
     let mut options = Options {
         scene: "atrium".to_owned(),
         dump: None,
-        rounds: 5,
+        rounds: 6,
         size_px: 512,
         json: false,
     };
@@ -105,9 +106,18 @@ fn run() -> anyhow::Result<()> {
             "bvh8 steps"
         );
     }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
     for stream in &streams {
-        let f = measure(&bvh, stream, options.rounds);
         if options.json {
+            // Whole streams, as the other program runs them.
+            let f = measure(
+                &bvh,
+                stream,
+                options.rounds,
+                &[Variant::Two, Variant::Eight],
+                usize::MAX,
+                &pool,
+            );
             println!(
                 "{{\"stream\":\"{}\",\"rays\":{},\"bvh2\":{:.4},\"bvh8\":{:.4}}}",
                 stream.name,
@@ -117,6 +127,7 @@ fn run() -> anyhow::Result<()> {
             );
             continue;
         }
+        let f = measure(&bvh, stream, options.rounds, &VARIANTS, SLICE, &pool);
         let cost = |counted, plain| 100.0 * (f.rate(plain) / f.rate(counted) - 1.0);
         println!(
             "{:8} {:8} {:12.2} {:6.2} {:13.1} % {:5.1} % {:14.2}x {:5.2}x {:7.1} {:6.1} {:11.1}",
@@ -126,8 +137,8 @@ fn run() -> anyhow::Result<()> {
             f.rate(Variant::Eight),
             cost(Variant::Two, Variant::TwoPlain),
             cost(Variant::Eight, Variant::EightPlain),
-            f.rate(Variant::TwoThreads2) / f.rate(Variant::Two),
-            f.rate(Variant::TwoThreads8) / f.rate(Variant::Eight),
+            f.gain(Variant::TwoThreads2, Variant::Two),
+            f.gain(Variant::TwoThreads8, Variant::Eight),
             f.per_ray(f.counts2.0),
             f.per_ray(f.counts2.1),
             f.per_ray(f.counts8.0),
@@ -155,9 +166,15 @@ const VARIANTS: [Variant; 6] = [
     Variant::TwoThreads8,
 ];
 
+/// Rays in a slice: some milliseconds.
+const SLICE: usize = 1 << 15;
+
 struct Figures {
     rays: usize,
-    best_s: [f64; 6],
+    /// Seconds by variant, summed over the best round of each slice.
+    best_s: [f64; VARIANTS.len()],
+    /// Seconds by variant of the best whole round.
+    round_s: [f64; VARIANTS.len()],
     counts2: (u64, u64),
     counts8: (u64, u64),
 }
@@ -168,45 +185,80 @@ impl Figures {
         self.rays as f64 / self.best_s[variant as usize] / 1e6
     }
 
+    /// How many times faster two threads are than one.
+    fn gain(&self, two_threads: Variant, one: Variant) -> f64 {
+        self.round_s[one as usize] / self.round_s[two_threads as usize]
+    }
+
     fn per_ray(&self, n: u64) -> f64 {
         n as f64 / self.rays as f64
     }
 }
 
-fn measure(bvh: &Bvh, stream: &Stream, rounds: usize) -> Figures {
+fn measure(
+    bvh: &Bvh,
+    stream: &Stream,
+    rounds: usize,
+    variants: &[Variant],
+    slice: usize,
+    pool: &rayon::ThreadPool,
+) -> Figures {
+    let slices: Vec<&[Ray]> = stream.rays.chunks(slice).collect();
+    let mut best_s = vec![[f64::INFINITY; VARIANTS.len()]; slices.len()];
     let mut figures = Figures {
         rays: stream.rays.len(),
-        best_s: [f64::INFINITY; 6],
+        best_s: [0.0; VARIANTS.len()],
+        round_s: [f64::INFINITY; VARIANTS.len()],
         counts2: (0, 0),
         counts8: (0, 0),
     };
     let (two, eight) = (TraversalKind::Bvh2, TraversalKind::Bvh8);
-    for _ in 0..rounds {
-        for variant in VARIANTS {
-            let (start, cpu) = (Instant::now(), cpu_s());
-            match variant {
-                Variant::Two => figures.counts2 = counted(bvh, two, stream),
-                Variant::TwoPlain => plain(bvh, two, stream),
-                Variant::Eight => figures.counts8 = counted(bvh, eight, stream),
-                Variant::EightPlain => plain(bvh, eight, stream),
-                Variant::TwoThreads2 => on_two_threads(bvh, two, stream),
-                Variant::TwoThreads8 => on_two_threads(bvh, eight, stream),
+    let any = stream.any_hit;
+    for round in 0..rounds {
+        let mut round_s = [0.0; VARIANTS.len()];
+        (figures.counts2, figures.counts8) = ((0, 0), (0, 0));
+        for (slice, best_s) in slices.iter().zip(&mut best_s) {
+            for turn in 0..variants.len() {
+                // The second to walk a slice finds its nodes cached: each is second in its turn.
+                let variant = variants[if round % 2 == 0 {
+                    turn
+                } else {
+                    variants.len() - 1 - turn
+                }];
+                let start = Instant::now();
+                match variant {
+                    Variant::Two => add(&mut figures.counts2, counted(bvh, two, any, slice)),
+                    Variant::TwoPlain => plain(bvh, two, any, slice),
+                    Variant::Eight => add(&mut figures.counts8, counted(bvh, eight, any, slice)),
+                    Variant::EightPlain => plain(bvh, eight, any, slice),
+                    Variant::TwoThreads2 | Variant::TwoThreads8 => continue,
+                }
+                let seconds = start.elapsed().as_secs_f64();
+                round_s[variant as usize] += seconds;
+                let best = &mut best_s[variant as usize];
+                *best = best.min(seconds);
             }
-            let threaded = matches!(variant, Variant::TwoThreads2 | Variant::TwoThreads8);
-            let used = cpu_s().zip(cpu).filter(|_| !threaded);
-            let wall = start.elapsed().as_secs_f64();
-            let best = &mut figures.best_s[variant as usize];
-            *best = best.min(used.map_or(wall, |(end, start)| end - start));
         }
+        for (variant, tree) in [(Variant::TwoThreads2, two), (Variant::TwoThreads8, eight)] {
+            if !variants.contains(&variant) {
+                continue;
+            }
+            let start = Instant::now();
+            on_two_threads(bvh, tree, stream, pool);
+            round_s[variant as usize] = start.elapsed().as_secs_f64();
+        }
+        for (best, round) in figures.round_s.iter_mut().zip(round_s) {
+            *best = best.min(round);
+        }
+    }
+    for (variant, total) in figures.best_s.iter_mut().enumerate() {
+        *total = best_s.iter().map(|slice| slice[variant]).sum();
     }
     figures
 }
 
-/// Processor time of this thread in seconds, where the system tells (Linux).
-fn cpu_s() -> Option<f64> {
-    let stat = fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    let ns: f64 = stat.split(' ').next()?.parse().ok()?;
-    Some(ns / 1e9)
+fn add(total: &mut (u64, u64), more: (u64, u64)) {
+    *total = (total.0 + more.0, total.1 + more.1);
 }
 
 /// Walks the rays; the number of hits keeps the work from being optimised away.
@@ -233,28 +285,26 @@ fn walk<C: Counter + Default>(
         .count()
 }
 
-fn counted(bvh: &Bvh, tree: TraversalKind, stream: &Stream) -> (u64, u64) {
+fn counted(bvh: &Bvh, tree: TraversalKind, any_hit: bool, rays: &[Ray]) -> (u64, u64) {
     let mut stack = TraversalStack::default();
     let (mut steps, mut tests) = (0, 0);
     let done = |c: Counts| {
         steps += u64::from(c.steps);
         tests += u64::from(c.triangle_tests);
     };
-    let hits = walk(bvh, tree, stream.any_hit, &stream.rays, &mut stack, done);
+    let hits = walk(bvh, tree, any_hit, rays, &mut stack, done);
     std::hint::black_box(hits);
     (steps, tests)
 }
 
-fn plain(bvh: &Bvh, tree: TraversalKind, stream: &Stream) {
+fn plain(bvh: &Bvh, tree: TraversalKind, any_hit: bool, rays: &[Ray]) {
     let mut stack = TraversalStack::default();
     let done = |_: NoCounter| ();
-    let hits = walk(bvh, tree, stream.any_hit, &stream.rays, &mut stack, done);
+    let hits = walk(bvh, tree, any_hit, rays, &mut stack, done);
     std::hint::black_box(hits);
 }
 
-fn on_two_threads(bvh: &Bvh, tree: TraversalKind, stream: &Stream) {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
-    let Ok(pool) = pool else { return };
+fn on_two_threads(bvh: &Bvh, tree: TraversalKind, stream: &Stream, pool: &rayon::ThreadPool) {
     let chunks = stream.rays.par_chunks(4096);
     let steps: u64 = pool.install(|| {
         chunks
