@@ -10,6 +10,7 @@ use formats::raytrace::{
 use glam::Vec3;
 use rayon::prelude::*;
 use std::io::{Seek, Write};
+use std::ops::Range;
 
 /// Tiles traced before they are written: enough to keep all threads busy, few enough that the
 /// memory for encoded tiles stays small.
@@ -88,12 +89,13 @@ struct TileResult {
     stats: FrameStats,
 }
 
-/// Traces the tiles of both eyes and appends them to a trace. The result does not depend on the
-/// number of threads. `progress` is told the tiles done after each batch.
+/// Traces the tiles of both eyes and appends them to a trace; one batch is written while the next
+/// is traced. The result does not depend on the number of threads. `progress` is told the tiles
+/// traced after each batch.
 ///
 /// # Errors
 /// When writing fails.
-pub fn trace_frame<W: Write + Seek>(
+pub fn trace_frame<W: Write + Seek + Send>(
     scene: &TraceScene,
     settings: TraceSettings,
     tables: &RaytraceTables,
@@ -112,44 +114,75 @@ pub fn trace_frame<W: Write + Seek>(
     };
     let mut hit = vec![false; scene.soup.triangles.len()];
     let tiles = tables.tile_count();
-    for (eye, image) in tables.meta.eyes.iter().zip(&mut frame.images) {
-        let mut first = 0;
-        while first < tiles {
-            let last = (first + TILES_AT_ONCE).min(tiles);
-            let results: Vec<TileResult> = (first..last)
-                .into_par_iter()
-                .map_init(
-                    || (Tracer::new(scene, settings), RayTile::default()),
-                    |(tracer, tile), number| {
-                        tile.clear();
-                        (tile.origin_px, tile.size_px) = tables.tile_rect(number);
-                        trace_tile(tracer, settings, eye, tile)
-                    },
-                )
-                .collect();
-            for result in results {
-                writer.tile(&result.encoded?)?;
-                frame.stats.merge(&result.stats);
-                for primitive in result.primitives {
-                    hit[primitive as usize] = true;
-                }
-                let width = result.size_px[0] as usize;
-                for (row, colors) in result.colors.chunks(width.max(1)).enumerate() {
-                    let y = result.origin_px[1] as usize + row;
-                    let at = y * size_px[0] as usize + result.origin_px[0] as usize;
-                    image.pixels[at..at + colors.len()].copy_from_slice(colors);
-                }
-            }
-            progress(u64::from(last - first));
-            first = last;
-        }
+    let batches = (0..tables.meta.eyes.len()).flat_map(|eye| {
+        let starts = (0..tiles).step_by(TILES_AT_ONCE as usize);
+        starts.map(move |first| (eye, first..(first + TILES_AT_ONCE).min(tiles)))
+    });
+    let mut traced: (usize, Vec<TileResult>) = (0, Vec::new());
+    for (eye, batch) in batches {
+        let count = batch.len() as u64;
+        let camera = &tables.meta.eyes[eye];
+        let (taken, next) = rayon::join(
+            || frame.take(traced, writer, &mut hit),
+            || trace_batch(scene, settings, tables, camera, batch),
+        );
+        taken?;
+        traced = (eye, next);
+        progress(count);
     }
+    frame.take(traced, writer, &mut hit)?;
     frame.triangles = (0u32..)
         .zip(hit)
         .filter(|(_, hit)| *hit)
         .map(|(primitive, _)| triangle(scene, primitive))
         .collect();
     Ok(frame)
+}
+
+impl Frame {
+    /// Writes a batch of an eye's tiles and adds it to the frame.
+    fn take<W: Write + Seek>(
+        &mut self,
+        (eye, batch): (usize, Vec<TileResult>),
+        writer: &mut RaytraceWriter<W>,
+        hit: &mut [bool],
+    ) -> Result<()> {
+        let image = &mut self.images[eye];
+        for result in batch {
+            writer.tile(&result.encoded?)?;
+            self.stats.merge(&result.stats);
+            for primitive in result.primitives {
+                hit[primitive as usize] = true;
+            }
+            let width = result.size_px[0] as usize;
+            for (row, colors) in result.colors.chunks(width.max(1)).enumerate() {
+                let y = result.origin_px[1] as usize + row;
+                let at = y * image.size_px[0] as usize + result.origin_px[0] as usize;
+                image.pixels[at..at + colors.len()].copy_from_slice(colors);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn trace_batch(
+    scene: &TraceScene,
+    settings: TraceSettings,
+    tables: &RaytraceTables,
+    eye: &EyeCamera,
+    batch: Range<u32>,
+) -> Vec<TileResult> {
+    batch
+        .into_par_iter()
+        .map_init(
+            || (Tracer::new(scene, settings), RayTile::default()),
+            |(tracer, tile), number| {
+                tile.clear();
+                (tile.origin_px, tile.size_px) = tables.tile_rect(number);
+                trace_tile(tracer, settings, eye, tile)
+            },
+        )
+        .collect()
 }
 
 fn trace_tile(
