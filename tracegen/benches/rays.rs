@@ -1,15 +1,16 @@
 //! Speed of the counting traversal: `cargo bench -p tracegen --bench rays -- SCENE [--dump DIR]`.
 //!
 //! Four streams of single rays (primary, shadow, mirror, diffuse) over a scene's triangles, walked
-//! by both trees with and without counters, by one thread and by two. Streams are timed in slices
-//! and the variants take turns at each: a rate is that of every slice's best round, so that a busy
-//! moment costs one slice of one round. Two threads take whole streams; their gain is the best
-//! round's wall time against one thread's. `--dump` writes triangles and rays as plain
+//! by both trees with and without counters, by one thread and by two. The cost of counting is
+//! measured in slices at which the variants take turns: a rate is that of every slice's best round,
+//! so that a busy moment costs one slice of one round. The gain of two threads is that of whole
+//! streams, best round against best round. `--dump` writes triangles and rays as plain
 //! little-endian floats for scripts/embree_compare.py.
 
 use formats::raytrace::{EyeCamera, TraversalKind};
 use glam::Vec3;
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
@@ -106,7 +107,8 @@ fn run() -> anyhow::Result<()> {
             "bvh8 steps"
         );
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
+    let pool = |threads| ThreadPoolBuilder::new().num_threads(threads).build();
+    let pools = [pool(1)?, pool(2)?];
     for stream in &streams {
         if options.json {
             // Whole streams, as the other program runs them.
@@ -116,7 +118,6 @@ fn run() -> anyhow::Result<()> {
                 options.rounds,
                 &[Variant::Two, Variant::Eight],
                 usize::MAX,
-                &pool,
             );
             println!(
                 "{{\"stream\":\"{}\",\"rays\":{},\"bvh2\":{:.4},\"bvh8\":{:.4}}}",
@@ -127,7 +128,8 @@ fn run() -> anyhow::Result<()> {
             );
             continue;
         }
-        let f = measure(&bvh, stream, options.rounds, &VARIANTS, SLICE, &pool);
+        let f = measure(&bvh, stream, options.rounds, &VARIANTS, SLICE);
+        let gain = |tree| gain(&bvh, tree, stream, &pools, options.rounds);
         let cost = |counted, plain| 100.0 * (f.rate(plain) / f.rate(counted) - 1.0);
         println!(
             "{:8} {:8} {:12.2} {:6.2} {:13.1} % {:5.1} % {:14.2}x {:5.2}x {:7.1} {:6.1} {:11.1}",
@@ -137,8 +139,8 @@ fn run() -> anyhow::Result<()> {
             f.rate(Variant::Eight),
             cost(Variant::Two, Variant::TwoPlain),
             cost(Variant::Eight, Variant::EightPlain),
-            f.gain(Variant::TwoThreads2, Variant::Two),
-            f.gain(Variant::TwoThreads8, Variant::Eight),
+            gain(TraversalKind::Bvh2),
+            gain(TraversalKind::Bvh8),
             f.per_ray(f.counts2.0),
             f.per_ray(f.counts2.1),
             f.per_ray(f.counts8.0),
@@ -153,17 +155,13 @@ enum Variant {
     TwoPlain,
     Eight,
     EightPlain,
-    TwoThreads2,
-    TwoThreads8,
 }
 
-const VARIANTS: [Variant; 6] = [
+const VARIANTS: [Variant; 4] = [
     Variant::Two,
     Variant::TwoPlain,
     Variant::Eight,
     Variant::EightPlain,
-    Variant::TwoThreads2,
-    Variant::TwoThreads8,
 ];
 
 /// Rays in a slice: some milliseconds.
@@ -173,8 +171,6 @@ struct Figures {
     rays: usize,
     /// Seconds by variant, summed over the best round of each slice.
     best_s: [f64; VARIANTS.len()],
-    /// Seconds by variant of the best whole round.
-    round_s: [f64; VARIANTS.len()],
     counts2: (u64, u64),
     counts8: (u64, u64),
 }
@@ -183,11 +179,6 @@ impl Figures {
     /// Million rays a second.
     fn rate(&self, variant: Variant) -> f64 {
         self.rays as f64 / self.best_s[variant as usize] / 1e6
-    }
-
-    /// How many times faster two threads are than one.
-    fn gain(&self, two_threads: Variant, one: Variant) -> f64 {
-        self.round_s[one as usize] / self.round_s[two_threads as usize]
     }
 
     fn per_ray(&self, n: u64) -> f64 {
@@ -201,21 +192,18 @@ fn measure(
     rounds: usize,
     variants: &[Variant],
     slice: usize,
-    pool: &rayon::ThreadPool,
 ) -> Figures {
     let slices: Vec<&[Ray]> = stream.rays.chunks(slice).collect();
     let mut best_s = vec![[f64::INFINITY; VARIANTS.len()]; slices.len()];
     let mut figures = Figures {
         rays: stream.rays.len(),
         best_s: [0.0; VARIANTS.len()],
-        round_s: [f64::INFINITY; VARIANTS.len()],
         counts2: (0, 0),
         counts8: (0, 0),
     };
     let (two, eight) = (TraversalKind::Bvh2, TraversalKind::Bvh8);
     let any = stream.any_hit;
     for round in 0..rounds {
-        let mut round_s = [0.0; VARIANTS.len()];
         (figures.counts2, figures.counts8) = ((0, 0), (0, 0));
         for (slice, best_s) in slices.iter().zip(&mut best_s) {
             for turn in 0..variants.len() {
@@ -231,30 +219,35 @@ fn measure(
                     Variant::TwoPlain => plain(bvh, two, any, slice),
                     Variant::Eight => add(&mut figures.counts8, counted(bvh, eight, any, slice)),
                     Variant::EightPlain => plain(bvh, eight, any, slice),
-                    Variant::TwoThreads2 | Variant::TwoThreads8 => continue,
                 }
-                let seconds = start.elapsed().as_secs_f64();
-                round_s[variant as usize] += seconds;
                 let best = &mut best_s[variant as usize];
-                *best = best.min(seconds);
+                *best = best.min(start.elapsed().as_secs_f64());
             }
-        }
-        for (variant, tree) in [(Variant::TwoThreads2, two), (Variant::TwoThreads8, eight)] {
-            if !variants.contains(&variant) {
-                continue;
-            }
-            let start = Instant::now();
-            on_two_threads(bvh, tree, stream, pool);
-            round_s[variant as usize] = start.elapsed().as_secs_f64();
-        }
-        for (best, round) in figures.round_s.iter_mut().zip(round_s) {
-            *best = best.min(round);
         }
     }
     for (variant, total) in figures.best_s.iter_mut().enumerate() {
         *total = best_s.iter().map(|slice| slice[variant]).sum();
     }
     figures
+}
+
+/// How many times faster two threads walk a stream than one.
+fn gain(
+    bvh: &Bvh,
+    tree: TraversalKind,
+    stream: &Stream,
+    pools: &[ThreadPool; 2],
+    rounds: usize,
+) -> f64 {
+    let mut best_s = [f64::INFINITY; 2];
+    for _ in 0..rounds {
+        for (best, pool) in best_s.iter_mut().zip(pools) {
+            let start = Instant::now();
+            walk_in(pool, bvh, tree, stream);
+            *best = best.min(start.elapsed().as_secs_f64());
+        }
+    }
+    best_s[0] / best_s[1]
 }
 
 fn add(total: &mut (u64, u64), more: (u64, u64)) {
@@ -304,8 +297,8 @@ fn plain(bvh: &Bvh, tree: TraversalKind, any_hit: bool, rays: &[Ray]) {
     std::hint::black_box(hits);
 }
 
-fn on_two_threads(bvh: &Bvh, tree: TraversalKind, stream: &Stream, pool: &rayon::ThreadPool) {
-    let chunks = stream.rays.par_chunks(4096);
+fn walk_in(pool: &ThreadPool, bvh: &Bvh, tree: TraversalKind, stream: &Stream) {
+    let chunks = stream.rays.par_chunks(1024);
     let steps: u64 = pool.install(|| {
         chunks
             .map_init(TraversalStack::default, |stack, rays| {
