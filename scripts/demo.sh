@@ -1,6 +1,6 @@
 #!/bin/sh
-# Captures the four built-in scenes in stereo, replays them in every order of the paper and writes
-# one HTML report.
+# Captures the four built-in raster scenes in stereo and replays them in every order of the Z2 paper;
+# traces the six ray-traced ones and reprojects them as in the SGRT paper. Writes two HTML reports.
 set -eu
 cd "$(dirname "$0")/.."
 out=${OUT:-out}
@@ -17,4 +17,13 @@ for scene in atrium atrium-plain atrium-shadows jungle; do
 done
 say "replay: 4 scenes x 4 cache configurations x 3 orders, timed"
 "$bin/replay" report "$@" -o "$out/report.html"
-say "done: open $out/report.html"
+
+set --
+for scene in teapot chess car lab music-box meadow; do
+    say "trace rays of $scene"
+    "$bin/tracegen" rays "$scene" --size 512x512 -o "$out/$scene.raytrace"
+    set -- "$@" "$out/$scene.raytrace"
+done
+say "reproject: 6 scenes, the default rule and the paper's"
+"$bin/replay" reproject "$@" --html "$out/reprojection.html" > "$out/reprojection.txt"
+say "done: open $out/report.html and $out/reprojection.html"

@@ -152,13 +152,8 @@ impl BarChart {
                         }
                         if let Some(decimals) = self.decimals {
                             let label = format!("{value:.decimals$}");
-                            let mut y = scale.at(value) - 8.0;
-                            // A mark just above the bar would strike the number through.
-                            if let Some(mark_y) = mark.map(|m| scale.at(m))
-                                && (mark_y - y).abs() < 8.0
-                            {
-                                y = mark_y.min(scale.at(value)) - 8.0;
-                            }
+                            let lines = [self.reference, mark];
+                            let y = label_y(scale.at(value), lines.map(|v| v.map(|v| scale.at(v))));
                             text(
                                 area,
                                 (x + bar_px / 2.0, y),
@@ -247,6 +242,20 @@ impl BarChart {
     }
 }
 
+/// Middle of the number over a bar: above the lines that would strike it through.
+fn label_y(bar_top: f64, lines: [Option<f64>; 2]) -> f64 {
+    let mut lines: Vec<f64> = lines.into_iter().flatten().collect();
+    // From the lowest up: a number moved off one line may come to lie on the next.
+    lines.sort_by(|a, b| b.total_cmp(a));
+    lines.into_iter().fold(bar_top - 8.0, |y, line| {
+        if (line - y).abs() < 8.0 {
+            line.min(bar_top) - 8.0
+        } else {
+            y
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -288,6 +297,23 @@ mod tests {
             bad.svg().unwrap_err().to_string(),
             "plot `Crytek`: group `8/128` holds NaN"
         );
+    }
+
+    #[test]
+    fn no_line_strikes_a_number_through() {
+        assert_eq!(label_y(100.0, [None, None]), 92.0);
+        assert_eq!(
+            label_y(100.0, [Some(110.0), None]),
+            92.0,
+            "a line below the top"
+        );
+        assert_eq!(label_y(100.0, [Some(94.0), None]), 86.0);
+        assert_eq!(
+            label_y(100.0, [Some(82.0), Some(94.0)]),
+            74.0,
+            "both in turn"
+        );
+        assert_eq!(label_y(100.0, [Some(50.0), None]), 92.0, "a line far above");
     }
 
     #[test]
