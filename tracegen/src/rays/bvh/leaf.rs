@@ -102,8 +102,7 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
     fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32> {
         let (first, count) = leaf.leaf_range();
         let blocks = &self.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
-        let mut tested = 0;
-        for block in blocks {
+        for (number, block) in blocks.iter().enumerate() {
             let mut mask = K::lines_hit(ray, self.prepared, block);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
@@ -122,11 +121,11 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
                         continue;
                     }
                 }
-                counter.triangles(blocks[0].first_slot, tested + lane as u32 + 1);
+                let tested = (number * BLOCK + lane + 1) as u32;
+                counter.triangles(blocks[0].first_slot, tested);
                 self.blocked = true;
                 return None;
             }
-            tested += BLOCK as u32;
         }
         counter.triangles(blocks[0].first_slot, count);
         Some(self.prepared.ray.t_max)
