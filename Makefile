@@ -1,5 +1,5 @@
 # Two commands do everything on a fresh Debian or Ubuntu machine with Rust:
-#   make demo   capture the built-in scenes, replay them, write out/report.html
+#   make demo   capture, trace and replay the built-in scenes; write two reports into out/
 #   make test   run every test
 # The rest is for daily work.
 

@@ -77,19 +77,18 @@ fn compare(golden: &Path, actual: &[u8]) {
     );
 }
 
-#[test]
-fn every_golden_texture_trace_replays_to_its_golden_result() {
-    let traces = golden_traces("textrace");
-    assert!(traces.len() >= 3, "golden traces are missing: {traces:?}");
+/// Replays every golden trace of a kind with each set of options.
+fn replay_all(extension: &str, at_least: usize, subcommand: &str, runs: &[(&str, &[&str])]) {
+    let traces = golden_traces(extension);
+    assert!(
+        traces.len() >= at_least,
+        "golden traces are missing: {traces:?}"
+    );
     for trace in traces {
-        for (name, options) in TEXTRACE_RUNS {
-            let output = run_ok(
-                program("replay")
-                    .arg("run")
-                    .arg(&trace)
-                    .args(*options)
-                    .arg("--json"),
-            );
+        for (name, options) in runs {
+            let mut command = program("replay");
+            command.arg(subcommand).arg(&trace).args(*options);
+            let output = run_ok(command.arg("--json"));
             compare(
                 &trace.with_extension("golden").join(format!("{name}.json")),
                 &output.stdout,
@@ -99,20 +98,13 @@ fn every_golden_texture_trace_replays_to_its_golden_result() {
 }
 
 #[test]
+fn every_golden_texture_trace_replays_to_its_golden_result() {
+    replay_all("textrace", 3, "run", TEXTRACE_RUNS);
+}
+
+#[test]
 fn every_golden_ray_trace_reprojects_to_its_golden_result() {
-    let traces = golden_traces("raytrace");
-    assert!(traces.len() >= 2, "golden traces are missing: {traces:?}");
-    for trace in traces {
-        for (name, options) in RAYTRACE_RUNS {
-            let mut command = program("replay");
-            command.arg("reproject").arg(&trace).args(*options);
-            let output = run_ok(command.arg("--json"));
-            compare(
-                &trace.with_extension("golden").join(format!("{name}.json")),
-                &output.stdout,
-            );
-        }
-    }
+    replay_all("raytrace", 2, "reproject", RAYTRACE_RUNS);
 }
 
 #[test]

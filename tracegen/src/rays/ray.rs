@@ -32,7 +32,11 @@ impl Ray {
     /// [`LARGEST_COORDINATE`]: such a ray hits nothing.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        self.origin.abs().max_element() <= LARGEST_COORDINATE
+        // Not by the largest element, which passes over a NaN.
+        self.origin
+            .abs()
+            .cmple(Vec3::splat(LARGEST_COORDINATE))
+            .all()
             && self.direction.is_finite()
             && self.direction != Vec3::ZERO
             && self.t_max >= self.t_min

@@ -29,7 +29,9 @@ pub trait Kernel: Copy + Sized {
         ray: &Self::Ray,
         counter: &mut C,
         leaf: Child,
-    ) -> Option<f32>;
+    ) -> Option<f32> {
+        test.test(ray, counter, leaf)
+    }
 }
 
 /// Eight values, aligned for one store.
@@ -86,15 +88,6 @@ impl Kernel for Scalar {
         (0..BLOCK)
             .map(|lane| u32::from(prepared.line_hits(&block.triangle(lane))) << lane)
             .sum()
-    }
-
-    fn leaf_apart<C: Counter, L: LeafTest<Self, C>>(
-        test: &mut L,
-        ray: &PreparedRay,
-        counter: &mut C,
-        leaf: Child,
-    ) -> Option<f32> {
-        test.test(ray, counter, leaf)
     }
 }
 

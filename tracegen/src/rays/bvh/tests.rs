@@ -109,6 +109,12 @@ fn what_reaches_too_far_is_left_out() {
             closest(Vec3::ZERO).map(|h| (h.t, h.primitive)),
             Some((9.0, 1))
         );
-        assert_eq!(closest(Vec3::new(0.0, 0.0, -1e19)), None);
+        for outside in [-1e19, f32::NEG_INFINITY, f32::NAN] {
+            for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+                let origin = Vec3::select(axis.cmpeq(Vec3::ONE), Vec3::splat(outside), Vec3::ZERO);
+                assert_eq!(closest(origin), None, "from {origin}");
+                assert!(!Ray::new(origin, Vec3::Z).is_valid(), "from {origin}");
+            }
+        }
     }
 }
