@@ -2,7 +2,7 @@
 
 use super::ConfigArgs;
 use crate::config::{OrderKind, RunConfig};
-use crate::paper::{Z2_CACHES_KIB, Z2_ORDERS, Z2_SCENES};
+use crate::paper::{self, Z2_CACHES_KIB, Z2_ORDERS, Z2_SCENES};
 use crate::report::files::write_atomically;
 use crate::report::picture::Picture;
 use crate::report::z2::experiment::{Plan, Subject, labels, twin_of};
@@ -83,7 +83,8 @@ impl ExperimentArgs {
                 Ok(Subject {
                     source: trace,
                     id: id.clone(),
-                    twin: twin(&self.twins, &label)?.unwrap_or_else(|| twin_of(trace.tables())),
+                    twin: paper::asked(&self.twins, &label, &Z2_SCENES)?
+                        .map_or_else(|| twin_of(trace.tables()), |scene| scene.map(str::to_owned)),
                     label,
                 })
             })
@@ -210,25 +211,6 @@ fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
         .collect()
 }
 
-/// The twin that the arguments give to a label: `None` leaves it to the scene's name.
-fn twin(twins: &[String], label: &str) -> Result<Option<Option<String>>> {
-    let mut found = None;
-    for entry in twins {
-        let (name, scene) = entry
-            .rsplit_once('=')
-            .map_or((None, entry.as_str()), |(n, s)| (Some(n), s));
-        ensure!(
-            scene == "none" || Z2_SCENES.contains(&scene),
-            "--as: expected none or one of {}, found `{scene}`",
-            Z2_SCENES.join(", ")
-        );
-        if name.is_none_or(|n| n == label) {
-            found = Some((scene != "none").then(|| scene.to_owned()));
-        }
-    }
-    Ok(found)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -257,23 +239,6 @@ mod tests {
         assert_eq!(
             parse_caches("8-128").unwrap_err().to_string(),
             "--caches: expected L1/L2 in KiB as in 8/128,16/128,8/256,16/256, found `8-128`"
-        );
-    }
-
-    #[test]
-    fn a_twin_can_be_given_for_one_label_or_for_all() {
-        let twins = ["crytek-sponza".to_owned(), "b=none".to_owned()];
-        assert_eq!(
-            twin(&twins, "a").unwrap(),
-            Some(Some("crytek-sponza".to_owned()))
-        );
-        assert_eq!(twin(&twins, "b").unwrap(), Some(None));
-        assert_eq!(twin(&[], "a").unwrap(), None);
-        assert!(
-            twin(&["x".to_owned()], "a")
-                .unwrap_err()
-                .to_string()
-                .starts_with("--as: expected none or one of")
         );
     }
 }

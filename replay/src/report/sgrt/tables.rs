@@ -9,9 +9,15 @@ use crate::sgrt::compose::Reuse;
 use crate::sgrt::result::{Outcome, Report};
 
 /// A scene's name without folder and extension.
+#[must_use]
+pub fn label(scene: &str) -> &str {
+    let file = scene.rsplit(['/', '\\']).next().unwrap_or(scene);
+    file.split('.').next().unwrap_or(file)
+}
+
+/// The name of a trace in tables.
 pub fn scene_name(report: &Report) -> String {
-    let name = report.trace.scene.rsplit('/').next().unwrap_or_default();
-    name.split('.').next().unwrap_or(name).to_owned()
+    label(&report.trace.scene).to_owned()
 }
 
 /// Short names of the two runs: rules can be long, and [`rule_line`] says which one it is.
@@ -45,13 +51,32 @@ pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
         |pct: fn(&Report) -> f64| of_paper.iter().map(|r| pct(r)).sum::<f64>() / count as f64;
     (count > 0).then(|| {
         format!(
-            "right pixels reused, mean of {count} stand-ins: {:.2} % chosen, {:.2} % plain; \
+            "right pixels reused, mean of {count} scenes set beside the paper: {:.2} % chosen, {:.2} % plain; \
              paper {:.2} %",
             mean(|r| r.result.reuse_pct),
             mean(|r| r.plain.reuse_pct),
-            crate::sgrt::paper::REUSE_PCT
+            crate::paper::sgrt::REUSE_PCT
         )
     })
+}
+
+/// What to know of traces whose eyes the paper's row test is not made for.
+#[must_use]
+pub fn row_notes(entries: &[Entry]) -> Vec<String> {
+    let reports = entries.iter().map(|e| &e.report);
+    reports
+        .filter(|report| !report.rows.row_test_applies)
+        .map(|report| {
+            format!(
+                "{}: the paper's row test does not apply to these eyes: {:.1} % of the left pixels \
+                 arrive in a row of another number, and a right row needs {:.1} left rows; all \
+                 rows that are needed are fetched and charged",
+                scene_name(report),
+                report.rows.other_row_pct,
+                report.rows.left_rows_per_right_row
+            )
+        })
+        .collect()
 }
 
 fn reuse_name(reuse: Reuse) -> &'static str {
@@ -223,22 +248,32 @@ pub fn work(entries: &[Entry]) -> Table {
     })
 }
 
-/// G-buffer bytes with and without tiling.
+/// Bytes moved, with the G-buffer in tiles and without.
 pub fn traffic(entries: &[Entry]) -> Table {
     let columns = vec![
-        Column::number("on chip, tiled", "MB"),
-        Column::number("DRAM, tiled", "MB"),
-        Column::number("DRAM, whole screen", "MB"),
-        Column::number("energy, tiled", "ratio"),
-        Column::number("energy, whole screen", "ratio"),
+        Column::number("detection reads", "B/px"),
+        Column::number("tile buffers", "MB"),
+        Column::number("G-buffer in DRAM", "MB"),
+        Column::number("all DRAM", "MB"),
+        Column::number("both eyes in full", "MB"),
+        Column::number("energy", "ratio"),
+        Column::number("whole screen: all DRAM", "MB"),
+        Column::number("performance", "ratio"),
+        Column::number("energy", "ratio"),
     ];
-    by_rule(entries, columns, |_, o| {
+    by_rule(entries, columns, |report, o| {
+        let screen = &o.whole_screen;
+        let read_bytes = o.detection_reads.pixel_bytes(&report.config.model.gbuffer);
         vec![
-            mega(o.gbuffer_tiled.on_chip_bytes),
-            mega(o.gbuffer_tiled.dram_bytes),
-            mega(o.gbuffer_whole_screen.dram_bytes),
+            read_bytes.to_string(),
+            mega(o.on_chip_bytes),
+            mega(o.dram.gbuffer_bytes),
+            mega(o.dram.total()),
+            mega(o.reference_dram.total()),
             format!("{:.3}", o.relative_energy),
-            format!("{:.3}", o.whole_screen_relative_energy),
+            mega(screen.dram.total()),
+            format!("{:.3}", screen.relative_performance),
+            format!("{:.3}", screen.relative_energy),
         ]
     })
 }
@@ -296,9 +331,9 @@ pub fn curve(report: &Report) -> Table {
     ]);
     let mut last = None;
     for p in &report.curve {
-        if last != Some(p.rule) {
+        if last != Some(&p.rule) {
             table.begin_group();
-            last = Some(p.rule);
+            last = Some(&p.rule);
         }
         table.push(vec![
             p.rule.to_string(),
@@ -377,8 +412,13 @@ pub fn csv(entries: &[Entry]) -> String {
         "psnr_db",
         "ssim",
         "on_chip_bytes",
+        "gbuffer_dram_bytes",
         "dram_bytes",
+        "reference_dram_bytes",
         "whole_screen_dram_bytes",
+        "whole_screen_relative_performance",
+        "whole_screen_relative_energy",
+        "row_test_applies",
     ]);
     for entry in entries {
         let report = &entry.report;
@@ -415,9 +455,14 @@ pub fn csv(entries: &[Entry]) -> String {
                     .value(o.pixels_per_degree)
                     .value(o.psnr_db)
                     .value(o.ssim)
-                    .value(o.gbuffer_tiled.on_chip_bytes)
-                    .value(o.gbuffer_tiled.dram_bytes)
-                    .value(o.gbuffer_whole_screen.dram_bytes),
+                    .value(o.on_chip_bytes)
+                    .value(o.dram.gbuffer_bytes)
+                    .value(o.dram.total())
+                    .value(o.reference_dram.total())
+                    .value(o.whole_screen.dram.total())
+                    .value(o.whole_screen.relative_performance)
+                    .value(o.whole_screen.relative_energy)
+                    .value(report.rows.row_test_applies),
             );
         }
     }

@@ -1,9 +1,5 @@
-//! Published figures, to be set beside measured ones.
-//!
-//! - Z2: Nah, Lim, Ki, Shin, "Z2 traversal order: An interleaving approach for VR stereo rendering
-//!   on tile-based GPUs", Computational Visual Media 3(4), 2017. Table 2 is `data/z2-table2.csv`.
-//! - SGRT: Lee, Hwang, Shin, Yoo, Ryu, "Fast Stereoscopic Rendering on Mobile Ray Tracing GPU for
-//!   Virtual Reality Applications", 2017. Figures 1 and 3, section IV.
+//! Nah, Lim, Ki, Shin, "Z2 traversal order: An interleaving approach for VR stereo rendering on
+//! tile-based GPUs", Computational Visual Media 3(4), 2017. Table 2 is `data/z2-table2.csv`.
 
 use crate::config::OrderKind;
 use serde::{Deserialize, Serialize};
@@ -52,7 +48,7 @@ pub const Z2_CACHES_KIB: [(u32, u32); 4] = [(8, 128), (16, 128), (8, 256), (16, 
 pub const Z2_ORDERS: [OrderKind; 3] = [OrderKind::Morton, OrderKind::Z2Lrta, OrderKind::Z2Sta];
 
 static Z2_TABLE: LazyLock<Vec<Z2Row>> =
-    LazyLock::new(|| parse_table(include_str!("../data/z2-table2.csv")));
+    LazyLock::new(|| parse_table(include_str!("../../data/z2-table2.csv")));
 
 /// The Z2 paper's Table 2.
 #[must_use]
@@ -105,58 +101,6 @@ pub fn z2_twin(scene: &str, shadow_maps: bool) -> Option<&'static str> {
         Some(crytek)
     } else {
         None
-    }
-}
-
-/// One scene of the SGRT paper: section IV and Figure 3.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SgrtRow {
-    /// Scene as the paper names it.
-    pub scene: &'static str,
-    /// Built-in scene that stands for it.
-    pub stand_in: &'static str,
-    /// Triangles, thousands.
-    pub triangles_thousands: u32,
-    /// Performance with reprojection over without.
-    pub relative_performance: f64,
-    /// Energy with reprojection over without.
-    pub relative_energy: f64,
-    /// Frames per second with reprojection.
-    pub frames_per_second: f64,
-}
-
-/// The SGRT paper's scenes at 2048x1024 with secondary rays.
-pub const SGRT_SCENES: [SgrtRow; 6] = [
-    sgrt("Teapot", "teapot", 15, 1.64, 0.96, 131.3),
-    sgrt("Chess", "chess", 42, 1.13, 1.02, 14.4),
-    sgrt("BMW", "car", 55, 1.42, 0.97, 18.2),
-    sgrt("Chemical Lab.", "lab", 98, 1.11, 0.99, 8.6),
-    sgrt("Music box", "music-box", 106, 1.28, 0.98, 28.9),
-    sgrt("Provence", "meadow", 600, 1.51, 0.80, 44.5),
-];
-
-/// Right-image pixels that the SGRT paper reuses, percent, on average.
-pub const SGRT_REUSE_PCT: f64 = 91.54;
-/// T&I work that reprojection saves, percent (section III).
-pub const SGRT_TNI_SAVED_PCT: f64 = 68.0;
-/// Software that reprojection adds, percent (section III).
-pub const SGRT_SRP_ADDED_PCT: f64 = 10.0;
-
-const fn sgrt(
-    scene: &'static str,
-    stand_in: &'static str,
-    triangles_thousands: u32,
-    relative_performance: f64,
-    relative_energy: f64,
-    frames_per_second: f64,
-) -> SgrtRow {
-    SgrtRow {
-        scene,
-        stand_in,
-        triangles_thousands,
-        relative_performance,
-        relative_energy,
-        frames_per_second,
     }
 }
 
