@@ -275,7 +275,9 @@ mod tests {
     impl Row for Point {
         fn columns() -> Vec<Column<'static, Self>> {
             vec![
-                Column::new("misses", "misses", "M", Show::Millions(1), |p: &Self| p.misses),
+                Column::new("misses", "misses", "M", Show::Millions(1), |p: &Self| {
+                    p.misses
+                }),
                 Column::real("paper.rate", "paper", "%", 2, |p: &Self| p.paper).published(),
                 Column::real("paper.half", "half", "%", 2, |p: &Self| {
                     p.paper.map(|x| x / 2.0)

@@ -1,6 +1,7 @@
 //! A table of cells: for a terminal, for the page, and as CSV.
 
 use super::columns::{Column, Heading, Show, Value};
+use formats::text::printable;
 use maud::{Markup, html};
 
 /// Cells under headings.
@@ -57,7 +58,9 @@ impl Table {
     /// The cells as a table writes them.
     #[must_use]
     pub fn cells(&self) -> Vec<Vec<String>> {
-        let cell = |(value, heading): (&Value, &Heading)| printable(&heading.show.write(value));
+        let cell = |(value, heading): (&Value, &Heading)| {
+            printable(&heading.show.write(value)).into_owned()
+        };
         self.rows
             .iter()
             .map(|row| row.iter().zip(&self.headings).map(cell).collect())
@@ -71,7 +74,11 @@ impl Table {
     /// As text for a terminal; never wrapped, so that it can be piped and compared.
     #[must_use]
     pub fn text(&self) -> String {
-        let names = self.headings.iter().map(|h| printable(&h.name)).collect();
+        let names = self
+            .headings
+            .iter()
+            .map(|h| printable(&h.name).into_owned())
+            .collect();
         let mut lines: Vec<Vec<String>> = vec![names];
         if self.headings.iter().any(|h| !h.unit.is_empty()) {
             lines.push(self.headings.iter().map(|h| h.unit.to_owned()).collect());
@@ -148,21 +155,6 @@ impl Table {
         let bytes = csv.into_inner().unwrap_or_default();
         String::from_utf8_lossy(&bytes).into_owned()
     }
-}
-
-/// Text with its control characters spelled out: names come from files, and a terminal would obey.
-fn printable(text: &str) -> String {
-    if !text.contains(char::is_control) {
-        return text.to_owned();
-    }
-    let spell = |c: char| {
-        if c.is_control() {
-            c.escape_default().to_string()
-        } else {
-            c.to_string()
-        }
-    };
-    text.chars().map(spell).collect()
 }
 
 #[cfg(test)]
