@@ -198,6 +198,8 @@ pub struct CurvePoint {
     pub tni_reduction_pct: f64,
     /// Frames per second over the reference's.
     pub relative_performance: f64,
+    /// Energy over the reference's.
+    pub relative_energy: f64,
     /// Mean FLIP.
     pub flip_mean: f64,
     /// 99th percentile of FLIP.

@@ -43,6 +43,7 @@ impl LoadedTrace<'_> {
                         * (1.0
                             - comparison.reprojected.tni_cycles / comparison.reference.tni_cycles),
                     relative_performance: comparison.relative_performance(),
+                    relative_energy: comparison.relative_energy(),
                     flip_mean: flip.mean(),
                     flip_p99: flip.p99(),
                 });

@@ -64,7 +64,7 @@ fn without_added_kernels_half_the_rays_are_twice_the_performance() {
     config.srp.detect_cycles = 0.0;
     config.srp.reuse_cycles = 0.0;
     config.srp.cores = 4096;
-    config.memory.bandwidth_gb_s = 1e6;
+    config.memory.bandwidth_gb_s = 1e15;
     let e = compared(&frame, "none", Reuse::Color, &config);
     assert!((e.relative_performance() - 2.0).abs() < 1e-9);
 }
