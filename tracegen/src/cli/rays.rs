@@ -1,11 +1,6 @@
 //! `tracegen rays`.
 
 use super::scene_args::{SceneArgs, SceneSetup};
-use crate::rays::frame::{Frame, trace_frame};
-use crate::rays::picture;
-use crate::rays::scene::TraceScene;
-use crate::rays::tracer::TraceSettings;
-use crate::scene::LoadOptions;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use formats::container::AtomicFile;
@@ -13,6 +8,11 @@ use formats::raytrace::{
     EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
 };
 use formats::textrace::TraceMeta;
+use rays::frame::{Frame, trace_frame};
+use rays::picture;
+use rays::scene::TraceScene;
+use rays::tracer::TraceSettings;
+use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
