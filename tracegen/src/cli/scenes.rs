@@ -1,12 +1,12 @@
 //! `tracegen scenes`: built-in scenes, or what a file holds.
 
 use super::scene_args::load_scene;
-use crate::scene::textures::{CompressedTexture, TextureSet};
-use crate::scene::{LoadOptions, Scene, procedural};
 use clap::Args;
+use scene::{LoadOptions, Scene};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::time::Instant;
+use textures::{CompressedTexture, TextureSet};
 
 /// Arguments of `tracegen scenes`.
 #[derive(Args, Debug)]
@@ -124,10 +124,10 @@ fn json(value: &impl Serialize) -> serde_json::Result<String> {
 }
 
 fn list(as_json: bool) -> anyhow::Result<String> {
-    let scenes: Vec<Builtin> = procedural::names()
+    let scenes: Vec<Builtin> = ::scenes::names()
         .iter()
         .filter_map(|&(name, description)| {
-            let triangles = procedural::build(name)?.triangle_count();
+            let triangles = ::scenes::build(name)?.triangle_count();
             Some(Builtin {
                 name,
                 description,
