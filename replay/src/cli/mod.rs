@@ -7,9 +7,11 @@ pub mod dump;
 mod experiment_args;
 pub mod info;
 mod paper;
+mod progress;
 mod report;
 mod reproject;
 mod run;
+mod subjects;
 mod sweep;
 #[cfg(test)]
 mod testing;

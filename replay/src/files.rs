@@ -1,7 +1,6 @@
 //! Output files appear whole or not at all.
 
 use formats::container::AtomicFile;
-use std::io::Write;
 use std::path::Path;
 
 /// Writes `bytes` to a temporary file beside `path` and renames it.
@@ -9,17 +8,11 @@ use std::path::Path;
 /// # Errors
 /// The folder cannot be made, or the file cannot be written; the message names the path.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let write = || -> std::io::Result<()> {
-        let folder = path
-            .parent()
-            .filter(|p| !p.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder)?;
-        let mut file = AtomicFile::create(path)?;
-        file.write_all(bytes)?;
-        file.persist()
-    };
-    write().map_err(|e| anyhow::anyhow!("{}: cannot write: {e}", path.display()))
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    folder
+        .map_or(Ok(()), std::fs::create_dir_all)
+        .and_then(|()| AtomicFile::write_whole(path, bytes))
+        .map_err(|e| anyhow::anyhow!("{}: cannot write: {e}", path.display()))
 }
 
 #[cfg(test)]
