@@ -162,6 +162,12 @@ impl ConfigArgs {
         Ok(config)
     }
 
+    /// The file of `--config`.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        self.config.as_deref()
+    }
+
     /// Puts the flags over a configuration.
     ///
     /// # Errors

@@ -1,16 +1,16 @@
 //! Arguments that `replay paper` and `replay report` share: what to vary, and what to write.
 
 use super::ConfigArgs;
-use super::progress::Progress;
 use super::subjects::Traces;
 use crate::config::{Order, RunConfig};
 use crate::experiment::{self, Plan, Subject};
-use crate::files::write_atomically;
+use crate::files::{self, write_atomically};
 use crate::paper::{self, z2};
 use crate::report::picture::Picture;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::page;
 use anyhow::{Context, Result, bail, ensure};
+use shell::{Output, Progress, is_stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -38,24 +38,24 @@ pub struct ExperimentArgs {
     /// Picture of both eyes for the page, LABEL=FILE (or FILE for a single trace)
     #[arg(long = "image", value_name = "LABEL=FILE")]
     images: Vec<String>,
-    /// Worker threads; results do not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: shell::Threads,
 }
 
 impl ExperimentArgs {
     /// Replays every point and hands the report to `print`; exit code 1 when the orders replayed
-    /// different accesses.
+    /// different accesses. The `outputs` that will be written are checked first.
     ///
     /// # Errors
-    /// Wrong arguments, an unreadable trace, what `print` says.
+    /// Wrong arguments, an unreadable trace, an output that cannot be written, what `print` says.
     pub fn run(
         &self,
+        outputs: &[Output],
         functional: bool,
         tile_maps: bool,
         print: impl FnOnce(&PaperReport) -> Result<()>,
     ) -> Result<ExitCode> {
-        super::set_threads(self.threads)?;
+        self.threads.start()?;
         let base = self.machine.resolve()?;
         let usual = RunConfig::default();
         ensure!(
@@ -66,6 +66,14 @@ impl ExperimentArgs {
             (base.l1.size_bytes, base.l2.size_bytes) == (usual.l1.size_bytes, usual.l2.size_bytes),
             "--l1 and --l2 are varied here; use --caches"
         );
+        let images = self.images.iter().map(|image| {
+            let file = image
+                .split_once('=')
+                .map_or(image.as_str(), |(_, file)| file);
+            Path::new(file)
+        });
+        let traces = self.traces.iter().map(PathBuf::as_path);
+        files::check_outputs(outputs, traces.chain(images).chain(self.machine.file()))?;
         let caches = parse_caches(&self.caches)?;
         let mut plan = Plan::paper(base, &caches, &parse_orders(&self.orders)?, functional)?;
         if tile_maps {
@@ -74,14 +82,14 @@ impl ExperimentArgs {
         let traces = Traces::open(&self.traces)?;
         let mut subjects = traces.subjects();
         self.choose_stand_ins(&mut subjects)?;
-        let progress = Progress::new(subjects.len() * plan.points.len(), "replays");
-        let outcome = experiment::run(&plan, &subjects, None, &|done| progress.add(done));
-        progress.finish();
-        let outcome = outcome?;
+        let replays = subjects.len() * plan.points.len();
+        let progress = Progress::new("replaying", replays as u64, "replays");
+        let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
+        drop(progress);
         let report = PaperReport::new(&outcome);
         print(&report)?;
         if let Some(problem) = report.not_conserved() {
-            anstream::eprintln!("error: {problem}");
+            shell::error(&problem);
             return Ok(ExitCode::FAILURE);
         }
         Ok(ExitCode::SUCCESS)
@@ -133,15 +141,28 @@ impl ExperimentArgs {
     }
 }
 
+/// The page at `path`, and JSON and CSV with the same numbers beside it; a page that goes to
+/// standard output goes alone.
+#[must_use]
+pub fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
+    let mut outputs = vec![Output::text(flag, path)];
+    if !is_stdout(path) {
+        outputs.extend(["json", "csv"].map(|e| Output::text(flag, &path.with_extension(e))));
+    }
+    outputs
+}
+
 /// Writes the page, and the same numbers beside it as JSON and CSV.
 ///
 /// # Errors
 /// A plot that cannot be drawn, a file that cannot be written.
 pub fn write_page(report: &PaperReport, pictures: &[Picture], path: &Path) -> Result<()> {
     let html = page::page(report, pictures)?;
-    let json = report.json()? + "\n";
-    write_atomically(&path.with_extension("json"), json.as_bytes())?;
-    write_atomically(&path.with_extension("csv"), report.csv().as_bytes())?;
+    if !is_stdout(path) {
+        let json = report.json()? + "\n";
+        write_atomically(&path.with_extension("json"), json.as_bytes())?;
+        write_atomically(&path.with_extension("csv"), report.csv().as_bytes())?;
+    }
     write_atomically(path, html.as_bytes())
 }
 

@@ -1,10 +1,11 @@
 //! `replay paper`: the Z2 paper's experiment as a table.
 
-use super::experiment_args::{ExperimentArgs, write_page};
+use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
 use crate::files::write_atomically;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::tables;
 use anyhow::Result;
+use shell::Output;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,20 +40,27 @@ pub struct Args {
 /// Wrong arguments, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let page = args.html.is_some();
-    args.experiment
-        .run(args.functional || page, page, |report| {
-            if let Some(path) = &args.csv {
-                write_atomically(path, report.csv().as_bytes())?;
-            }
-            if let Some(path) = &args.html {
-                write_page(report, &args.experiment.pictures(report)?, path)?;
-            }
-            super::print(&if args.json {
-                report.json()?
-            } else {
-                text(report)
-            })
+    let mut outputs: Vec<Output> = Vec::new();
+    outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
+    outputs.extend(
+        args.html
+            .iter()
+            .flat_map(|path| page_outputs("--html", path)),
+    );
+    let functional = args.functional || page;
+    args.experiment.run(&outputs, functional, page, |report| {
+        if let Some(path) = &args.csv {
+            write_atomically(path, report.csv().as_bytes())?;
+        }
+        if let Some(path) = &args.html {
+            write_page(report, &args.experiment.pictures(report)?, path)?;
+        }
+        super::print(&if args.json {
+            report.json()?
+        } else {
+            text(report)
         })
+    })
 }
 
 /// The tables for a terminal.

@@ -34,9 +34,8 @@ pub struct Args {
     /// Print the whole configuration as TOML and stop
     #[arg(long)]
     print_config: bool,
-    /// Worker threads; results do not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: shell::Threads,
 }
 
 /// Runs the subcommand.
@@ -54,7 +53,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         config.mode = crate::config::Mode::Timed;
     }
     let plan = Plan::single(config, args.compare_modes)?;
-    super::set_threads(args.threads)?;
+    args.threads.start()?;
     let traces = Traces::open(&[path])?;
     let subjects = traces.subjects();
 
@@ -64,10 +63,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let rows = outcome.rows();
     // On stderr: a result must not depend on the machine.
     let footprints: u64 = rows.iter().map(|row| row.result.footprints).sum();
-    anstream::eprintln!(
+    shell::note(&format!(
         "{:.1} M footprints/s ({footprints} footprints in {seconds:.3} s, decoding included)",
         footprints as f64 / seconds / 1e6,
-    );
+    ));
     super::print(&match (rows.as_slice(), args.json) {
         ([timed, functional], true) => report::modes_json(timed, functional)?,
         ([timed, functional], false) => report::modes_text(timed, functional),

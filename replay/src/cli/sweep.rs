@@ -1,12 +1,12 @@
 //! `replay sweep`: the points of an experiment file.
 
 use super::config_args::read_toml;
-use super::progress::Progress;
 use super::subjects::Traces;
 use crate::experiment::{self, ExperimentFile, Point, Store};
-use crate::files::write_atomically;
+use crate::files::{self, write_atomically};
 use crate::report::sweep::SweepReport;
 use anyhow::{Context, Result, ensure};
+use shell::{Output, Progress};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -31,9 +31,8 @@ pub struct Args {
     /// Print the points and stop
     #[arg(long)]
     plan: bool,
-    /// Worker threads; results do not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: shell::Threads,
 }
 
 /// Runs the subcommand.
@@ -41,7 +40,7 @@ pub struct Args {
 /// # Errors
 /// A bad experiment file, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    super::set_threads(args.threads)?;
+    args.threads.start()?;
     let name = args.experiment.display();
     let file = ExperimentFile::parse(&read_toml(&args.experiment)?);
     let file = file.with_context(|| name.to_string())?;
@@ -56,32 +55,37 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         !paths.is_empty(),
         "{name}: no traces: name them in `traces` or on the command line"
     );
-    let traces = Traces::open(&paths)?;
-    let subjects = traces.subjects();
-
     let stem = args.experiment.file_stem().unwrap_or_default();
     let out = args
         .out
         .clone()
         .unwrap_or_else(|| Path::new("out").join(stem));
+    let outputs = ["results.json", "results.csv", "report.html"].map(|name| out.join(name));
+    let inputs = paths.iter().chain([&args.experiment]).map(PathBuf::as_path);
+    let checked = outputs.each_ref().map(|path| Output::text("--out", path));
+    files::check_outputs(&checked, inputs)?;
+    let traces = Traces::open(&paths)?;
+    let subjects = traces.subjects();
+
     let points = subjects.len() * plan.points.len();
-    let progress = Progress::new(points, "points");
+    let progress = Progress::new("replaying", points as u64, "points");
     let store = Store::new(&out);
-    let outcome = experiment::run(&plan, &subjects, Some(&store), &|done| progress.add(done));
-    progress.finish();
-    let outcome = outcome?;
-    anstream::eprintln!(
+    let done = |done| progress.advance(done);
+    let outcome = experiment::run(&plan, &subjects, Some(&store), &done)?;
+    drop(progress);
+    shell::note(&format!(
         "{points} points: {} replayed, the others taken from {} or equal to one of these",
         outcome.replays,
         out.display()
-    );
+    ));
 
     let report = SweepReport::new(&file, &outcome);
     let json = report.json()?;
     let page = report.page(&format!("Parallax sweep: {}", stem.to_string_lossy()))?;
-    write_atomically(&out.join("results.json"), format!("{json}\n").as_bytes())?;
-    write_atomically(&out.join("results.csv"), report.csv().as_bytes())?;
-    write_atomically(&out.join("report.html"), page.as_bytes())?;
+    let contents = [format!("{json}\n"), report.csv(), page];
+    for (path, text) in outputs.iter().zip(contents) {
+        write_atomically(path, text.as_bytes())?;
+    }
     super::print(&if args.json {
         json
     } else {

@@ -34,7 +34,7 @@ pub fn run<'a>(
     plan: &'a Plan,
     subjects: &'a [Subject<'a>],
     store: Option<&Store>,
-    done: &(dyn Fn(usize) + Sync),
+    done: &(dyn Fn(u64) + Sync),
 ) -> Result<Outcome<'a>, RunError> {
     let replays = AtomicUsize::new(0);
     let groups = groups(&plan.points);
@@ -48,7 +48,7 @@ pub fn run<'a>(
             let point = &plan.points[group[0]];
             let kept = store.and_then(|s| s.load(&subject.id, &point.config));
             let answer = kept.map_or_else(|| one(subject, point, store, &replays), Ok);
-            done(group.len());
+            done(group.len() as u64);
             answer
         })
         .collect();

@@ -73,7 +73,7 @@ pub fn text(row: &ResultRow) -> String {
         format_bytes(config.l2.size_bytes),
         levels.text(),
         views.text(),
-        whole(row).text(),
+        whole(row).text().trim_start(),
     );
     text += &format!(
         "quads {}, covered pixels {}, access hash {}\n",
