@@ -1,8 +1,9 @@
 //! `tracegen scenes`: built-in scenes, or what a file holds.
 
 use super::scene_args::load_scene;
+use crate::scene::procedural::BUILTINS;
 use crate::scene::textures::{CompressedTexture, TextureSet};
-use crate::scene::{LoadOptions, Scene, procedural};
+use crate::scene::{LoadOptions, Scene};
 use clap::Args;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -34,6 +35,7 @@ struct Builtin {
     name: &'static str,
     description: &'static str,
     triangles: u64,
+    cameras: &'static [&'static str],
 }
 
 /// JSON of one scene.
@@ -124,28 +126,29 @@ fn json(value: &impl Serialize) -> serde_json::Result<String> {
 }
 
 fn list(as_json: bool) -> anyhow::Result<String> {
-    let scenes: Vec<Builtin> = procedural::names()
-        .iter()
-        .filter_map(|&(name, description)| {
-            let triangles = procedural::build(name)?.triangle_count();
-            Some(Builtin {
-                name,
-                description,
-                triangles,
-            })
-        })
-        .collect();
     if as_json {
+        let scenes = BUILTINS
+            .iter()
+            .map(|b| Builtin {
+                name: b.name,
+                description: b.description,
+                triangles: b.triangles,
+                cameras: b.cameras,
+            })
+            .collect();
         let schema = "tracegen.scenes/1";
         return Ok(json(&BuiltinList { schema, scenes })?);
     }
-    let width = scenes.iter().map(|s| s.name.len()).max().unwrap_or(0);
-    Ok(scenes
+    let width = BUILTINS.iter().map(|b| b.name.len()).max().unwrap_or(0);
+    Ok(BUILTINS
         .iter()
-        .map(|s| {
+        .map(|b| {
             format!(
-                "{:width$}  {:>9} triangles  {}\n",
-                s.name, s.triangles, s.description
+                "{:width$}  {:>7} triangles  {} (cameras: {})\n",
+                b.name,
+                b.triangles,
+                b.description,
+                b.cameras.join(", ")
             )
         })
         .collect())

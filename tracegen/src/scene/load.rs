@@ -111,9 +111,9 @@ pub fn load_with(spec: &str, options: &LoadOptions) -> Result<Loaded, SceneError
         _ => {
             return Err(SceneError::Unknown {
                 spec: spec.to_owned(),
-                known: procedural::names()
+                known: procedural::BUILTINS
                     .iter()
-                    .map(|(name, _)| *name)
+                    .map(|b| b.name)
                     .collect::<Vec<_>>()
                     .join(", "),
             });

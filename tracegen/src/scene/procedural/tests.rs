@@ -1,29 +1,15 @@
 //! What every built-in scene promises to the renderers.
 
-use super::{build, names};
+use super::{BUILTINS, build};
 use crate::scene::{Mesh, Scene};
 use glam::Vec3;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::OnceLock;
 
-/// Triangles that a scene must have, instances counted.
-const TRIANGLES: &[(&str, std::ops::RangeInclusive<u64>)] = &[
-    ("atrium", 200_000..=280_000),
-    ("atrium-plain", 64_000..=68_000),
-    ("atrium-shadows", 64_000..=68_000),
-    ("jungle", 300_000..=450_000),
-    ("teapot", 14_700..=15_300),
-    ("chess", 41_160..=42_840),
-    ("car", 53_900..=56_100),
-    ("lab", 96_040..=99_960),
-    ("music-box", 103_880..=108_120),
-    ("meadow", 588_000..=612_000),
-];
-
 /// All built-in scenes, built once for all tests.
 fn scenes() -> &'static [Scene] {
     static SCENES: OnceLock<Vec<Scene>> = OnceLock::new();
-    SCENES.get_or_init(|| names().iter().filter_map(|(name, _)| build(name)).collect())
+    SCENES.get_or_init(|| BUILTINS.iter().filter_map(|b| build(b.name)).collect())
 }
 
 fn scene(name: &str) -> Option<&'static Scene> {
@@ -57,29 +43,21 @@ fn corners(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> {
 }
 
 #[test]
-fn every_listed_scene_can_be_built_and_no_other() {
-    for (name, description) in names() {
-        assert!(scene(name).is_some(), "{name}");
-        assert!(!description.is_empty());
+fn the_table_tells_the_triangles_and_cameras_of_every_scene() {
+    for listed in BUILTINS {
+        let Some(built) = scene(listed.name) else {
+            panic!("{} cannot be built under its name", listed.name);
+        };
+        assert_eq!(built.triangle_count(), listed.triangles, "{}", listed.name);
+        let cameras: Vec<&str> = built.cameras.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(cameras, listed.cameras, "{}", listed.name);
     }
     assert!(build("no-such-scene").is_none());
 }
 
 #[test]
-fn triangle_counts_are_those_of_the_scenes_stood_for() {
-    assert_eq!(TRIANGLES.len(), names().len());
-    for (name, range) in TRIANGLES {
-        let count = scene(name).map_or(0, Scene::triangle_count);
-        assert!(
-            range.contains(&count),
-            "{name}: {count} is not in {range:?}"
-        );
-    }
-}
-
-#[test]
 fn the_same_scene_comes_out_with_one_thread_as_with_all() {
-    for (name, _) in names() {
+    for name in BUILTINS.iter().map(|b| b.name) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let alone = pool.map(|pool| pool.install(|| build(name)));
         let alone = alone.ok().flatten().map(|s| digest(&s));
