@@ -11,6 +11,7 @@ pub mod interop;
 pub mod layout;
 pub mod parse;
 pub mod raytrace;
+pub mod text;
 pub mod textrace;
 pub mod texture;
 pub mod view;

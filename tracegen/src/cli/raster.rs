@@ -1,20 +1,20 @@
 //! `tracegen raster`.
 
 use super::scene_args::{SceneArgs, SceneSetup};
-use crate::raster::backend::CaptureBackend;
-use crate::raster::capture::{CaptureJob, Pictures};
-use crate::raster::draws::DrawList;
-use crate::raster::lavapipe::Lavapipe;
-use crate::raster::lighting::Lighting;
-use crate::raster::picture;
-use crate::raster::tiles::CaptureCounts;
-use crate::scene::LoadOptions;
-use crate::scene::textures::TextureSet;
+use crate::picture;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::textrace::{Tables, TextraceWriter, TraceMeta};
+use raster::backend::CaptureBackend;
+use raster::capture::{CaptureJob, Pictures};
+use raster::draws::DrawList;
+use raster::lavapipe::Lavapipe;
+use raster::lighting::Lighting;
+use record::CaptureCounts;
+use scene::LoadOptions;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;

@@ -1,11 +1,6 @@
 //! `tracegen rays`.
 
 use super::scene_args::{SceneArgs, SceneSetup};
-use crate::rays::frame::{Frame, trace_frame};
-use crate::rays::picture;
-use crate::rays::scene::TraceScene;
-use crate::rays::tracer::TraceSettings;
-use crate::scene::LoadOptions;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use formats::container::AtomicFile;
@@ -14,6 +9,11 @@ use formats::raytrace::{
 };
 use formats::textrace::TraceMeta;
 use indicatif::{ProgressBar, ProgressStyle};
+use rays::frame::{Frame, trace_frame};
+use rays::picture;
+use rays::scene::TraceScene;
+use rays::tracer::TraceSettings;
+use scene::LoadOptions;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 

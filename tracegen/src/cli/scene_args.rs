@@ -1,9 +1,10 @@
 //! Flags that say what is looked at, from where and through which display.
 
-use crate::scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd, load_with};
 use clap::Args;
 use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::Vec3;
+use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd};
+use scenes::load_with;
 
 /// Most frames of a camera path.
 const MAX_FRAMES: u32 = 10_000;

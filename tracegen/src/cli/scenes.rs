@@ -1,13 +1,13 @@
 //! `tracegen scenes`: built-in scenes, or what a file holds.
 
 use super::scene_args::load_scene;
-use crate::scene::procedural::BUILTINS;
-use crate::scene::textures::{CompressedTexture, TextureSet};
-use crate::scene::{LoadOptions, Scene};
+use ::scenes::BUILTINS;
 use clap::Args;
+use scene::{LoadOptions, Scene};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::time::Instant;
+use textures::{CompressedTexture, TextureSet};
 
 /// Arguments of `tracegen scenes`.
 #[derive(Args, Debug)]
