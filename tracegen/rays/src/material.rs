@@ -4,7 +4,8 @@ use super::soup::{Attributes, Soup};
 use super::texture::{Pyramid, SrgbTable, fast_log2};
 use formats::raytrace::RayMaterial;
 use glam::{Vec2, Vec3, Vec4};
-use scene::{AlphaMode, Material, Scene, TextureRef};
+use rayon::prelude::*;
+use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
 
 /// Smoother dielectrics get a highlight.
 const GLOSSY_ROUGHNESS: f32 = 0.7;
@@ -50,26 +51,26 @@ pub struct Materials {
 
 impl Materials {
     /// Makes the pyramids of the images that rays sample.
-    #[must_use]
-    pub fn new(scene: &Scene) -> Self {
-        use rayon::prelude::*;
-        let used: Vec<bool> = (0..scene.images.len())
-            .map(|i| {
-                let mut refs = scene.materials.iter().flat_map(ray_textures);
-                refs.any(|t| t.image == i)
-            })
+    ///
+    /// # Errors
+    /// Images that cannot be read or decoded.
+    pub fn new(scene: &Scene) -> Result<Self, SceneError> {
+        let mut used = vec![false; scene.images.len()];
+        for texture in scene.materials.iter().flat_map(ray_textures) {
+            if let Some(used) = used.get_mut(texture.image) {
+                *used = true;
+            }
+        }
+        let texels = scene::image::texels(&scene.images, |i| used[i])?;
+        let pyramids = (scene.images.par_iter())
+            .zip(texels)
+            .map(|(image, rgba)| Pyramid::new(image, rgba?))
             .collect();
-        let pyramids = scene
-            .images
-            .par_iter()
-            .zip(used)
-            .map(|(image, used)| used.then(|| Pyramid::new(image)).flatten())
-            .collect();
-        Self {
+        Ok(Self {
             materials: scene.materials.clone(),
             pyramids,
             srgb: SrgbTable::default(),
-        }
+        })
     }
 
     /// The table of a trace.

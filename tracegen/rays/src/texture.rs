@@ -3,7 +3,6 @@
 use formats::texture::{ColorSpace, Filter, Wrap};
 use glam::{Vec2, Vec4};
 use scene::{Image, TextureRef};
-use std::sync::Arc;
 
 /// An image with its smaller levels, RGBA8 in its own colour space.
 pub struct Pyramid {
@@ -13,7 +12,7 @@ pub struct Pyramid {
 
 struct Level {
     size: [u32; 2],
-    rgba: Arc<[u8]>,
+    rgba: Vec<u8>,
 }
 
 /// Linear value of each sRGB byte.
@@ -34,17 +33,17 @@ impl Default for SrgbTable {
 }
 
 impl Pyramid {
-    /// The levels of an image, or `None` where it has no texels.
+    /// The levels of an image above its texels, or `None` where those are too few.
     #[must_use]
-    pub fn new(image: &Image) -> Option<Self> {
+    pub fn new(image: &Image, rgba: Vec<u8>) -> Option<Self> {
         let [width, height] = image.size;
         let bytes = width as usize * height as usize * 4;
-        if bytes == 0 || image.rgba.len() < bytes {
+        if bytes == 0 || rgba.len() < bytes {
             return None;
         }
         let mut levels = vec![Level {
             size: image.size,
-            rgba: image.rgba.clone(),
+            rgba,
         }];
         while let Some(next) = levels.last().and_then(Level::halved) {
             levels.push(next);
@@ -142,10 +141,7 @@ impl Level {
                 }
             }
         }
-        Some(Self {
-            size,
-            rgba: rgba.into(),
-        })
+        Some(Self { size, rgba })
     }
 }
 

@@ -145,6 +145,9 @@ pub fn load(spec: &str) -> Result<Scene, SceneError> {
 pub fn load_with(spec: &str, options: &LoadOptions) -> Result<Loaded, SceneError> {
     if let Some(mut scene) = build(spec) {
         scene::complete(&mut scene);
+        if options.slots != LoadOptions::ALL.slots {
+            scene.keep_texture_slots(options.slots);
+        }
         let warnings = Vec::new();
         return Ok(Loaded { scene, warnings });
     }

@@ -1,5 +1,6 @@
 //! `tracegen raster`.
 
+use super::cache_args::CacheArgs;
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::picture;
 use anyhow::{Context, ensure};
@@ -40,6 +41,8 @@ pub struct RasterArgs {
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
     record_budget: u64,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Threads of the driver and of the post-processing (the trace is the same) [default: all].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -54,21 +57,16 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
     check_folder(&args.output)?;
     args.image.as_deref().map_or(Ok(()), check_folder)?;
     let started = Instant::now();
-    let mut setup = args.scene.setup(None, &LoadOptions::ALL)?;
+    let cache = args.cache.open()?;
+    let setup = args.scene.setup(None, &LoadOptions::ALL)?;
+    let loaded = started.elapsed();
     let cascades = if args.shadows {
         CASCADES
     } else {
         setup.scene.shadow_cascades.min(CASCADES)
     };
     let draws = DrawList::new(&setup.scene, cascades)?;
-    let uploads = TextureSet::compress_and_free(&mut setup.scene)?;
-    for note in &uploads.notes {
-        super::warn(note);
-    }
     let size_px = setup.hmd.eye_size_px;
-    let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
-    let tables = tables(&setup, &args.scene.scene, &draws, &uploads, &backend);
-    drop(uploads);
     let bounds = setup.scene.bounds().unwrap_or_default();
     let mut job = CaptureJob {
         draws: &draws,
@@ -78,11 +76,26 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         size_px,
         parts: 1,
     };
+    let seen = job.seen_images(&setup.scene, &setup.frames);
+    let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache.as_ref())?;
+    let textured = started.elapsed();
+    for note in &uploads.notes {
+        super::warn(note);
+    }
+    let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
+    let tables = tables(&setup, &args.scene.scene, &draws, &uploads, &backend);
+    let (total, cached, unseen) = (uploads.textures.len(), uploads.cached, uploads.unseen());
+    drop(uploads);
     job.warm_up(&mut backend, &setup.frames[0])?;
+    let ready = started.elapsed();
     eprintln!(
-        "{}: ready in {:.2} s",
+        "{}: ready in {:.2} s (scene {:.2} s; textures {:.2} s: {} compressed, {cached} from the cache, {unseen} seen by no view; driver {:.2} s)",
         args.scene.scene,
-        started.elapsed().as_secs_f64()
+        ready.as_secs_f64(),
+        loaded.as_secs_f64(),
+        (textured - loaded).as_secs_f64(),
+        total - cached - unseen,
+        (ready - textured).as_secs_f64(),
     );
 
     let mut writer = TextraceWriter::create(&args.output, &tables)
@@ -192,6 +205,7 @@ fn tables(
 /// so that the same capture gives the same bytes.
 fn lasting_arguments(arguments: impl Iterator<Item = String>) -> Vec<String> {
     const WITH_VALUE: [&str; 5] = ["-o", "--output", "--image", "--threads", "--record-budget"];
+    const WITHOUT_VALUE: [&str; 2] = ["--no-plain", "--no-cache"];
     let mut kept = Vec::new();
     let mut skip_value = false;
     for argument in arguments {
@@ -203,7 +217,7 @@ fn lasting_arguments(arguments: impl Iterator<Item = String>) -> Vec<String> {
             skip_value = true;
         } else if !WITH_VALUE.contains(&name)
             && !argument.starts_with("-o")
-            && argument != "--no-plain"
+            && !WITHOUT_VALUE.contains(&name)
         {
             kept.push(argument);
         }
@@ -309,7 +323,7 @@ fn prepare_environment(threads: Option<u16>) -> anyhow::Result<()> {
 }
 
 /// Bytes with an optional binary suffix: `64MiB`, `512KiB`, `1GiB`, `4096`.
-fn parse_bytes(text: &str) -> Result<u64, String> {
+pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
     let digits = text
         .find(|c: char| !c.is_ascii_digit())
         .unwrap_or(text.len());
@@ -344,7 +358,7 @@ mod tests {
         );
         assert_eq!(
             kept(
-                "raster s.gltf --output=a --shadows --threads 2 --no-plain --camera x --record-budget 4MiB -ob"
+                "raster s.gltf --output=a --shadows --threads 2 --no-cache --no-plain --camera x --record-budget 4MiB -ob"
             ),
             expected
         );

@@ -86,7 +86,6 @@ pub fn run(args: RaysArgs) -> anyhow::Result<()> {
     let start = Instant::now();
     let writer = RaytraceWriter::create(&args.output)?;
     let textures = LoadOptions {
-        images: true,
         // Base colour, metallic-roughness and emissive: what rays look at.
         slots: [true, false, true, false, false, true],
     };

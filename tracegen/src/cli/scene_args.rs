@@ -399,7 +399,7 @@ mod tests {
         ] {
             let args = parse(flags).unwrap();
             let error = args
-                .setup(None, &LoadOptions::NO_IMAGES)
+                .setup(None, &LoadOptions::ALL)
                 .unwrap_err()
                 .to_string();
             assert!(error.contains(part), "{flags}: {error}");

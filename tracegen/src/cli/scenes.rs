@@ -1,5 +1,6 @@
 //! `tracegen scenes`: built-in scenes, or what a file holds.
 
+use super::cache_args::CacheArgs;
 use super::scene_args::load_scene;
 use ::scenes::BUILTINS;
 use clap::Args;
@@ -7,7 +8,7 @@ use scene::{LoadOptions, Scene};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::time::Instant;
-use textures::{CompressedTexture, TextureSet};
+use textures::{Cache, TextureSet};
 
 /// Arguments of `tracegen scenes`.
 #[derive(Args, Debug)]
@@ -18,6 +19,8 @@ pub struct ScenesArgs {
     /// Also read the images, compress them as a capture does, and tell the bytes.
     #[arg(long, requires = "scene")]
     textures: bool,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -82,9 +85,12 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
         None => list(args.json)?,
         Some(spec) => {
             let description = if args.textures {
-                read_textures(&spec)?
+                {
+                    let cache = args.cache.open()?;
+                    read_textures(&spec, cache.as_ref())?
+                }
             } else {
-                describe(&load_scene(&spec, &LoadOptions::NO_IMAGES)?)
+                describe(&load_scene(&spec, &LoadOptions::ALL)?)
             };
             if args.json {
                 json(&description)?
@@ -100,23 +106,23 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
 }
 
 /// Loads and compresses everything; how long that took goes to stderr.
-fn read_textures(spec: &str) -> anyhow::Result<Description> {
+fn read_textures(spec: &str, cache: Option<&Cache>) -> anyhow::Result<Description> {
     let start = Instant::now();
-    let mut scene = load_scene(spec, &LoadOptions::ALL)?;
+    let scene = load_scene(spec, &LoadOptions::ALL)?;
     let loaded = start.elapsed();
-    let set = TextureSet::compress_and_free(&mut scene)?;
+    let set = TextureSet::prepare(&scene, |_| true, cache)?;
     for note in &set.notes {
         super::warn(note);
     }
     anstream::eprintln!(
-        "loaded in {:.2} s, {} textures compressed in {:.2} s",
+        "loaded in {:.2} s, {} textures made ready in {:.2} s, {} of them from the cache",
         loaded.as_secs_f64(),
         set.textures.len(),
         (start.elapsed() - loaded).as_secs_f64(),
+        set.cached,
     );
-    let bytes = set.textures.iter().map(CompressedTexture::bytes).sum();
     Ok(Description {
-        texture_bytes: Some(bytes),
+        texture_bytes: Some(set.bytes()),
         ..describe(&scene)
     })
 }

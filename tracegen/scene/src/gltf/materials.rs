@@ -11,7 +11,7 @@
 
 use super::accessors::Buffers;
 use crate::files::Origin;
-use crate::images::{Request, Requests, Source, Usage};
+use crate::image_files::{Request, Requests, Source, Usage};
 use crate::uri::{self, Uri};
 use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef};
 use formats::texture::{Filter, MipFilter, Sampler, Wrap};

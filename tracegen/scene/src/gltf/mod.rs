@@ -65,7 +65,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
             .extend((primitives.into_iter()).map(|mesh| Instance { mesh, transform }));
     }
     warnings.append(&mut materials.warnings);
-    scene.images = materials.requests.decode(&origin, options)?;
+    scene.images = materials.requests.images(&origin)?;
     scene.materials = materials.materials;
     Ok(Loaded { scene, warnings })
 }

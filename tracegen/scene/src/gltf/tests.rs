@@ -225,19 +225,20 @@ mod reading {
         assert_eq!(material.base_color_texture.unwrap().image, 0);
         assert_eq!(material.emissive_texture.unwrap().image, 0);
         assert_eq!(material.occlusion_texture.unwrap().image, 1);
-        assert_eq!(&scene.images[0].rgba[..4], [10, 20, 30, 255]);
+        let texels = crate::image::texels(&scene.images, |i| i == 0).unwrap();
+        assert_eq!(texels[0].as_ref().unwrap()[..4], [10, 20, 30, 255]);
+        assert_eq!(texels[1], None);
     }
 
     #[test]
-    fn without_images_an_image_has_its_size_only() {
+    fn images_are_decoded_when_their_texels_are_asked_for() {
         let files = Files::new(&textured());
-        files.write("my image.png", &png([6, 3], [0; 4]));
-        let path = files.path("scene.gltf");
-        let scene = load_file(&path, &LoadOptions::NO_IMAGES).unwrap().scene;
-        assert_eq!(
-            (scene.images[0].size, scene.images[0].rgba.len()),
-            ([6, 3], 0)
-        );
+        let whole = png([6, 3], [0; 4]);
+        files.write("my image.png", &whole[..whole.len() - 20]);
+        let scene = files.load().unwrap().scene;
+        assert_eq!(scene.images[0].size, [6, 3]);
+        let error = crate::image::texels(&scene.images, |_| true).unwrap_err();
+        assert!(error.to_string().contains("my image.png"), "{error}");
     }
 
     #[test]

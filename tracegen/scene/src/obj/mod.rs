@@ -7,7 +7,7 @@
 
 use super::files::{Origin, read_file};
 use super::geometry::{vertex_normals, vertex_tangents};
-use super::images::{Request, Requests, Source, Usage};
+use super::image_files::{Request, Requests, Source, Usage};
 use super::{
     AlphaMode, Instance, LoadOptions, Loaded, Material, Mesh, Scene, SceneError, TextureRef,
 };
@@ -94,7 +94,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
         });
         scene.meshes.push(mesh);
     }
-    scene.images = requests.decode(&origin, options)?;
+    scene.images = requests.images(&origin)?;
     Ok(Loaded { scene, warnings })
 }
 

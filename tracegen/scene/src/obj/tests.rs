@@ -50,8 +50,9 @@ fn an_opacity_map_becomes_the_colour_maps_alpha() {
     let scene = load(folder.path(), QUAD, Some(mtl)).unwrap().scene;
     let material = &scene.materials[0];
     assert_eq!(material.alpha, AlphaMode::Mask(0.5));
-    let image = &scene.images[material.base_color_texture.unwrap().image];
-    assert_eq!(&image.rgba[..4], [200, 100, 50, 77]);
+    let image = material.base_color_texture.unwrap().image;
+    let texels = crate::image::texels(&scene.images, |i| i == image).unwrap();
+    assert_eq!(texels[image].as_ref().unwrap()[..4], [200, 100, 50, 77]);
     assert!(material.normal_texture.is_some());
 }
 
