@@ -1,7 +1,6 @@
 //! Text from files, made fit for a terminal.
 
 use std::borrow::Cow;
-use std::fmt::Write;
 
 /// The text with every character escaped that steers a terminal or turns the reading direction:
 /// control characters (C0, DEL, C1), line separators and bidirectional marks.
@@ -10,14 +9,23 @@ use std::fmt::Write;
 /// scene or shown in a message.
 #[must_use]
 pub fn printable(text: &str) -> Cow<'_, str> {
-    if !text.contains(steers) {
+    escaped(text, steers)
+}
+
+/// [`printable`] for whole messages, which may have several lines and tabs.
+#[must_use]
+pub fn printable_lines(message: &str) -> Cow<'_, str> {
+    escaped(message, |c| steers(c) && c != '\n' && c != '\t')
+}
+
+fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(&is_bad) {
         return Cow::Borrowed(text);
     }
     let mut escaped = String::with_capacity(text.len() + 16);
     for c in text.chars() {
-        if steers(c) {
-            // Writing to a String cannot fail.
-            let _ = write!(escaped, "{}", c.escape_default());
+        if is_bad(c) {
+            escaped.extend(c.escape_default());
         } else {
             escaped.push(c);
         }
@@ -46,5 +54,6 @@ mod tests {
         ] {
             assert_eq!(printable(text), expected);
         }
+        assert_eq!(printable_lines("a\r\n\tb"), "a\\r\n\tb");
     }
 }
