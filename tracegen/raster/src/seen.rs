@@ -3,6 +3,7 @@
 use super::backend::View;
 use super::capture::CaptureJob;
 use super::draws::DrawMode;
+use super::groups::MATERIAL_TEXTURES;
 use formats::view::FrameViews;
 use glam::Mat4;
 use scene::Scene;
@@ -13,8 +14,7 @@ impl CaptureJob<'_> {
     /// frame, or is a masked caster that a shadow cascade may see.
     #[must_use]
     pub fn seen_images(&self, scene: &Scene, frames: &[FrameViews]) -> Vec<bool> {
-        let mut by_eyes = vec![false; self.draws.calls.len()];
-        let mut by_cascades = by_eyes.clone();
+        let mut seen = vec![false; scene.images.len()];
         for views in frames {
             let lighting = self.light_frame(views);
             for eye in views.eyes {
@@ -23,51 +23,46 @@ impl CaptureJob<'_> {
                     lighting: &lighting,
                     visible: &[],
                 };
-                self.mark(scene, view.clip_from_world(), |_| true, &mut by_eyes);
+                self.mark(
+                    scene,
+                    view.clip_from_world(),
+                    |_| MATERIAL_TEXTURES,
+                    &mut seen,
+                );
             }
             for cascade in &lighting.cascades {
-                let masked = |mode| mode == DrawMode::Masked;
-                self.mark(scene, cascade.clip_from_world, masked, &mut by_cascades);
+                // A masked caster samples its base colour, the first slot.
+                let slots = |mode| usize::from(mode == DrawMode::Masked);
+                self.mark(scene, cascade.clip_from_world, slots, &mut seen);
             }
         }
-        let mut images = vec![false; scene.images.len()];
-        for (draw, call) in self.draws.calls.iter().enumerate() {
-            let textures = scene.materials[call.material].textures();
-            let sampled = match (by_eyes[draw], by_cascades[draw]) {
-                (true, _) => &textures[..],
-                // The caster's alpha.
-                (false, true) => &textures[..1],
-                (false, false) => &[],
-            };
-            for texture in sampled.iter().flatten() {
-                if let Some(image) = images.get_mut(texture.image) {
-                    *image = true;
-                }
-            }
-        }
-        images
+        seen
     }
 
-    /// Marks the draws of the chosen modes of which the view may see a triangle.
+    /// Marks the images in the first `slots` of the materials that the view may see.
     fn mark(
         &self,
         scene: &Scene,
         clip_from_world: Mat4,
-        chosen: impl Fn(DrawMode) -> bool,
+        slots: impl Fn(DrawMode) -> usize,
         seen: &mut [bool],
     ) {
         for index in self.draws.visible(clip_from_world) {
             let call = &self.draws.calls[index as usize];
             let mesh = &scene.meshes[call.mesh];
-            let seen = &mut seen[index as usize];
-            *seen = *seen
-                || chosen(call.mode)
-                    && triangles::any_inside(
-                        &mesh.positions,
-                        &mesh.indices,
-                        &call.transform,
-                        clip_from_world,
-                    );
+            let sampled = scene.materials[call.material].textures();
+            let sampled = || sampled[..slots(call.mode)].iter().flatten();
+            let inside = || {
+                let (transform, triangles) = (&call.transform, &mesh.indices);
+                triangles::any_inside(&mesh.positions, triangles, transform, clip_from_world)
+            };
+            if sampled().any(|t| seen.get(t.image) == Some(&false)) && inside() {
+                for texture in sampled() {
+                    if let Some(seen) = seen.get_mut(texture.image) {
+                        *seen = true;
+                    }
+                }
+            }
         }
     }
 }

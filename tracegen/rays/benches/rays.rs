@@ -15,7 +15,7 @@ use rays::bvh::count::{Counter, Counts, NoCounter};
 use rays::bvh::{AllOpaque, Bvh, TraversalStack};
 use rays::ray::{Ray, barycentrics, offset, point_at};
 use rays::soup::Soup;
-use scene::{Light, LoadOptions, cameras, hmd};
+use scene::{Light, cameras, hmd};
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;

@@ -70,7 +70,10 @@ mod tests {
         assert_eq!(with(&[home]), Some("/h/.cache/parallax".into()));
         let relative = ("XDG_CACHE_HOME", "x");
         assert_eq!(with(&[home, relative]), Some("/h/.cache/parallax".into()));
-        assert_eq!(with(&[home, ("PARALLAX_CACHE_DIR", "")]), Some("/h/.cache/parallax".into()));
+        assert_eq!(
+            with(&[home, ("PARALLAX_CACHE_DIR", "")]),
+            Some("/h/.cache/parallax".into())
+        );
         assert_eq!(with(&[]), None);
     }
 }

@@ -398,10 +398,7 @@ mod tests {
             ("--eye 1,1,1 --target 1,1,1", "away from the eye"),
         ] {
             let args = parse(flags).unwrap();
-            let error = args
-                .setup(None, &LoadOptions::ALL)
-                .unwrap_err()
-                .to_string();
+            let error = args.setup(None, &LoadOptions::ALL).unwrap_err().to_string();
             assert!(error.contains(part), "{flags}: {error}");
         }
     }

@@ -51,7 +51,11 @@ mod tests {
 
     #[test]
     fn a_mesh_around_the_frustum_with_no_triangle_in_it_is_not_seen() {
-        let far_left = [Vec3::new(-90.0, 0.0, 0.0), Vec3::new(-90.0, 1.0, 0.0), Vec3::new(-91.0, 0.0, 1.0)];
+        let far_left = [
+            Vec3::new(-90.0, 0.0, 0.0),
+            Vec3::new(-90.0, 1.0, 0.0),
+            Vec3::new(-91.0, 0.0, 1.0),
+        ];
         let far_right = far_left.map(|p| p + Vec3::X * 180.0);
         let positions = [far_left, far_right].concat();
         let seen = |indices: &[u32]| any_inside(&positions, indices, &Affine3A::IDENTITY, clip());
