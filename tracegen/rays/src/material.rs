@@ -1,7 +1,7 @@
 //! What a scene's materials mean to a ray.
 
 use super::soup::{Attributes, Soup};
-use super::texture::{Pyramid, SrgbTable, fast_log2};
+use super::texture::{Pyramid, fast_log2};
 use formats::raytrace::RayMaterial;
 use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -46,7 +46,7 @@ pub struct Surface {
 pub struct Materials {
     materials: Vec<Material>,
     pyramids: Vec<Option<Pyramid>>,
-    srgb: SrgbTable,
+    srgb: &'static [f32; 256],
 }
 
 impl Materials {
@@ -69,7 +69,7 @@ impl Materials {
         Ok(Self {
             materials: scene.materials.clone(),
             pyramids,
-            srgb: SrgbTable::default(),
+            srgb: &scene::srgb::LINEAR,
         })
     }
 
@@ -120,7 +120,7 @@ impl Materials {
     fn alpha(&self, material: &Material, uv: impl Fn(u32) -> Vec2) -> f32 {
         let texel = material.base_color_texture.as_ref().and_then(|t| {
             let pyramid = self.pyramids.get(t.image)?.as_ref()?;
-            Some(pyramid.sample(t, uv(t.uv_set), 0.0, &self.srgb).w)
+            Some(pyramid.sample(t, uv(t.uv_set), 0.0, self.srgb).w)
         });
         material.base_color.w * texel.unwrap_or(1.0)
     }
@@ -165,7 +165,7 @@ impl Materials {
         // Texels across the footprint, squared.
         let texels = at.uv_density[set] * scale * footprint_m * footprint_m;
         let lod = 0.5 * fast_log2(texels);
-        Some(pyramid.sample(texture, at.uv[set], lod, &self.srgb))
+        Some(pyramid.sample(texture, at.uv[set], lod, self.srgb))
     }
 }
 
@@ -202,9 +202,14 @@ fn describe(m: &Material) -> RayMaterial {
     let metal = m.metallic > 0.0 && may_be_smooth;
     let polished = m.metallic_roughness_texture.is_some() || m.roughness < POLISHED_ROUGHNESS;
     let glossy = m.metallic_roughness_texture.is_some() || m.roughness < GLOSSY_ROUGHNESS;
+    let flawless =
+        m.metallic_roughness_texture.is_none() && m.metallic * (1.0 - m.roughness) >= 1.0;
     RayMaterial {
         name: m.name.clone(),
-        diffuse: m.transmission < 1.0 && m.mirror < 1.0 && (m.metallic < 1.0 || may_be_smooth),
+        diffuse: m.transmission < 1.0
+            && m.mirror < 1.0
+            && !flawless
+            && (m.metallic < 1.0 || may_be_smooth),
         mirror: m.mirror > 0.0 || metal || polished,
         glass,
         glossy,

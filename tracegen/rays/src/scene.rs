@@ -1,10 +1,10 @@
 //! Everything that rays need of a scene, prepared once and shared by all threads.
 
 use super::bvh::{AlphaTest, Bvh, BvhError};
-use super::light::Sky;
 use super::material::Materials;
 use super::soup::Soup;
 use formats::raytrace::RayLight;
+use scene::light::Sky;
 use scene::{Light, Scene, SceneError};
 
 /// A scene ready to be traced.

@@ -160,7 +160,7 @@ pub struct Material {
     /// Index of refraction. Ray tracing only.
     pub ior: f32,
     /// Fraction mirrored at normal incidence beyond Fresnel's (chrome, polished floors), 0 to 1.
-    /// Ray tracing only; a loader sets it for smooth metals.
+    /// Ray tracing only, which has smooth metals mirror without it.
     pub mirror: f32,
 }
 

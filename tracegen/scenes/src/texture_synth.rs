@@ -3,8 +3,8 @@
 use super::noise::lerp;
 use formats::texture::ColorSpace;
 use rayon::prelude::*;
-use scene::SceneError;
 use scene::image::{Image, ImageSource, OpenSource};
+use scene::{SceneError, srgb};
 use std::sync::Arc;
 
 /// A colour as an artist picks it: sRGB-encoded, 0 to 1.
@@ -31,14 +31,7 @@ pub fn shade(a: Rgb, factor: f32) -> Rgb {
 /// The linear-light value of an sRGB colour, for material factors.
 #[must_use]
 pub fn linear(color: Rgb) -> glam::Vec3 {
-    let decode = |c: f32| {
-        if c <= 0.040_45 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        }
-    };
-    glam::Vec3::from(color.map(decode))
+    glam::Vec3::from(color.map(|c| srgb::decode(c.into()) as f32))
 }
 
 /// What a surface looks like at one point.
