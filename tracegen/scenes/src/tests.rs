@@ -2,7 +2,7 @@
 
 use super::{BUILTINS, build};
 use glam::Vec3;
-use scene::{Mesh, Scene};
+use scene::{LoadOptions, Mesh, Scene, TextureRef};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::OnceLock;
 
@@ -175,4 +175,31 @@ fn atriums_differ_in_textures_and_shadows_only_where_they_should() {
     let cascades = |name: &str| scene(name).map(|s| s.shadow_cascades);
     assert_eq!(cascades("atrium"), Some(0));
     assert_eq!(cascades("atrium-shadows"), Some(4));
+}
+
+#[test]
+fn slots_that_are_left_out_take_their_images_with_them() {
+    let mut slots = [true; 6];
+    slots[1] = false;
+    let whole = crate::load("teapot").unwrap();
+    let part = crate::load_with("teapot", &LoadOptions { slots })
+        .unwrap()
+        .scene;
+    let names =
+        |scene: &Scene| -> Vec<String> { scene.images.iter().map(|i| i.name.clone()).collect() };
+    let colors: Vec<String> = (names(&whole).into_iter())
+        .filter(|name| name.ends_with("-color"))
+        .collect();
+    assert!(colors.len() < whole.images.len());
+    assert_eq!(names(&part), colors);
+    for (before, after) in whole.materials.iter().zip(&part.materials) {
+        assert_eq!(after.normal_texture, None);
+        let image = |scene: &Scene, texture: Option<TextureRef>| {
+            texture.map(|t| scene.images[t.image].name.clone())
+        };
+        assert_eq!(
+            image(&part, after.base_color_texture),
+            image(&whole, before.base_color_texture)
+        );
+    }
 }

@@ -67,10 +67,13 @@ impl Files {
         load_file(&self.path("scene.gltf"), &LoadOptions::ALL)
     }
 
-    /// The error's text, which must name the file and hold every part.
+    /// The text of the error, which loading or decoding the images gives, must name the file and
+    /// hold every part.
     fn fails_with(&self, parts: &[&str]) {
+        let texels = |loaded: Loaded| crate::image::texels(&loaded.scene.images, |_| true);
         let error = self
             .load()
+            .and_then(texels)
             .expect_err("a broken file was accepted")
             .to_string();
         for part in [self.folder.path().to_str().unwrap()].iter().chain(parts) {
