@@ -6,7 +6,6 @@ use ::scenes::BUILTINS;
 use clap::Args;
 use scene::{LoadOptions, Scene};
 use serde::Serialize;
-use std::io::{self, Write};
 use std::time::Instant;
 use textures::{Cache, TextureSet};
 
@@ -99,10 +98,7 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
             }
         }
     };
-    let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()?;
-    Ok(())
+    shell::print(&text)
 }
 
 /// Loads and compresses everything; how long that took goes to stderr.
@@ -112,15 +108,15 @@ fn read_textures(spec: &str, cache: Option<&Cache>) -> anyhow::Result<Descriptio
     let loaded = start.elapsed();
     let set = TextureSet::prepare(&scene, |_| true, cache)?;
     for note in &set.notes {
-        super::warn(note);
+        shell::warn(note);
     }
-    anstream::eprintln!(
+    shell::note(&format!(
         "loaded in {:.2} s, {} textures made ready in {:.2} s, {} of them from the cache",
         loaded.as_secs_f64(),
         set.textures.len(),
         (start.elapsed() - loaded).as_secs_f64(),
         set.cached,
-    );
+    ));
     Ok(Description {
         texture_bytes: Some(set.bytes()),
         ..describe(&scene)
