@@ -1,13 +1,15 @@
 //! Images in files: found when a scene is loaded, decoded when their texels are asked for.
 
 use crate::SceneError;
-use crate::files::{Origin, read_file};
+use crate::files::{Origin, read_file, read_start};
 use crate::image::{Image, ImageSource, OpenSource};
 use formats::texture::ColorSpace;
-use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Largest image edge in texels: what a Vulkan texture may have on the drivers used.
@@ -17,17 +19,48 @@ pub const MAX_SIZE: u32 = 16384;
 /// round differently, and prepared textures are kept under this name.
 const DECODERS: &str = "image 0.25.10, png 0.18.1, zune-jpeg 0.5.15";
 
+/// Most bytes of an image's file: more than a PNG of [`MAX_SIZE`] squared takes.
+const MAX_FILE_BYTES: u64 = 1 << 31;
+
+/// Most bytes of texels that a byte of an encoded image stands for: deflate reaches 1,032, a JPEG
+/// of one colour about as much. Larger images cannot be whole, and would cost a small file nothing.
+const MAX_EXPANSION: u64 = 2048;
+
+/// Bytes of texels that any image may have.
+const SMALL_IMAGE_BYTES: u64 = 1 << 20;
+
 /// Encoded bytes of an image, or where they are.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Source {
     /// A file.
     File(PathBuf),
-    /// Bytes inside the scene file, told apart by the number.
-    Bytes(usize, Arc<[u8]>),
+    /// Bytes inside the scene file.
+    Bytes(Embedded),
+}
+
+/// An image inside the scene file. Two are the same where their numbers are.
+#[derive(Clone, Debug)]
+pub(crate) struct Embedded {
+    pub number: usize,
+    pub bytes: Arc<[u8]>,
+}
+
+impl PartialEq for Embedded {
+    fn eq(&self, other: &Self) -> bool {
+        self.number == other.number
+    }
+}
+
+impl Eq for Embedded {}
+
+impl Hash for Embedded {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.number.hash(state);
+    }
 }
 
 /// How a material reads an image, which decides its colour space and channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Usage {
     /// sRGB colour.
     Color,
@@ -41,7 +74,7 @@ pub(crate) enum Usage {
 }
 
 /// One image to decode.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug)]
 pub(crate) struct Request {
     pub source: Source,
     pub usage: Usage,
@@ -54,30 +87,31 @@ pub(crate) struct Request {
 /// The images of a scene, each source and usage once.
 #[derive(Debug, Default)]
 pub(crate) struct Requests {
-    pub list: Vec<Request>,
+    list: Vec<Request>,
+    /// Where each source and usage stands in `list`.
+    known: HashMap<(Source, Usage), usize>,
     /// Opacity maps of `Usage::Masked`.
-    pub masks: Vec<Request>,
+    masks: Vec<Request>,
+    known_masks: HashMap<Source, usize>,
 }
 
 impl Requests {
     /// The index of the image in the scene's table, added where it is new.
     pub fn index(&mut self, request: Request) -> usize {
-        let same = |r: &Request| r.usage == request.usage && r.source == request.source;
-        if let Some(index) = self.list.iter().position(same) {
-            return index;
-        }
-        self.list.push(request);
-        self.list.len() - 1
+        let key = (request.source.clone(), request.usage);
+        *self.known.entry(key).or_insert_with(|| {
+            self.list.push(request);
+            self.list.len() - 1
+        })
     }
 
     /// The index of an opacity map among the masks.
     pub fn mask(&mut self, request: Request) -> usize {
-        let same = |r: &Request| r.source == request.source;
-        if let Some(index) = self.masks.iter().position(same) {
-            return index;
-        }
-        self.masks.push(request);
-        self.masks.len() - 1
+        let key = request.source.clone();
+        *self.known_masks.entry(key).or_insert_with(|| {
+            self.masks.push(request);
+            self.masks.len() - 1
+        })
     }
 
     /// The images, their sizes read from the files' headers on all cores, in order.
@@ -126,8 +160,8 @@ struct Read<'a> {
 impl Encoded {
     fn read(&self, request: &Request) -> Result<Arc<[u8]>, SceneError> {
         match &request.source {
-            Source::File(path) => Ok(read_file(path, &request.place)?.into()),
-            Source::Bytes(_, bytes) => Ok(Arc::clone(bytes)),
+            Source::File(path) => Ok(read_file(path, &request.place, MAX_FILE_BYTES)?.into()),
+            Source::Bytes(embedded) => Ok(Arc::clone(&embedded.bytes)),
         }
     }
 
@@ -143,6 +177,15 @@ impl Encoded {
     /// Size and RGBA8 texels.
     fn decode(&self, request: &Request, bytes: &[u8]) -> Result<([u32; 2], Vec<u8>), SceneError> {
         let (decoder, size) = self.decoder(request, bytes)?;
+        let most = bytes.len() as u64 * MAX_EXPANSION + SMALL_IMAGE_BYTES;
+        if decoder.total_bytes() > most {
+            let [width, height] = size;
+            return Err(self.invalid(
+                request,
+                &format!("at most {most} bytes of texels from {} bytes", bytes.len()),
+                format!("{width}x{height}, {} bytes", decoder.total_bytes()),
+            ));
+        }
         let decoded = DynamicImage::from_decoder(decoder).map_err(|e| self.corrupt(request, &e))?;
         Ok((size, decoded.into_rgba8().into_raw()))
     }
@@ -181,15 +224,12 @@ impl Encoded {
     }
 
     fn invalid(&self, request: &Request, expected: &str, found: String) -> SceneError {
-        SceneError::Invalid {
-            file: match &request.source {
-                Source::File(path) => path.clone(),
-                Source::Bytes(..) => self.scene_file.clone(),
-            },
-            place: format!("{} (image '{}')", request.place, request.name),
-            expected: expected.to_owned(),
-            found,
-        }
+        let file = match &request.source {
+            Source::File(path) => path,
+            Source::Bytes(_) => &self.scene_file,
+        };
+        let place = format!("{} (image '{}')", request.place, request.name);
+        Origin::new(file).invalid(place, expected, found)
     }
 }
 
@@ -232,6 +272,13 @@ impl OpenSource for Read<'_> {
         }
         Ok(vec![rgba; parts.len()])
     }
+}
+
+/// Whether the file begins as a PNG or a JPEG; `None` where it cannot be read.
+pub(crate) fn is_png_or_jpeg(file: &Path) -> Option<bool> {
+    let (start, _) = read_start(file, "image", 16).ok()?;
+    let format = image::guess_format(&start).ok();
+    Some(matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg)))
 }
 
 fn spread_alpha(mut rgba: Vec<u8>) -> Vec<u8> {

@@ -17,6 +17,7 @@ mod options;
 mod real_scenes;
 pub mod srgb;
 mod uri;
+mod warnings;
 
 pub use error::SceneError;
 pub use image::Image;
