@@ -1,11 +1,11 @@
 //! `replay reproject`: ray traces through the model of a ray-tracing GPU that reuses the left
 //! image for the right one.
 
+use crate::files::write_atomically;
 use crate::image::{Picture, png};
 use crate::paper::sgrt as paper;
-use crate::report::files::write_atomically;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
-use crate::result::TraceId;
+use crate::result::{TraceId, scene_name};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use crate::sgrt::frame::RaySource;
@@ -177,7 +177,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
             cache_misses: loaded.cache_misses().to_owned(),
             model: config.clone(),
         },
-        paper: paper::values(scene, report::label(scene), &args.paper_scenes)?,
+        paper: paper::values(scene, scene_name(scene), &args.paper_scenes)?,
         curve: if args.curve {
             loaded.curve(&curve_rules(), config)
         } else {

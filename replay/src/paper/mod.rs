@@ -1,9 +1,20 @@
-//! Published figures, to be set beside measured ones, and which trace stands beside which.
+//! Published figures, to be set beside measured ones, and the scenes that stand for the papers'.
+//!
+//! The papers' scenes are not free. A scene of ours stands for one of them when its short name is
+//! in the paper's table, or when the command line says so; nothing is guessed from parts of names.
 
 pub mod sgrt;
-mod z2;
+pub mod z2;
 
-pub use z2::*;
+/// The entry of a scene in a paper's table of `(our short name, entry)`.
+///
+/// `scene` is the name or path that the trace records; see
+/// [`scene_name`](crate::result::scene_name).
+pub fn stand_in<'t, T>(scene: &str, table: &'t [(&str, T)]) -> Option<&'t T> {
+    let short = crate::result::scene_name(scene);
+    let entry = table.iter().find(|(name, _)| *name == short)?;
+    Some(&entry.1)
+}
 
 /// A scene of `--as` that the paper does not have.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
@@ -46,6 +57,15 @@ pub fn asked<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn part_of_a_name_makes_no_stand_in() {
+        let table = [("car", "BMW"), ("lab", "Chemical Lab.")];
+        assert_eq!(stand_in("car", &table), Some(&"BMW"));
+        for other in ["scarf.gltf", "label", "collab/model.gltf", "car-park"] {
+            assert_eq!(stand_in(other, &table), None, "{other}");
+        }
+    }
 
     #[test]
     fn a_papers_scene_can_be_given_for_one_label_or_for_all() {

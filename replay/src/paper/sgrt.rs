@@ -10,8 +10,6 @@ pub struct PaperScene {
     pub id: &'static str,
     /// Name in the figures.
     pub title: &'static str,
-    /// Built-in scene that stands for it.
-    pub stand_in: &'static str,
     /// Frames per second over the reference's.
     pub relative_performance: f64,
     /// Energy over the reference's.
@@ -39,14 +37,12 @@ pub const SRP_OVERHEAD_PCT: f64 = 10.0;
 const fn scene(
     id: &'static str,
     title: &'static str,
-    stand_in: &'static str,
     relative_performance: f64,
     relative_energy: f64,
 ) -> PaperScene {
     PaperScene {
         id,
         title,
-        stand_in,
         relative_performance,
         relative_energy,
     }
@@ -54,12 +50,19 @@ const fn scene(
 
 /// Figure 3.
 pub const SCENES: [PaperScene; 6] = [
-    scene("teapot", "Teapot", "teapot", 1.64, 0.96),
-    scene("chess", "Chess", "chess", 1.13, 1.02),
-    scene("bmw", "BMW", "car", 1.42, 0.97),
-    scene("chemical-lab", "Chemical lab", "lab", 1.11, 0.99),
-    scene("music-box", "Music box", "music-box", 1.28, 0.98),
-    scene("provence", "Provence", "meadow", 1.51, 0.80),
+    scene("teapot", "Teapot", 1.64, 0.96),
+    scene("chess", "Chess", 1.13, 1.02),
+    scene("bmw", "BMW", 1.42, 0.97),
+    scene("chemical-lab", "Chemical lab", 1.11, 0.99),
+    scene("music-box", "Music box", 1.28, 0.98),
+    scene("provence", "Provence", 1.51, 0.80),
+];
+
+/// Built-in scenes of another name than the paper's scene that they stand for.
+const STAND_INS: [(&str, &str); 3] = [
+    ("car", "bmw"),
+    ("lab", "chemical-lab"),
+    ("meadow", "provence"),
 ];
 
 /// The paper's values for a trace: of the scene that the values of `--as` give to its label, else
@@ -72,13 +75,10 @@ pub fn values(
     label: &str,
     asked: &[String],
 ) -> Result<Option<PaperValues>, super::UnknownScene> {
-    let id = match super::asked(asked, label, &SCENES.map(|s| s.id))? {
-        Some(id) => id,
-        None => SCENES
-            .iter()
-            .find(|s| scene == s.id || scene == s.stand_in)
-            .map(|s| s.id),
-    };
+    let ids = SCENES.map(|s| s.id);
+    let named = || super::stand_in(scene, &ids.map(|id| (id, id))).copied();
+    let id = super::asked(asked, label, &ids)?
+        .unwrap_or_else(|| super::stand_in(scene, &STAND_INS).copied().or_else(named));
     let found = SCENES.iter().find(|s| Some(s.id) == id);
     Ok(found.map(|s| PaperValues {
         scene: s.title.to_owned(),

@@ -5,10 +5,10 @@ use crate::config::Order;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
-/// One row of the Z2 paper's Table 2: a scene, a cache configuration, an order.
+/// One row of the paper's Table 2: a scene, a cache configuration, an order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Z2Row {
-    /// Scene, as in [`Z2_SCENES`].
+pub struct PublishedRow {
+    /// Scene, as in [`SCENES`].
     pub scene: String,
     /// L1 size in KiB.
     pub l1_kib: u32,
@@ -24,97 +24,104 @@ pub struct Z2Row {
     pub tmu_util_pct: f64,
 }
 
-impl Z2Row {
+impl PublishedRow {
     /// External traffic in lines per footprint (L1 times L2 miss rate): Fig. 5 but for the scale,
     /// which the paper's text does not give as numbers.
     #[must_use]
     pub fn external_lines_per_footprint(&self) -> f64 {
         self.l1_miss_pct * self.l2_miss_pct / 1e4
     }
+
+    /// The same scene and caches in Morton order.
+    #[must_use]
+    pub fn morton(&self) -> Option<&'static Self> {
+        row(&self.scene, self.l1_kib, self.l2_kib, Order::MORTON)
+    }
+
+    /// External traffic saved against Morton order, percent.
+    #[must_use]
+    pub fn reduction_pct(&self) -> Option<f64> {
+        let morton = self.morton()?.external_lines_per_footprint();
+        Some(100.0 * (1.0 - self.external_lines_per_footprint() / morton))
+    }
+
+    /// TMU utilisation over Morton order's.
+    #[must_use]
+    pub fn tmu_ratio(&self) -> Option<f64> {
+        Some(self.tmu_util_pct / self.morton()?.tmu_util_pct)
+    }
 }
 
-/// The Z2 paper's scenes, as its tables order them.
-pub const Z2_SCENES: [&str; 4] = [
+/// The paper's scenes, as its tables order them.
+pub const SCENES: [&str; 4] = [
     "gfxbench-t-rex",
     "crytek-sponza",
     "l-bench-sponza-no-shadows",
     "l-bench-sponza-shadows",
 ];
 
-/// The Z2 paper's cache configurations: L1 and L2 size in KiB, in the order of its Table 2.
-pub const Z2_CACHES_KIB: [(u32, u32); 4] = [(8, 128), (16, 128), (8, 256), (16, 256)];
+/// The paper's cache configurations: L1 and L2 size in KiB, in the order of its Table 2.
+pub const CACHES_KIB: [(u32, u32); 4] = [(8, 128), (16, 128), (8, 256), (16, 256)];
 
-/// The orders that the Z2 paper compares.
-pub const Z2_ORDERS: [Order; 3] = [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA];
+/// The orders that the paper compares.
+pub const ORDERS: [Order; 3] = [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA];
 
-static Z2_TABLE: LazyLock<Vec<Z2Row>> =
+static TABLE: LazyLock<Vec<PublishedRow>> =
     LazyLock::new(|| parse_table(include_str!("../../data/z2-table2.csv")));
 
-/// The Z2 paper's Table 2.
+/// The paper's Table 2.
 #[must_use]
-pub fn z2_table() -> &'static [Z2Row] {
-    &Z2_TABLE
+pub fn table() -> &'static [PublishedRow] {
+    &TABLE
 }
 
 /// The row of Table 2 for a scene, a cache configuration and an order, if it has one.
 #[must_use]
-pub fn z2_row(scene: &str, l1_kib: u32, l2_kib: u32, order: Order) -> Option<&'static Z2Row> {
-    z2_table()
+pub fn row(scene: &str, l1_kib: u32, l2_kib: u32, order: Order) -> Option<&'static PublishedRow> {
+    table()
         .iter()
         .find(|r| r.scene == scene && r.l1_kib == l1_kib && r.l2_kib == l2_kib && r.order == order)
 }
 
 /// Lines that do not parse are left out; a test holds that there are none.
-fn parse_table(csv: &str) -> Vec<Z2Row> {
-    csv.lines()
-        .skip(1)
-        .filter_map(|line| {
-            let mut cells = line.split(',');
-            let mut next = || cells.next();
-            Some(Z2Row {
-                scene: next()?.to_owned(),
-                l1_kib: next()?.parse().ok()?,
-                l2_kib: next()?.parse().ok()?,
-                order: next().and_then(Order::find)?,
-                l1_miss_pct: next()?.parse().ok()?,
-                l2_miss_pct: next()?.parse().ok()?,
-                tmu_util_pct: next()?.parse().ok()?,
-            })
-        })
-        .collect()
+fn parse_table(text: &str) -> Vec<PublishedRow> {
+    let mut lines = csv::Reader::from_reader(text.as_bytes());
+    lines.deserialize().filter_map(Result::ok).collect()
 }
 
-/// The scene of the Z2 paper that a scene stands for, by name and by whether it samples shadow
-/// maps: the built-in scenes were made for it, the real ones are the same models or alike.
+/// Our scenes that stand for the paper's: short name, and the paper's scene without and with shadow
+/// maps. The built-in ones were made for it, the others are the same models or alike.
+const STAND_INS: [(&str, [Option<&str>; 2]); 7] = {
+    let [t_rex, crytek, plain, shadows] = SCENES;
+    [
+        ("atrium", [Some(crytek), None]),
+        ("crytek-sponza", [Some(crytek), None]),
+        ("atrium-plain", [Some(plain), Some(shadows)]),
+        ("dabrovic-sponza", [Some(plain), Some(shadows)]),
+        ("atrium-shadows", [None, Some(shadows)]),
+        ("jungle", [Some(t_rex), Some(t_rex)]),
+        ("stk-cocoa-temple", [Some(t_rex), Some(t_rex)]),
+    ]
+};
+
+/// The scene of the paper that a scene stands for, by its exact short name and by whether it
+/// samples shadow maps.
 #[must_use]
-pub fn z2_twin(scene: &str, shadow_maps: bool) -> Option<&'static str> {
-    let name = scene.to_ascii_lowercase();
-    let [t_rex, crytek, plain, shadows] = Z2_SCENES;
-    if name.contains("jungle") || name.contains("cocoa") {
-        Some(t_rex)
-    } else if name.contains("atrium-shadows") {
-        Some(shadows)
-    } else if name.contains("atrium-plain") || name.contains("dabrovic") {
-        Some(if shadow_maps { shadows } else { plain })
-    } else if (name.contains("atrium") || name.contains("crytek")) && !shadow_maps {
-        Some(crytek)
-    } else {
-        None
-    }
+pub fn stand_in(scene: &str, shadow_maps: bool) -> Option<&'static str> {
+    super::stand_in(scene, &STAND_INS)?[usize::from(shadow_maps)]
 }
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn table_2_is_complete() {
-        assert_eq!(z2_table().len(), 48);
-        for scene in Z2_SCENES {
-            for (l1, l2) in Z2_CACHES_KIB {
-                for order in Z2_ORDERS {
+        assert_eq!(table().len(), 48);
+        for scene in SCENES {
+            for (l1, l2) in CACHES_KIB {
+                for order in ORDERS {
                     assert!(
-                        z2_row(scene, l1, l2, order).is_some(),
+                        row(scene, l1, l2, order).is_some(),
                         "{scene} {l1} {l2} {order:?}"
                     );
                 }
@@ -126,19 +133,8 @@ mod tests {
     #[test]
     fn the_papers_average_reductions_follow_from_its_table() {
         let reductions = |order| -> Vec<f64> {
-            Z2_SCENES
-                .iter()
-                .flat_map(|scene| {
-                    Z2_CACHES_KIB.map(|(l1, l2)| {
-                        let lines = |o| {
-                            z2_row(scene, l1, l2, o)
-                                .unwrap()
-                                .external_lines_per_footprint()
-                        };
-                        100.0 * (1.0 - lines(order) / lines(Order::MORTON))
-                    })
-                })
-                .collect()
+            let rows = table().iter().filter(|row| row.order == order);
+            rows.map(|row| row.reduction_pct().unwrap()).collect()
         };
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         let sta = reductions(Order::Z2_STA);
@@ -149,21 +145,22 @@ mod tests {
     }
 
     #[test]
-    fn scenes_find_their_twins() {
-        assert_eq!(
-            z2_twin("../scenes/crytek-sponza/sponza.gltf", false),
-            Some("crytek-sponza")
-        );
-        assert_eq!(z2_twin("atrium", false), Some("crytek-sponza"));
-        assert_eq!(
-            z2_twin("atrium-plain", false),
-            Some("l-bench-sponza-no-shadows")
-        );
-        assert_eq!(
-            z2_twin("dabrovic-sponza/sponza.obj", true),
-            Some("l-bench-sponza-shadows")
-        );
-        assert_eq!(z2_twin("jungle", true), Some("gfxbench-t-rex"));
-        assert_eq!(z2_twin("bunny", false), None);
+    fn a_scene_stands_for_the_papers_by_its_exact_name() {
+        let path = "../scenes/crytek-sponza/sponza.gltf";
+        assert_eq!(stand_in(path, false), Some("crytek-sponza"));
+        assert_eq!(stand_in("atrium", false), Some("crytek-sponza"));
+        assert_eq!(stand_in("atrium", true), None);
+        let dabrovic = |shadow_maps| stand_in("dabrovic-sponza/sponza.obj", shadow_maps);
+        assert_eq!(dabrovic(false), Some("l-bench-sponza-no-shadows"));
+        assert_eq!(dabrovic(true), Some("l-bench-sponza-shadows"));
+        assert_eq!(stand_in("jungle", true), Some("gfxbench-t-rex"));
+        for other in [
+            "bunny",
+            "my-atrium-test.gltf",
+            "jungle-book",
+            "not-crytek.obj",
+        ] {
+            assert_eq!(stand_in(other, false), None, "{other}");
+        }
     }
 }

@@ -8,16 +8,9 @@ use crate::sgrt::compose::Reuse;
 use crate::sgrt::energy::EnergyPj;
 use crate::sgrt::result::{CurvePoint, Outcome, Report, Sensitivity};
 
-/// A scene's name without folder and extension.
-#[must_use]
-pub fn label(scene: &str) -> &str {
-    let file = scene.rsplit(['/', '\\']).next().unwrap_or(scene);
-    file.split('.').next().unwrap_or(file)
-}
-
 /// The name of a trace in tables.
 pub fn scene_name(report: &Report) -> String {
-    label(&report.trace.scene).to_owned()
+    crate::result::scene_name(&report.trace.scene).to_owned()
 }
 
 /// Which rule and level of reuse the rows called "chosen" have.
