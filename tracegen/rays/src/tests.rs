@@ -339,7 +339,7 @@ fn vertex_colours_multiply_the_base_colour_at_the_hit() {
         materials: vec![veil],
         ..Scene::default()
     };
-    let (soup, materials) = (Soup::new(&scene), Materials::new(&scene));
+    let (soup, materials) = (Soup::new(&scene), Materials::new(&scene).unwrap());
     let albedo = |primitive, bary| {
         let at = soup.attributes(&scene, primitive, bary);
         let surface = materials.surface(0, &at, 0.0);
