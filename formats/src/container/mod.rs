@@ -10,7 +10,7 @@ mod writer;
 
 pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 pub use reader::Container;
-pub use writer::{AtomicFile, ContainerWriter, crc32_of_file};
+pub use writer::{AtomicFile, ContainerWriter};
 
 use std::fmt;
 

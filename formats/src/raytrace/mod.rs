@@ -5,7 +5,6 @@
 //! cost in the bounding volume hierarchy. Lengths are metres; positions are `f32` relative to
 //! [`RaytraceMeta::origin`], so that a scene far from the world's origin loses no precision.
 
-mod bytes;
 pub mod camera;
 mod codec;
 mod file;
