@@ -141,8 +141,25 @@ pub struct EyeView {
     pub position: [f32; 3],
 }
 
+impl Default for EyeView {
+    /// At the origin, with clip space for a view: what a made-up trace names.
+    fn default() -> Self {
+        let identity = [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        Self {
+            world_to_eye: identity,
+            eye_to_clip: identity,
+            position: [0.0; 3],
+        }
+    }
+}
+
 /// The cameras of one frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameViews {
     /// Frame number, from 0.
     pub frame: u32,
