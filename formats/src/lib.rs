@@ -12,6 +12,7 @@ mod json;
 pub mod layout;
 mod parse;
 pub mod raytrace;
+pub mod text;
 pub mod textrace;
 pub mod texture;
 mod tiles;

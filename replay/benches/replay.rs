@@ -1,7 +1,7 @@
 //! Replay speed on a generated stereo frame: footprints per second by mode and order.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use replay::config::{Mode, OrderKind, RunConfig};
+use replay::config::{Mode, Order, RunConfig};
 use replay::engine::synthetic::Synthetic;
 
 fn replay_modes(criterion: &mut Criterion) {
@@ -13,7 +13,7 @@ fn replay_modes(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("replay");
     group.sample_size(10);
     for mode in [Mode::Functional, Mode::Timed] {
-        for order in [OrderKind::Morton, OrderKind::Z2Sta] {
+        for order in [Order::MORTON, Order::Z2_STA] {
             let config = RunConfig {
                 mode,
                 order,

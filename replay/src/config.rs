@@ -4,6 +4,7 @@ use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+pub use crate::order::Order;
 pub use formats::footprint::{FilterOverride, LodFormula, SamplingOptions as SamplingConfig};
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
 
@@ -18,60 +19,6 @@ pub enum Mode {
     Timed,
     /// Without latencies: a footprint is a unit of time, and a miss fills at once.
     Functional,
-}
-
-/// Tile orders.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum OrderKind {
-    /// Rows from left to right.
-    Scanline,
-    /// Rows, every other one from right to left.
-    ZigZag,
-    /// Z-order curve: the paper's baseline.
-    #[default]
-    Morton,
-    /// Hilbert curve.
-    Hilbert,
-    /// Morton, left and right tile in turn.
-    Z2Lrta,
-    /// Morton, both tiles on one core, their triangles in turn.
-    Z2Sta,
-    /// As `Z2Sta`, the triangle lists merged by primitive number.
-    Z2StaMerge,
-    /// Shuffled tiles: the control.
-    Random,
-}
-
-impl OrderKind {
-    /// Every order, in the order of the tables.
-    pub const ALL: [Self; 8] = [
-        Self::Scanline,
-        Self::ZigZag,
-        Self::Morton,
-        Self::Hilbert,
-        Self::Z2Lrta,
-        Self::Z2Sta,
-        Self::Z2StaMerge,
-        Self::Random,
-    ];
-
-    /// Name as in configurations and tables.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Scanline => "scanline",
-            Self::ZigZag => "zig-zag",
-            Self::Morton => "morton",
-            Self::Hilbert => "hilbert",
-            Self::Z2Lrta => "z2-lrta",
-            Self::Z2Sta => "z2-sta",
-            Self::Z2StaMerge => "z2-sta-merge",
-            Self::Random => "random",
-        }
-    }
 }
 
 /// How work items are given to cores.
@@ -202,7 +149,7 @@ pub struct RunConfig {
     /// Timed or functional.
     pub mode: Mode,
     /// Tile order.
-    pub order: OrderKind,
+    pub order: Order,
     /// Seed of the random order and of random replacement.
     pub seed: u64,
     /// Shader cores, each with its own L1 and texture unit.
@@ -229,7 +176,7 @@ impl Default for RunConfig {
     fn default() -> Self {
         Self {
             mode: Mode::Timed,
-            order: OrderKind::Morton,
+            order: Order::MORTON,
             seed: 1,
             cores: 2,
             assign: Assign::FirstIdle,
@@ -398,7 +345,7 @@ mod tests {
         let config: RunConfig =
             toml::from_str("order = \"z2-sta\"\n[l1]\nsize_bytes = \"16KiB\"\n").unwrap();
         assert_eq!(config.l1, CacheConfig::lru(16 << 10));
-        assert_eq!(config.order, OrderKind::Z2Sta);
+        assert_eq!(config.order, Order::Z2_STA);
         let error = toml::from_str::<RunConfig>("l3 = 1")
             .unwrap_err()
             .to_string();
@@ -408,18 +355,11 @@ mod tests {
     #[test]
     fn a_printed_configuration_reads_back_the_same() {
         let config = RunConfig {
-            order: OrderKind::Z2StaMerge,
+            order: Order::Z2_STA_MERGE,
             seed: 9,
             ..RunConfig::default()
         };
         let text = toml::to_string(&config).unwrap();
         assert_eq!(toml::from_str::<RunConfig>(&text).unwrap(), config);
-    }
-
-    #[test]
-    fn an_orders_name_is_its_serialised_form() {
-        for order in OrderKind::ALL {
-            assert_eq!(serde_json::to_value(order).unwrap(), order.name());
-        }
     }
 }

@@ -5,7 +5,7 @@
 //! - SGRT: Lee, Hwang, Shin, Yoo, Ryu, "Fast Stereoscopic Rendering on Mobile Ray Tracing GPU for
 //!   Virtual Reality Applications", 2017. Figures 1 and 3, section IV.
 
-use crate::config::OrderKind;
+use crate::config::Order;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
@@ -19,7 +19,7 @@ pub struct Z2Row {
     /// L2 size in KiB.
     pub l2_kib: u32,
     /// Order.
-    pub order: OrderKind,
+    pub order: Order,
     /// L1 miss rate, percent of footprints.
     pub l1_miss_pct: f64,
     /// L2 miss rate, percent of L2 look-ups.
@@ -49,7 +49,7 @@ pub const Z2_SCENES: [&str; 4] = [
 pub const Z2_CACHES_KIB: [(u32, u32); 4] = [(8, 128), (16, 128), (8, 256), (16, 256)];
 
 /// The orders that the Z2 paper compares.
-pub const Z2_ORDERS: [OrderKind; 3] = [OrderKind::Morton, OrderKind::Z2Lrta, OrderKind::Z2Sta];
+pub const Z2_ORDERS: [Order; 3] = [Order::MORTON, Order::Z2_LRTA, Order::Z2_STA];
 
 static Z2_TABLE: LazyLock<Vec<Z2Row>> =
     LazyLock::new(|| parse_table(include_str!("../data/z2-table2.csv")));
@@ -62,7 +62,7 @@ pub fn z2_table() -> &'static [Z2Row] {
 
 /// The row of Table 2 for a scene, a cache configuration and an order, if it has one.
 #[must_use]
-pub fn z2_row(scene: &str, l1_kib: u32, l2_kib: u32, order: OrderKind) -> Option<&'static Z2Row> {
+pub fn z2_row(scene: &str, l1_kib: u32, l2_kib: u32, order: Order) -> Option<&'static Z2Row> {
     z2_table()
         .iter()
         .find(|r| r.scene == scene && r.l1_kib == l1_kib && r.l2_kib == l2_kib && r.order == order)
@@ -79,8 +79,7 @@ fn parse_table(csv: &str) -> Vec<Z2Row> {
                 scene: next()?.to_owned(),
                 l1_kib: next()?.parse().ok()?,
                 l2_kib: next()?.parse().ok()?,
-                order: next()
-                    .and_then(|name| OrderKind::ALL.into_iter().find(|o| o.name() == name))?,
+                order: next().and_then(Order::find)?,
                 l1_miss_pct: next()?.parse().ok()?,
                 l2_miss_pct: next()?.parse().ok()?,
                 tmu_util_pct: next()?.parse().ok()?,
@@ -192,15 +191,15 @@ mod tests {
                                 .unwrap()
                                 .external_lines_per_footprint()
                         };
-                        100.0 * (1.0 - lines(order) / lines(OrderKind::Morton))
+                        100.0 * (1.0 - lines(order) / lines(Order::MORTON))
                     })
                 })
                 .collect()
         };
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-        let sta = reductions(OrderKind::Z2Sta);
+        let sta = reductions(Order::Z2_STA);
         // The table's rates are rounded and weigh L2 look-ups alike; the paper sums bytes.
-        assert!((mean(&reductions(OrderKind::Z2Lrta)) - 24.8).abs() < 0.4);
+        assert!((mean(&reductions(Order::Z2_LRTA)) - 24.8).abs() < 0.4);
         assert!((mean(&sta) - 27.9).abs() < 0.4);
         assert!((sta.iter().copied().fold(0.0, f64::max) - 47.8).abs() < 0.4);
     }

@@ -4,13 +4,15 @@
 //! points at it. Header, directory and every chunk have a CRC-32, and the bytes between chunks
 //! must be zero, so that no flipped bit goes unseen. FORMAT.md has the byte layout.
 
+mod atomic;
 mod header;
 mod reader;
 mod writer;
 
+pub use atomic::{AtomicFile, check_target, discard_unfinished, is_stdout};
 pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 pub use reader::Container;
-pub use writer::{AtomicFile, ContainerWriter};
+pub use writer::ContainerWriter;
 
 use std::fmt;
 

@@ -1,70 +1,11 @@
 //! Writing a container: chunks streamed to a temporary file, renamed when complete.
 
+use super::atomic::AtomicFile;
 use super::header::{HEADER_BYTES, Header};
 use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind};
 use crate::error::{FormatError, Result};
-use std::io::{self, BufWriter, Cursor, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
-
-/// A file that appears under its name only once it is complete; dropped before, it leaves
-/// nothing behind.
-#[derive(Debug)]
-pub struct AtomicFile {
-    writer: BufWriter<NamedTempFile>,
-    target: PathBuf,
-}
-
-impl AtomicFile {
-    /// Opens a temporary file beside `target`.
-    ///
-    /// # Errors
-    /// When the folder cannot be written.
-    pub fn create(target: &Path) -> io::Result<Self> {
-        let folder = match target.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".").suffix(".part");
-        #[cfg(unix)]
-        {
-            // Temporary files are private; a trace should get the modes of any other output.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        Ok(Self {
-            writer: BufWriter::with_capacity(1 << 20, builder.tempfile_in(folder)?),
-            target: target.to_owned(),
-        })
-    }
-
-    /// Flushes and renames the file over its target.
-    ///
-    /// # Errors
-    /// When either fails; the target is then untouched.
-    pub fn persist(self) -> io::Result<()> {
-        let file = self.writer.into_inner().map_err(io::Error::from)?;
-        file.persist(&self.target).map_err(io::Error::from)?;
-        Ok(())
-    }
-}
-
-impl Write for AtomicFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.writer.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush()
-    }
-}
-
-impl Seek for AtomicFile {
-    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
-        self.writer.seek(position)
-    }
-}
+use std::io::{Cursor, Seek, SeekFrom, Write};
+use std::path::Path;
 
 /// Writes a container chunk by chunk.
 #[derive(Debug)]
@@ -81,11 +22,11 @@ impl ContainerWriter<AtomicFile> {
     /// Starts a file of `kind` that will be renamed to `path` by [`Self::finish`].
     ///
     /// # Errors
-    /// When the temporary file beside `path` cannot be written.
+    /// Those of [`AtomicFile::create`].
     pub fn create(path: &Path, kind: Kind) -> Result<Self> {
         let name = path.display().to_string();
-        let sink = AtomicFile::create(path)
-            .map_err(|source| FormatError::io(&name, "create a temporary file beside", source))?;
+        let sink =
+            AtomicFile::create(path).map_err(|source| FormatError::io(&name, "write", source))?;
         Self::start(name, sink, kind)
     }
 

@@ -1,7 +1,7 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
 use crate::config::{
-    Assign, BlockOrder, FilterOverride, LodFormula, Mode, OrderKind, Replacement, RunConfig,
+    Assign, BlockOrder, FilterOverride, LodFormula, Mode, Order, Replacement, RunConfig,
     TextureOrder,
 };
 use crate::size::parse_bytes;
@@ -26,7 +26,7 @@ pub struct ConfigArgs {
     config: Option<PathBuf>,
     /// Tile order
     #[arg(long)]
-    order: Option<OrderKind>,
+    order: Option<Order>,
     /// Cycle model, or footprints without latencies
     #[arg(long)]
     mode: Option<Mode>,

@@ -131,7 +131,7 @@ fn accesses(
         },
         line_bytes: config.line_bytes,
     };
-    let order = order::by_kind(config.order, config.seed);
+    let order = config.order.build(config.seed);
     let mut feed = Feed::default();
     for item in order::plan(&*order, &tables.passes).iter().flatten() {
         feed.load(trace, item)?;

@@ -1,7 +1,7 @@
 //! Arguments that `replay paper` and `replay report` share: what to vary, and what to write.
 
 use super::ConfigArgs;
-use crate::config::{OrderKind, RunConfig};
+use crate::config::{Order, RunConfig};
 use crate::paper::{Z2_CACHES_KIB, Z2_ORDERS, Z2_SCENES};
 use crate::report::files::write_atomically;
 use crate::report::picture::Picture;
@@ -166,17 +166,15 @@ pub fn check_conservation(report: &PaperReport) -> std::result::Result<(), Strin
     ))
 }
 
-fn parse_orders(text: &str) -> Result<Vec<OrderKind>> {
+fn parse_orders(text: &str) -> Result<Vec<Order>> {
     if text == "all" {
-        let others = OrderKind::ALL
-            .into_iter()
-            .filter(|o| !Z2_ORDERS.contains(o));
+        let others = Order::all().filter(|o| !Z2_ORDERS.contains(o));
         return Ok(Z2_ORDERS.into_iter().chain(others).collect());
     }
     let mut orders = Vec::new();
     for name in text.split(',').map(str::trim) {
-        let Some(order) = OrderKind::ALL.into_iter().find(|o| o.name() == name) else {
-            let known: Vec<&str> = OrderKind::ALL.iter().map(|o| o.name()).collect();
+        let Some(order) = Order::find(name) else {
+            let known: Vec<&str> = Order::all().map(|o| o.name()).collect();
             bail!(
                 "--orders: expected `all` or some of {}, found `{name}`",
                 known.join(", ")
@@ -237,14 +235,18 @@ mod tests {
     fn all_orders_begin_with_the_papers() {
         let orders = parse_orders("all").unwrap();
         assert_eq!(orders[..3], Z2_ORDERS);
-        assert_eq!(orders.len(), OrderKind::ALL.len());
+        assert_eq!(orders.len(), Order::all().len());
     }
 
     #[test]
     fn an_unknown_order_is_named_with_the_known_ones() {
+        let known: Vec<&str> = Order::all().map(Order::name).collect();
         assert_eq!(
             parse_orders("morton,spiral").unwrap_err().to_string(),
-            "--orders: expected `all` or some of scanline, zig-zag, morton, hilbert, z2-lrta, z2-sta, z2-sta-merge, random, found `spiral`"
+            format!(
+                "--orders: expected `all` or some of {}, found `spiral`",
+                known.join(", ")
+            )
         );
     }
 

@@ -97,7 +97,7 @@ fn run<S: TileSource + ?Sized, A: Cache, B: Cache>(
 ) -> Result<RunResult, ReplayError> {
     let tables = trace.tables();
     let footprints = Footprints::new(tables, config)?;
-    let order = order::by_kind(config.order, config.seed);
+    let order = config.order.build(config.seed);
     let phases = order::plan(&*order, &tables.passes);
     let tally = Tally::new(tables, footprints.lines(), config.tile_maps);
     match config.mode {

@@ -1,6 +1,6 @@
 use super::synthetic::Synthetic;
 use super::*;
-use crate::config::{Assign, OrderKind};
+use crate::config::{Assign, Order};
 use crate::order::WorkItem;
 use crate::result::LevelCounters;
 use formats::footprint::record_footprints;
@@ -18,7 +18,7 @@ fn small() -> MemoryTrace {
     .generate()
 }
 
-fn functional(order: OrderKind) -> RunConfig {
+fn functional(order: Order) -> RunConfig {
     RunConfig {
         mode: Mode::Functional,
         order,
@@ -55,7 +55,7 @@ fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounter
     let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
     let mut seen = HashSet::new();
     let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
-    let order = order::by_kind(config.order, config.seed);
+    let order = config.order.build(config.seed);
     for item in order::plan(&*order, &trace.tables.passes).iter().flatten() {
         let WorkItem::Tile(at) = item else {
             panic!("single-view orders only")
@@ -105,7 +105,7 @@ fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounter
 #[test]
 fn one_core_equals_a_brute_force_replay() {
     let trace = small();
-    for order in [OrderKind::Scanline, OrderKind::Hilbert, OrderKind::Random] {
+    for order in [Order::SCANLINE, Order::HILBERT, Order::RANDOM] {
         let config = RunConfig {
             cores: 1,
             ..functional(order)
@@ -125,7 +125,7 @@ fn one_core_equals_a_brute_force_replay() {
 #[test]
 fn compiled_and_general_caches_agree() {
     let trace = small();
-    let config = functional(OrderKind::Z2Sta);
+    let config = functional(Order::Z2_STA);
     let common = replay(&trace, &config).unwrap();
     let general = RunConfig {
         l1: CacheConfig {
@@ -160,8 +160,8 @@ fn every_order_and_mode_replays_the_same_accesses() {
             r.lanes,
         )
     };
-    let expected = conserved(Mode::Functional, Assign::Static, OrderKind::Scanline);
-    for order in OrderKind::ALL {
+    let expected = conserved(Mode::Functional, Assign::Static, Order::SCANLINE);
+    for order in Order::all() {
         for mode in [Mode::Functional, Mode::Timed] {
             for assign in [Assign::Static, Assign::FirstIdle] {
                 assert_eq!(
@@ -178,7 +178,7 @@ fn every_order_and_mode_replays_the_same_accesses() {
 #[test]
 fn the_access_hash_sees_a_single_changed_access() {
     let mut trace = small();
-    let config = functional(OrderKind::Morton);
+    let config = functional(Order::MORTON);
     let before = replay(&trace, &config).unwrap().access_hash;
     let tile = trace.tiles[0]
         .iter_mut()
@@ -191,7 +191,7 @@ fn the_access_hash_sees_a_single_changed_access() {
 #[test]
 fn without_penalties_timed_equals_functional_on_one_core() {
     let trace = small();
-    for order in [OrderKind::Morton, OrderKind::Z2Sta, OrderKind::Z2StaMerge] {
+    for order in [Order::MORTON, Order::Z2_STA, Order::Z2_STA_MERGE] {
         let functional = RunConfig {
             cores: 1,
             ..functional(order)
@@ -231,7 +231,7 @@ fn parts_add_up_to_the_whole() {
         let config = RunConfig {
             mode,
             tile_maps: true,
-            ..functional(OrderKind::Z2Lrta)
+            ..functional(Order::Z2_LRTA)
         };
         let r = replay(&trace, &config).unwrap();
         for parts in [&r.by_view, &r.by_texture, &r.by_level] {
@@ -264,7 +264,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
     .generate();
     let config = RunConfig {
         tile_maps: true,
-        ..functional(OrderKind::Morton)
+        ..functional(Order::MORTON)
     };
     let result = replay(&trace, &config).unwrap();
     let left = &result.tile_maps[0];
@@ -299,7 +299,7 @@ fn static_lrta_gives_each_core_its_own_view() {
     let trace = small();
     let config = RunConfig {
         assign: Assign::Static,
-        ..functional(OrderKind::Z2Lrta)
+        ..functional(Order::Z2_LRTA)
     };
     let both = replay(&trace, &config).unwrap();
     let alone: HashMap<&str, LevelCounters> = ["left", "right"]
@@ -312,7 +312,7 @@ fn static_lrta_gives_each_core_its_own_view() {
                 .for_each(formats::textrace::Tile::clear);
             let config = RunConfig {
                 cores: 1,
-                ..functional(OrderKind::Morton)
+                ..functional(Order::MORTON)
             };
             (name, replay(&one, &config).unwrap().l1.counters)
         })

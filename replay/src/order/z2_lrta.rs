@@ -1,7 +1,7 @@
 //! Z2 left-right tile assignment (Z2 paper section 3): L0 R0 L1 R1 ... along the Z-order curve, so
 //! that of two cores one works on the left tile while the other works on the right one.
 
-use super::{Morton, TileOrder, View, WorkItem, covering, paired};
+use super::{Morton, Pairing, TileOrder};
 
 /// Z2 LRTA.
 pub struct Z2Lrta;
@@ -11,14 +11,7 @@ impl TileOrder for Z2Lrta {
         Morton.curve(tiles)
     }
 
-    fn stereo(&self, left: View, right: View) -> Vec<WorkItem> {
-        paired(
-            left,
-            right,
-            &self.curve(covering(left, right)),
-            |l, r, items| {
-                items.extend([WorkItem::Tile(l), WorkItem::Tile(r)]);
-            },
-        )
+    fn pairing(&self) -> Pairing {
+        Pairing::InTurn
     }
 }

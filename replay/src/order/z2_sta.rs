@@ -1,7 +1,7 @@
 //! Z2 simultaneous tile access (Z2 paper section 3): the tile pair goes to one core, which renders
 //! the triangles of the two lists in turn.
 
-use super::{Interleave, Morton, TileOrder, View, WorkItem, covering, paired};
+use super::{Interleave, Morton, Pairing, TileOrder};
 
 /// Z2 STA.
 pub struct Z2Sta;
@@ -11,14 +11,7 @@ impl TileOrder for Z2Sta {
         Morton.curve(tiles)
     }
 
-    fn stereo(&self, left: View, right: View) -> Vec<WorkItem> {
-        paired(
-            left,
-            right,
-            &self.curve(covering(left, right)),
-            |l, r, items| {
-                items.push(WorkItem::Pair(l, r, Interleave::Alternate));
-            },
-        )
+    fn pairing(&self) -> Pairing {
+        Pairing::OneCore(Interleave::Alternate)
     }
 }

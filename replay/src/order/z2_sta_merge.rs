@@ -1,7 +1,7 @@
 //! Z2 STA with the two triangle lists merged by primitive number: the same triangle is rendered
 //! for both eyes back to back, even where one eye sees triangles that the other does not.
 
-use super::{Interleave, Morton, TileOrder, View, WorkItem, covering, paired};
+use super::{Interleave, Morton, Pairing, TileOrder};
 
 /// Z2 STA, lists merged.
 pub struct Z2StaMerge;
@@ -11,14 +11,7 @@ impl TileOrder for Z2StaMerge {
         Morton.curve(tiles)
     }
 
-    fn stereo(&self, left: View, right: View) -> Vec<WorkItem> {
-        paired(
-            left,
-            right,
-            &self.curve(covering(left, right)),
-            |l, r, items| {
-                items.push(WorkItem::Pair(l, r, Interleave::Merge));
-            },
-        )
+    fn pairing(&self) -> Pairing {
+        Pairing::OneCore(Interleave::Merge)
     }
 }

@@ -1,22 +1,28 @@
 //! The one look of every plot: colours, type, strokes, and where labels may stand.
 //!
-//! Colours are Okabe and Ito's ("Color Universal Design", 2008), which stay apart under the common
-//! kinds of colour blindness. Inks and grid are sentinel colours that the page's style sheet maps
-//! to a dark scheme (see `html/style.css`), so one SVG serves both.
+//! Inks and grid are sentinel colours that the page's style sheet maps to a dark scheme (see
+//! `html/style.css`), so one SVG serves both.
 
+use crate::palette::{self, Rgb};
 use plotters::style::RGBColor;
 
-/// A sequence of series colours; index 7 is the neutral one.
+/// A sequence of series colours; the last is the neutral one.
 pub const SERIES: [RGBColor; 8] = [
-    RGBColor(0xE6, 0x9F, 0x00), // orange
-    RGBColor(0x56, 0xB4, 0xE9), // sky blue
-    RGBColor(0x00, 0x72, 0xB2), // blue
-    RGBColor(0x00, 0x9E, 0x73), // bluish green
-    RGBColor(0xD5, 0x5E, 0x00), // vermilion
-    RGBColor(0xCC, 0x79, 0xA7), // reddish purple
-    RGBColor(0xC9, 0xB8, 0x1A), // yellow, darkened to be seen on white
-    RGBColor(0x80, 0x86, 0x8E), // grey
+    color(palette::ORANGE),
+    color(palette::SKY_BLUE),
+    color(palette::BLUE),
+    color(palette::GREEN),
+    color(palette::VERMILION),
+    color(palette::PURPLE),
+    color(palette::YELLOW),
+    color(palette::GREY),
 ];
+
+/// The plotting library's form of a colour.
+#[must_use]
+pub const fn color([red, green, blue]: Rgb) -> RGBColor {
+    RGBColor(red, green, blue)
+}
 
 /// Text.
 pub const INK: RGBColor = RGBColor(0x1F, 0x23, 0x28);
@@ -39,21 +45,6 @@ pub const LABEL_PX: u32 = 12;
 pub const TICK_PX: u32 = 11;
 /// Series strokes, px.
 pub const LINE_PX: u32 = 2;
-
-/// Colour of a tile order, the same in every plot.
-#[must_use]
-pub fn order_color(order: &str) -> RGBColor {
-    match order {
-        "morton" => SERIES[0],
-        "z2-lrta" => SERIES[1],
-        "z2-sta" => SERIES[2],
-        "z2-sta-merge" => SERIES[3],
-        "scanline" => SERIES[4],
-        "zig-zag" => SERIES[5],
-        "hilbert" => SERIES[6],
-        _ => SERIES[7],
-    }
-}
 
 /// Width in pixels that `text` takes at `size_px`, a little on the safe side.
 ///

@@ -3,7 +3,8 @@
 use super::plan::{Axis, Experiment, Point, plain};
 use super::run::SweepOutcome;
 use super::store::point_key;
-use crate::config::{OrderKind, RunConfig};
+use crate::config::{Order, RunConfig};
+use crate::palette;
 use crate::report::csv::Csv;
 use crate::report::html::table::{Column, Table};
 use crate::report::html::{self, Section, figures, folded};
@@ -120,7 +121,7 @@ impl SweepReport {
 }
 
 fn is_morton_of(candidate: &Point, point: &Point) -> bool {
-    candidate.config.order == OrderKind::Morton
+    candidate.config.order == Order::MORTON
         && candidate
             .settings
             .iter()
@@ -284,7 +285,7 @@ impl<'a> Lookup<'a> {
         }
         let style = |o: &Value| SeriesStyle {
             name: plain(o),
-            color: theme::order_color(&plain(o)),
+            color: theme::color(Order::find(&plain(o)).map_or(palette::GREY, Order::color)),
         };
         self.orders.iter().map(style).collect()
     }

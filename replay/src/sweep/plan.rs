@@ -368,7 +368,7 @@ fn parsed(table: &Table) -> Result<RunConfig, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Mode, OrderKind};
+    use crate::config::{Mode, Order};
 
     const FILE: &str = "traces = [\"a.textrace\"]\n\n[base]\nmode = \"functional\"\n\n[axes]\norder = [\"morton\", \"z2-sta\"]\nl1.size_bytes = [\"8KiB\", \"16KiB\"]\n\n[one-at-a-time]\nlayout.block_order = [\"morton\"]\n";
 
@@ -383,7 +383,7 @@ mod tests {
             "order=z2-sta l1.size_bytes=16KiB layout.block_order=morton"
         );
         assert!(points.iter().all(|p| p.config.mode == Mode::Functional));
-        assert_eq!(points[3].config.order, OrderKind::Z2Sta);
+        assert_eq!(points[3].config.order, Order::Z2_STA);
         assert_eq!(points[3].config.l1.size_bytes, 16 << 10);
         assert_eq!(points[3].config.l1.ways, 4);
     }

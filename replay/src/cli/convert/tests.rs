@@ -1,6 +1,6 @@
 use super::*;
 use crate::cli::testing::{file_of, lines};
-use crate::config::{Mode, OrderKind};
+use crate::config::{Mode, Order};
 use crate::engine::synthetic::Synthetic;
 use crate::engine::{MemoryTrace, replay};
 use clap::Parser;
@@ -43,7 +43,7 @@ fn din_holds_the_look_ups_that_run_counts() {
     let memory = small();
     let file = file_of(&memory);
     let trace = Textrace::open(file.path()).unwrap();
-    for order in [OrderKind::Morton, OrderKind::Z2Sta, OrderKind::Z2StaMerge] {
+    for order in [Order::MORTON, Order::Z2_STA, Order::Z2_STA_MERGE] {
         for line_bytes in [16, 64] {
             let config = RunConfig {
                 mode: Mode::Functional,
@@ -79,9 +79,9 @@ fn every_order_writes_the_same_accesses() {
         addresses.sort_unstable();
         addresses
     };
-    let reference = sorted(OrderKind::Scanline);
+    let reference = sorted(Order::SCANLINE);
     assert!(!reference.is_empty());
-    for order in OrderKind::ALL {
+    for order in Order::all() {
         assert!(sorted(order) == reference, "{}", order.name());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::model::{PaperReport, Run, TraceInfo};
 use super::plots::MAPPED_ORDERS;
-use crate::config::{Mode, OrderKind, RunConfig};
+use crate::config::{Mode, Order, RunConfig};
 use crate::engine::{ReplayError, TileSource, replay};
 use crate::paper::z2_twin;
 use crate::result::TraceId;
@@ -30,7 +30,7 @@ pub struct Plan {
     /// L1 and L2 size in bytes.
     pub caches_bytes: Vec<(u64, u64)>,
     /// Orders; Morton first, since the others are held against it.
-    pub orders: Vec<OrderKind>,
+    pub orders: Vec<Order>,
     /// Also run every point in functional mode.
     pub functional: bool,
     /// Keep per-tile maps of the first cache configuration for the orders that are drawn.

@@ -1,6 +1,6 @@
 //! The rows of the experiment, their averages and their checks, as plain data (`replay.paper/1`).
 
-use crate::config::{OrderKind, RunConfig};
+use crate::config::{Order, RunConfig};
 use crate::paper::{z2_row, z2_table};
 use crate::result::{Part, RunResult, TileMap, TraceId};
 use crate::tmu::closed_form as closed_form_utilization;
@@ -61,7 +61,7 @@ pub struct Row {
     /// L2 size in KiB.
     pub l2_kib: f64,
     /// Order.
-    pub order: OrderKind,
+    pub order: Order,
     /// The figures.
     #[serde(flatten)]
     pub figures: Figures,
@@ -117,7 +117,7 @@ pub struct Average {
     /// A scene's label, or `all scenes`.
     pub scene: String,
     /// Order.
-    pub order: OrderKind,
+    pub order: Order,
     /// Mean traffic saved against Morton, percent.
     pub reduction_pct: f64,
     /// Mean utilisation over Morton's; none in functional mode.
@@ -162,7 +162,7 @@ pub struct Detail {
     /// L2 size in KiB.
     pub l2_kib: f64,
     /// Order.
-    pub order: OrderKind,
+    pub order: Order,
     /// By view.
     pub by_view: Vec<Part>,
     /// By texture.
@@ -229,7 +229,7 @@ impl PaperReport {
 
     /// The orders of the experiment in order of appearance.
     #[must_use]
-    pub fn orders(&self) -> Vec<OrderKind> {
+    pub fn orders(&self) -> Vec<Order> {
         unique(self.rows.iter().map(|r| r.order))
     }
 
@@ -241,7 +241,7 @@ impl PaperReport {
 
     /// The row of a scene, a cache configuration and an order.
     #[must_use]
-    pub fn row(&self, scene: &str, caches: (f64, f64), order: OrderKind) -> Option<&Row> {
+    pub fn row(&self, scene: &str, caches: (f64, f64), order: Order) -> Option<&Row> {
         self.rows
             .iter()
             .find(|r| r.scene == scene && (r.l1_kib, r.l2_kib) == caches && r.order == order)
@@ -264,7 +264,7 @@ fn caches_kib(config: &RunConfig) -> (f64, f64) {
 }
 
 /// The run of the same trace and caches with another order.
-fn sibling<'a>(runs: &'a [Run], of: &Run, order: OrderKind) -> Option<&'a Run> {
+fn sibling<'a>(runs: &'a [Run], of: &Run, order: Order) -> Option<&'a Run> {
     runs.iter().find(|r| {
         r.trace == of.trace
             && caches_kib(&r.config) == caches_kib(&of.config)
@@ -287,7 +287,7 @@ fn row(traces: &[TraceInfo], runs: &[Run], functional: &[Run], run: &Run) -> Row
     let (l1_kib, l2_kib) = caches_kib(&run.config);
     let order = run.config.order;
     let mb_per_frame = |bytes: f64| bytes / BYTES_PER_MB / f64::from(info.frames.max(1));
-    let morton = sibling(runs, run, OrderKind::Morton).map(|r| &r.result);
+    let morton = sibling(runs, run, Order::MORTON).map(|r| &r.result);
     let utilization = |r: &RunResult| r.tmu.as_ref().map(|t| t.utilization);
     let closed_form_util_pct = percent(closed_form_utilization(
         result.l1.miss_rate,
@@ -336,9 +336,9 @@ fn row(traces: &[TraceInfo], runs: &[Run], functional: &[Run], run: &Run) -> Row
 }
 
 /// The paper's figures for one of its scenes.
-fn published(twin: &str, l1_kib: f64, l2_kib: f64, order: OrderKind) -> Option<Figures> {
+fn published(twin: &str, l1_kib: f64, l2_kib: f64, order: Order) -> Option<Figures> {
     let row = |order| z2_row(twin, l1_kib as u32, l2_kib as u32, order);
-    let (ours, morton) = (row(order)?, row(OrderKind::Morton)?);
+    let (ours, morton) = (row(order)?, row(Order::MORTON)?);
     Some(Figures {
         l1_miss_pct: ours.l1_miss_pct,
         l2_miss_pct: ours.l2_miss_pct,
@@ -358,14 +358,14 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// Means a scene, then over all scenes if there are several, for every order but the baseline.
 fn averages(report: &PaperReport) -> Vec<Average> {
-    let paper: Vec<(&str, OrderKind, Figures)> = z2_table()
+    let paper: Vec<(&str, Order, Figures)> = z2_table()
         .iter()
         .filter_map(|r| {
             let figures = published(&r.scene, f64::from(r.l1_kib), f64::from(r.l2_kib), r.order)?;
             Some((r.scene.as_str(), r.order, figures))
         })
         .collect();
-    let average = |scene: Option<&TraceInfo>, order: OrderKind| {
+    let average = |scene: Option<&TraceInfo>, order: Order| {
         let rows = || {
             report
                 .rows
@@ -386,10 +386,10 @@ fn averages(report: &PaperReport) -> Vec<Average> {
             paper_tmu_ratio: mean(published().filter_map(|(_, _, f)| f.tmu_ratio)),
         })
     };
-    let orders: Vec<OrderKind> = report
+    let orders: Vec<Order> = report
         .orders()
         .into_iter()
-        .filter(|o| *o != OrderKind::Morton)
+        .filter(|o| *o != Order::MORTON)
         .collect();
     let overall = (report.traces.len() > 1).then_some(None);
     let scenes = report.traces.iter().map(Some).chain(overall);
@@ -478,10 +478,10 @@ mod tests {
     fn reductions_and_ratios_are_against_morton() {
         let report = report();
         let row = report
-            .row("crytek-sponza", (8.0, 128.0), OrderKind::Z2Sta)
+            .row("crytek-sponza", (8.0, 128.0), Order::Z2_STA)
             .unwrap();
         let morton = report
-            .row("crytek-sponza", (8.0, 128.0), OrderKind::Morton)
+            .row("crytek-sponza", (8.0, 128.0), Order::MORTON)
             .unwrap();
         let saved = 1.0 - row.external_bytes as f64 / morton.external_bytes as f64;
         assert!((row.figures.reduction_pct.unwrap() - 100.0 * saved).abs() < 1e-9);
@@ -493,7 +493,7 @@ mod tests {
     fn the_twins_published_row_stands_beside_ours() {
         let report = report();
         let row = report
-            .row("crytek-sponza", (16.0, 256.0), OrderKind::Z2Lrta)
+            .row("crytek-sponza", (16.0, 256.0), Order::Z2_LRTA)
             .unwrap();
         let paper = row.paper.unwrap();
         assert_eq!((paper.l1_miss_pct, paper.l2_miss_pct), (8.76, 54.81));

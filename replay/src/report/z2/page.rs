@@ -2,8 +2,8 @@
 
 use super::model::{Detail, PaperReport, TraceInfo};
 use super::plots::{self, MAPPED_ORDERS, TileMeasure};
-use super::tables::{self, order_title};
-use crate::config::Mode;
+use super::tables;
+use crate::config::{Mode, Order};
 use crate::report::html::{self, Section, figures, folded};
 use crate::report::picture::Picture;
 use crate::report::plots::PlotError;
@@ -77,7 +77,7 @@ fn in_short(report: &PaperReport) -> Markup {
         ul {
             @for mean in means {
                 li {
-                    (order_title(mean.order)) " against Morton, mean of " (last.scene) ": external traffic "
+                    (mean.order.title()) " against Morton, mean of " (last.scene) ": external traffic "
                     strong { (format!("{:+.1} %", -mean.reduction_pct)) }
                     @if let Some(ratio) = mean.tmu_ratio { ", texture-unit utilisation " strong { "\u{d7}" (format!("{ratio:.3}")) } }
                     @if let Some(paper) = mean.paper_reduction_pct {
@@ -308,7 +308,7 @@ fn textures(report: &PaperReport) -> Result<Markup, PlotError> {
 
 fn configuration(report: &PaperReport) -> Markup {
     let text = toml::to_string(&report.config).unwrap_or_default();
-    let orders: Vec<&str> = report.orders().into_iter().map(order_title).collect();
+    let orders: Vec<&str> = report.orders().into_iter().map(Order::title).collect();
     let caches: Vec<String> = report
         .caches_kib()
         .into_iter()

@@ -1,9 +1,9 @@
 //! The experiment's plots, made of the rows and details of the report.
 
 use super::model::{Detail, PaperReport, Row, TraceInfo};
-use super::tables::{busiest, caches_title, l1_miss_pct, l2_miss_pct, order_title};
-use crate::config::OrderKind;
-use crate::order::{View, WorkItem, by_kind};
+use super::tables::{busiest, caches_title, l1_miss_pct, l2_miss_pct};
+use crate::config::Order;
+use crate::order::{View, WorkItem};
 use crate::paper::z2_table;
 use crate::report::plots::bars::{BarChart, BarGroup};
 use crate::report::plots::contours::{ContourChart, PointSeries};
@@ -16,10 +16,10 @@ use crate::report::theme;
 use crate::result::{Part, TileMap};
 use crate::tmu::closed_form as closed_form_utilization;
 
-fn style(order: OrderKind) -> SeriesStyle {
+fn style(order: Order) -> SeriesStyle {
     SeriesStyle {
-        name: order_title(order).to_owned(),
-        color: theme::order_color(order.name()),
+        name: order.title().to_owned(),
+        color: theme::color(order.color()),
     }
 }
 
@@ -73,9 +73,8 @@ fn by_caches(
 pub fn bandwidth(report: &PaperReport, scene: &str) -> BarChart {
     let mark = |row: &Row| {
         let saved = row.paper?.reduction_pct?;
-        let morton = report.row(scene, (row.l1_kib, row.l2_kib), OrderKind::Morton)?;
-        (row.order != OrderKind::Morton)
-            .then_some(morton.external_mb_per_frame * (1.0 - saved / 100.0))
+        let morton = report.row(scene, (row.l1_kib, row.l2_kib), Order::MORTON)?;
+        (row.order != Order::MORTON).then_some(morton.external_mb_per_frame * (1.0 - saved / 100.0))
     };
     let label = "external texture traffic, MB per frame";
     by_caches(
@@ -325,7 +324,7 @@ pub enum TileMeasure {
 }
 
 /// Orders whose tile maps are drawn: the baseline and what the paper proposes.
-pub const MAPPED_ORDERS: [OrderKind; 2] = [OrderKind::Morton, OrderKind::Z2Sta];
+pub const MAPPED_ORDERS: [Order; 2] = [Order::MORTON, Order::Z2_STA];
 
 impl TileMeasure {
     /// Every measure, and whether it depends on the order.
@@ -376,7 +375,7 @@ pub fn heat_map(info: &TraceInfo, detail: &Detail, measure: TileMeasure) -> Opti
         .iter()
         .any(|(m, depends)| *m == measure && *depends);
     let order = if of_order {
-        format!(", {}", order_title(detail.order))
+        format!(", {}", detail.order.title())
     } else {
         String::new()
     };
@@ -390,9 +389,9 @@ pub fn heat_map(info: &TraceInfo, detail: &Detail, measure: TileMeasure) -> Opti
 
 /// An order's path over both eyes' grids of `tiles`.
 #[must_use]
-pub fn path(order: OrderKind, seed: u64, tiles: [u32; 2]) -> PathPlot {
+pub fn path(order: Order, seed: u64, tiles: [u32; 2]) -> PathPlot {
     let view = |pass| View { pass, tiles };
-    let items = by_kind(order, seed).stereo(view(0), view(1));
+    let items = order.build(seed).stereo(view(0), view(1));
     let mut stops = Vec::with_capacity(2 * tiles[0] as usize * tiles[1] as usize);
     for item in &items {
         for (i, tile) in item.tiles().enumerate() {
@@ -412,7 +411,7 @@ pub fn path(order: OrderKind, seed: u64, tiles: [u32; 2]) -> PathPlot {
         (false, false) => "the whole left view, then the right",
     };
     PathPlot {
-        title: order_title(order).to_owned(),
+        title: order.title().to_owned(),
         note: note.to_owned(),
         tiles,
         stops,
@@ -467,7 +466,7 @@ mod tests {
 
     #[test]
     fn a_path_visits_every_tile_of_both_eyes_once() {
-        for order in OrderKind::ALL {
+        for order in Order::all() {
             let path = path(order, 1, [8, 4]);
             let mut seen: Vec<(u32, u32, u32)> =
                 path.stops.iter().map(|s| (s.eye, s.x, s.y)).collect();

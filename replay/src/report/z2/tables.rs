@@ -5,22 +5,6 @@ use crate::report::csv::Csv;
 use crate::report::html::table::{Column, Table};
 use crate::result::Part;
 
-/// An order's name as the paper writes it.
-#[must_use]
-pub fn order_title(order: crate::config::OrderKind) -> &'static str {
-    use crate::config::OrderKind as O;
-    match order {
-        O::Scanline => "Scanline",
-        O::ZigZag => "Zig-zag",
-        O::Morton => "Morton",
-        O::Hilbert => "Hilbert",
-        O::Z2Lrta => "Z2 LRTA",
-        O::Z2Sta => "Z2 STA",
-        O::Z2StaMerge => "Z2 STA-merge",
-        O::Random => "Random",
-    }
-}
-
 /// `8/128`, both in KiB.
 #[must_use]
 pub fn caches_title((l1_kib, l2_kib): (f64, f64)) -> String {
@@ -65,7 +49,7 @@ pub fn table_2(report: &PaperReport) -> Table {
         table.push(vec![
             row.scene.clone(),
             caches_title((row.l1_kib, row.l2_kib)),
-            order_title(row.order).to_owned(),
+            row.order.title().to_owned(),
             number(Some(row.figures.l1_miss_pct), 2),
             number(Some(row.figures.l2_miss_pct), 2),
             number(row.figures.tmu_util_pct, 2),
@@ -103,7 +87,7 @@ pub fn averages(averages: &[Average]) -> Table {
         }
         table.push(vec![
             average.scene.clone(),
-            order_title(average.order).to_owned(),
+            average.order.title().to_owned(),
             number(Some(average.reduction_pct), 1),
             number(average.tmu_ratio, 3),
             number(average.paper_reduction_pct, 1),
@@ -140,7 +124,7 @@ pub fn modes(rows: &[Row]) -> Table {
         table.push(vec![
             row.scene.clone(),
             caches_title((row.l1_kib, row.l2_kib)),
-            order_title(row.order).to_owned(),
+            row.order.title().to_owned(),
             number(Some(row.figures.l1_miss_pct), 2),
             number(Some(functional.l1_miss_pct), 2),
             number(Some(row.figures.l2_miss_pct), 2),
@@ -165,7 +149,7 @@ pub fn bounds(report: &PaperReport) -> Table {
     columns.extend(
         orders
             .iter()
-            .map(|o| Column::number(order_title(*o), "\u{d7} bound")),
+            .map(|o| Column::number(o.title(), "\u{d7} bound")),
     );
     let mut table = Table::new(columns);
     for info in &report.traces {
@@ -201,7 +185,7 @@ pub fn parts(
 ) -> Table {
     let mut columns = vec![Column::text(what), Column::number("footprints", "millions")];
     for detail in details {
-        let order = order_title(detail.order);
+        let order = detail.order.title();
         columns.push(Column::number(format!("L1 miss {order}"), "%"));
         columns.push(Column::number(format!("L2 miss {order}"), "%"));
         columns.push(Column::number(format!("external {order}"), "1000 lines"));

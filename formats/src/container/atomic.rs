@@ -1,0 +1,286 @@
+//! Output files that appear under their name whole or not at all.
+
+use std::collections::BTreeSet;
+use std::fs::{self, Metadata};
+use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tempfile::NamedTempFile;
+
+/// Temporary files that a signal handler has to remove. Files are made, renamed and removed with
+/// the lock held, so that none is missed.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes every unfinished file of this process, which has to end after it: no output can be
+/// started or finished any more, and threads that try to wait forever.
+pub fn discard_unfinished() {
+    let files = unfinished();
+    for file in &*files {
+        // Whatever cannot be removed now cannot be helped.
+        let _gone = fs::remove_file(file);
+    }
+    std::mem::forget(files);
+}
+
+/// True if an output is standard output, which `-` names; a file of that name is `./-`.
+#[must_use]
+pub fn is_stdout(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// A file that appears under its name only once it is complete; dropped before, it leaves
+/// nothing behind. It replaces regular files only, and keeps their permissions.
+///
+/// The target `-` is standard output: what was written is copied there when it is complete.
+#[derive(Debug)]
+pub struct AtomicFile {
+    // Removed before it is taken off the list.
+    writer: BufWriter<NamedTempFile>,
+    _listed: Listed,
+    target: PathBuf,
+}
+
+/// An entry of [`UNFINISHED`].
+#[derive(Debug)]
+struct Listed(PathBuf);
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        unfinished().remove(&self.0);
+    }
+}
+
+impl AtomicFile {
+    /// Opens a temporary file beside `target`.
+    ///
+    /// # Errors
+    /// Those of [`check_target`].
+    pub fn create(target: &Path) -> io::Result<Self> {
+        if !is_stdout(target) {
+            check_name(target)?;
+        }
+        let mut files = unfinished();
+        let file = temporary(target)?;
+        let path = file.path().to_owned();
+        files.insert(path.clone());
+        Ok(Self {
+            writer: BufWriter::with_capacity(1 << 20, file),
+            _listed: Listed(path),
+            target: target.to_owned(),
+        })
+    }
+
+    /// Writes a whole file.
+    ///
+    /// # Errors
+    /// When it cannot be written; the target is then untouched.
+    pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
+        let mut file = Self::create(target)?;
+        file.write_all(bytes)?;
+        file.persist()
+    }
+
+    /// Flushes and renames the file over its target.
+    ///
+    /// # Errors
+    /// When either fails; the target is then untouched.
+    pub fn persist(self) -> io::Result<()> {
+        let mut file = self.writer.into_inner().map_err(io::Error::from)?;
+        if is_stdout(&self.target) {
+            file.seek(SeekFrom::Start(0))?;
+            let mut stdout = io::stdout().lock();
+            io::copy(&mut file, &mut stdout)?;
+            return stdout.flush();
+        }
+        if let Some(replaced) = check_name(&self.target)? {
+            file.as_file().set_permissions(replaced.permissions())?;
+        }
+        let _held = unfinished();
+        file.persist(&self.target)?;
+        Ok(())
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Seek for AtomicFile {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.writer.seek(position)
+    }
+}
+
+/// Tells whether an [`AtomicFile`] could be written to `target`, without leaving anything there.
+///
+/// # Errors
+/// What stands there is no regular file (a folder, a device, a pipe, a symbolic link, ...) or may
+/// not be written, or its folder does not exist or may not be written.
+pub fn check_target(target: &Path) -> io::Result<()> {
+    if !is_stdout(target) {
+        check_name(target)?;
+        let _held = unfinished();
+        temporary(target)?;
+    }
+    Ok(())
+}
+
+/// The regular file that `target` would replace, if there is one.
+fn check_name(target: &Path) -> io::Result<Option<Metadata>> {
+    let refuse = |expected: &str, found: String| {
+        let message = format!("expected {expected}, found {found}");
+        Err(io::Error::new(ErrorKind::InvalidInput, message))
+    };
+    let is_folder_name = target.as_os_str().as_encoded_bytes().ends_with(b"/");
+    if target.file_name().is_none() || is_folder_name {
+        return refuse("the name of a file", format!("\"{}\"", target.display()));
+    }
+    let folder = folder_of(target);
+    if !folder.is_dir() {
+        return refuse(&format!("a folder {}", folder.display()), "none".to_owned());
+    }
+    let found = match fs::symlink_metadata(target) {
+        Ok(found) => found,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    if found.is_symlink() {
+        let to = fs::read_link(target).unwrap_or_default();
+        let found = format!("a symbolic link to {}", to.display());
+        return refuse("a regular file or a new name", found);
+    }
+    if !found.is_file() {
+        return refuse("a regular file or a new name", kind_of(&found).to_owned());
+    }
+    if found.permissions().readonly() {
+        return refuse("a file that may be written", "a read-only one".to_owned());
+    }
+    // Replacing a file takes rights on its folder alone, but whoever may not write it should not.
+    fs::OpenOptions::new().write(true).open(target)?;
+    Ok(Some(found))
+}
+
+fn kind_of(found: &Metadata) -> &'static str {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = found.file_type();
+        if kind.is_char_device() || kind.is_block_device() {
+            return "a device";
+        }
+        if kind.is_fifo() {
+            return "a pipe";
+        }
+        if kind.is_socket() {
+            return "a socket";
+        }
+    }
+    if found.is_dir() {
+        "a folder"
+    } else {
+        "something else"
+    }
+}
+
+fn folder_of(target: &Path) -> &Path {
+    match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// A temporary file on the file system of `target`, with the permissions of any new file.
+fn temporary(target: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".").suffix(".part");
+    #[cfg(unix)]
+    {
+        // Temporary files are private otherwise; the umask still applies.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    if is_stdout(target) {
+        builder.tempfile()
+    } else {
+        builder.tempfile_in(folder_of(target))
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    fn mode(path: &Path) -> u32 {
+        fs::metadata(path).unwrap().permissions().mode() & 0o7777
+    }
+
+    fn refused(path: &Path) -> String {
+        let error = check_target(path).unwrap_err().to_string();
+        assert_eq!(
+            AtomicFile::create(path).unwrap_err().to_string(),
+            error,
+            "checked and created differently"
+        );
+        error
+    }
+
+    #[test]
+    fn a_file_is_replaced_whole_with_its_permissions_and_nothing_else_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        fs::write(&path, "old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+        check_target(&path).unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        file.persist().unwrap();
+        assert_eq!(
+            (fs::read(&path).unwrap(), mode(&path)),
+            (b"new".to_vec(), 0o640)
+        );
+        drop(AtomicFile::create(&path).unwrap());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_is_no_regular_file_is_refused_by_its_kind() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("file"), "").unwrap();
+        symlink("file", at("link")).unwrap();
+        let _socket = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
+        let name = "expected a regular file or a new name, found";
+        assert_eq!(
+            refused(&at("link")),
+            format!("{name} a symbolic link to file")
+        );
+        assert_eq!(refused(&at("socket")), format!("{name} a socket"));
+        assert_eq!(refused(folder.path()), format!("{name} a folder"));
+        assert_eq!(refused(Path::new("/dev/null")), format!("{name} a device"));
+        assert!(refused(&at("new/")).contains("the name of a file"));
+        assert!(refused(Path::new("")).contains("the name of a file"));
+        assert!(refused(&at("none/a")).ends_with("none, found none"));
+        assert!(refused(&at("file/a")).ends_with("file, found none"));
+    }
+
+    #[test]
+    fn a_read_only_file_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        fs::write(&path, "old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o444)).unwrap();
+        assert!(refused(&path).ends_with("found a read-only one"));
+    }
+}

@@ -1,0 +1,59 @@
+//! Text from files, made fit for a terminal.
+
+use std::borrow::Cow;
+
+/// The text with every character escaped that steers a terminal or turns the reading direction:
+/// control characters (C0, DEL, C1), line separators and bidirectional marks.
+///
+/// Names of materials, cameras, files and passes pass through here before they are stored in a
+/// scene or shown in a message.
+#[must_use]
+pub fn printable(text: &str) -> Cow<'_, str> {
+    escaped(text, steers)
+}
+
+/// [`printable`] for whole messages, which may have several lines and tabs.
+#[must_use]
+pub fn printable_lines(message: &str) -> Cow<'_, str> {
+    escaped(message, |c| steers(c) && c != '\n' && c != '\t')
+}
+
+fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(&is_bad) {
+        return Cow::Borrowed(text);
+    }
+    let mut escaped = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if is_bad(c) {
+            escaped.extend(c.escape_default());
+        } else {
+            escaped.push(c);
+        }
+    }
+    Cow::Owned(escaped)
+}
+
+fn steers(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}')
+        || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_steers_a_terminal_is_escaped_and_the_rest_stays() {
+        for (text, expected) in [
+            ("Größe 漢字 #25", "Größe 漢字 #25"),
+            ("a\x1b[31mb", "a\\u{1b}[31mb"),
+            ("a\nb\tc\r", "a\\nb\\tc\\r"),
+            ("\u{9b}2J\u{7f}", "\\u{9b}2J\\u{7f}"),
+            ("gpj.\u{202e}x", "gpj.\\u{202e}x"),
+        ] {
+            assert_eq!(printable(text), expected);
+        }
+        assert_eq!(printable_lines("a\r\n\tb"), "a\\r\n\tb");
+    }
+}

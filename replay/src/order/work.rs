@@ -1,0 +1,59 @@
+//! Units of work: tiles, pairs of tiles, and the views that they belong to.
+
+/// A tile of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TileRef {
+    /// Index of the pass in the trace.
+    pub pass: u32,
+    /// Tile number, row by row.
+    pub tile: u32,
+}
+
+/// How the triangle lists of two tiles become one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interleave {
+    /// One of the left, one of the right, in turn; then the rest of the longer list.
+    Alternate,
+    /// By primitive number, left first, so that the same triangle is adjacent.
+    Merge,
+}
+
+/// What a core is given at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WorkItem {
+    /// One tile.
+    Tile(TileRef),
+    /// Two tiles rendered together on one core.
+    Pair(TileRef, TileRef, Interleave),
+}
+
+impl WorkItem {
+    /// The tiles of the item, the first one first.
+    pub fn tiles(&self) -> impl Iterator<Item = TileRef> {
+        let (first, second) = match *self {
+            Self::Tile(tile) => (tile, None),
+            Self::Pair(left, right, _) => (left, Some(right)),
+        };
+        std::iter::once(first).chain(second)
+    }
+}
+
+/// A view to traverse: a pass and its tile grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct View {
+    /// Index of the pass in the trace.
+    pub pass: u32,
+    /// Tile columns and rows.
+    pub tiles: [u32; 2],
+}
+
+impl View {
+    /// The tile at a column and row, if the grid has it.
+    #[must_use]
+    pub fn tile(&self, [x, y]: [u32; 2]) -> Option<TileRef> {
+        (x < self.tiles[0] && y < self.tiles[1]).then(|| TileRef {
+            pass: self.pass,
+            tile: y * self.tiles[0] + x,
+        })
+    }
+}

@@ -1,0 +1,136 @@
+//! Things that a user picks by name (tile orders, replacement policies): a table with a row each.
+//!
+//! The table is all there is to edit. Names in configurations and results, the values and help of
+//! command-line flags and the list in error messages are derived from it.
+
+use clap::builder::PossibleValue;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::fmt;
+use std::hash::{Hash, Hasher};
+
+/// A row of a table.
+pub trait Row: fmt::Debug + Sized + 'static {
+    /// Name in configurations, results and flags; unique in its table.
+    fn name(&self) -> &'static str;
+    /// One line of help.
+    fn help(&self) -> &'static str;
+    /// The whole table, in the order in which it is shown.
+    fn table() -> &'static [Named<Self>];
+    /// The table's names, in the same order.
+    fn names() -> &'static [&'static str];
+}
+
+/// A row, by reference. Written and read by its name.
+#[derive(Debug)]
+pub struct Named<R: 'static>(&'static R);
+
+impl<R: Row> Named<R> {
+    /// The handle of a row.
+    pub const fn new(row: &'static R) -> Self {
+        Self(row)
+    }
+
+    /// Every row, in the order of the table.
+    pub fn all() -> impl ExactSizeIterator<Item = Self> {
+        R::table().iter().copied()
+    }
+
+    /// The row of that name.
+    #[must_use]
+    pub fn find(name: &str) -> Option<Self> {
+        Self::all().find(|row| row.name() == name)
+    }
+
+    /// Name as in configurations, results and flags.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.0.name()
+    }
+
+    /// What the row holds.
+    pub(crate) const fn row(self) -> &'static R {
+        self.0
+    }
+}
+
+impl<R> Clone for Named<R> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R> Copy for Named<R> {}
+
+impl<R: Row> PartialEq for Named<R> {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+    }
+}
+
+impl<R: Row> Eq for Named<R> {}
+
+impl<R: Row> Hash for Named<R> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.name().hash(state);
+    }
+}
+
+impl<R: Row> Serialize for Named<R> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de, R: Row> Deserialize<'de> for Named<R> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Self::find(&name).ok_or_else(|| de::Error::unknown_variant(&name, R::names()))
+    }
+}
+
+impl<R: Row> clap::ValueEnum for Named<R> {
+    fn value_variants<'a>() -> &'a [Self] {
+        R::table()
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(self.0.help()))
+    }
+}
+
+/// Makes a table of rows of one type, which has the fields `name` and `help`: a constant of the
+/// handle for each, and [`Row`].
+macro_rules! registry {
+    ($row:ty: $($(#[$only:meta])* $id:ident = $value:expr;)+) => {
+        impl $crate::registry::Named<$row> {
+            $(
+                $(#[$only])*
+                #[doc = concat!("`", stringify!($id), "` of the table.")]
+                pub const $id: Self = Self::new(&$value);
+            )+
+        }
+
+        impl $crate::registry::Row for $row {
+            fn name(&self) -> &'static str {
+                self.name
+            }
+
+            fn help(&self) -> &'static str {
+                self.help
+            }
+
+            fn table() -> &'static [$crate::registry::Named<Self>] {
+                const TABLE: &[$crate::registry::Named<$row>] =
+                    &[$($(#[$only])* <$crate::registry::Named<$row>>::$id),+];
+                TABLE
+            }
+
+            fn names() -> &'static [&'static str] {
+                const NAMES: &[&str] =
+                    &[$($(#[$only])* <$crate::registry::Named<$row>>::$id.row().name),+];
+                NAMES
+            }
+        }
+    };
+}
+pub(crate) use registry;

@@ -1,0 +1,322 @@
+//! Columns: what a row's figures are called, how they are written, and how they are got.
+//!
+//! A row type lists its columns once ([`Row`]); the terminal table, the page's table and CSV
+//! ([`Table`](super::table::Table)) and the JSON object ([`Record`]) walk that list.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use std::borrow::Cow;
+
+/// A cell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Value {
+    /// Nothing: an empty cell, `null` in JSON.
+    #[default]
+    None,
+    /// Text.
+    Text(String),
+    /// A count.
+    Whole(u64),
+    /// A measure.
+    Real(f64),
+}
+
+impl From<String> for Value {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<&str> for Value {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<u64> for Value {
+    fn from(count: u64) -> Self {
+        Self::Whole(count)
+    }
+}
+
+impl From<f64> for Value {
+    fn from(measure: f64) -> Self {
+        Self::Real(measure)
+    }
+}
+
+impl<T: Into<Self>> From<Option<T>> for Value {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::None, Into::into)
+    }
+}
+
+impl Value {
+    /// The number, if it is one.
+    #[must_use]
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Whole(n) => Some(*n as f64),
+            Self::Real(x) => Some(*x),
+            Self::None | Self::Text(_) => None,
+        }
+    }
+
+    /// In full precision, for CSV.
+    #[must_use]
+    pub fn exact(&self) -> String {
+        match self {
+            Self::None => String::new(),
+            Self::Text(text) => text.clone(),
+            Self::Whole(n) => n.to_string(),
+            Self::Real(x) => x.to_string(),
+        }
+    }
+}
+
+impl Serialize for Value {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::None => serializer.serialize_none(),
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Whole(n) => serializer.serialize_u64(*n),
+            Self::Real(x) => serializer.serialize_f64(*x),
+        }
+    }
+}
+
+/// How a table writes a column's values. CSV and JSON have them in full.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Show {
+    /// As it is, flush left.
+    Text,
+    /// A count, thousands apart.
+    Whole,
+    /// With this many decimals.
+    Decimals(usize),
+    /// In millions, with this many decimals.
+    Millions(usize),
+}
+
+impl Show {
+    /// The cell of a table.
+    #[must_use]
+    pub fn write(self, value: &Value) -> String {
+        let fixed = |x: f64, decimals: usize| {
+            // A negative zero, or what rounds to it, prints without a sign.
+            let text = format!("{x:.decimals$}");
+            match text.strip_prefix('-') {
+                Some(rest) if rest.bytes().all(|b| matches!(b, b'0' | b'.')) => rest.to_owned(),
+                _ => text,
+            }
+        };
+        match (self, value.number()) {
+            (Self::Whole, Some(_)) => super::theme::group_thousands(&value.exact()),
+            (Self::Decimals(decimals), Some(x)) => fixed(x, decimals),
+            (Self::Millions(decimals), Some(x)) => fixed(x * 1e-6, decimals),
+            _ => value.exact(),
+        }
+    }
+}
+
+/// A column without its values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Heading {
+    /// Name in CSV and JSON. A dot nests in JSON (`paper.l1_miss_pct`) and is `_` in CSV.
+    pub key: Cow<'static, str>,
+    /// Heading of a table.
+    pub name: Cow<'static, str>,
+    /// Unit, empty where there is none.
+    pub unit: &'static str,
+    /// How a table writes the values.
+    pub show: Show,
+    /// What the figure is, for charts and for the page's notes; may be empty.
+    pub about: &'static str,
+    /// Holds published figures, set in a lighter ink.
+    pub published: bool,
+}
+
+/// A column of rows of type `R`.
+pub struct Column<'a, R: ?Sized> {
+    /// What it is called and how it is written.
+    pub heading: Heading,
+    value: Box<dyn Fn(&R) -> Value + 'a>,
+}
+
+impl<'a, R: ?Sized> Column<'a, R> {
+    /// A column; `show` and `unit` say how numbers are written.
+    pub fn new<V: Into<Value>>(
+        key: impl Into<Cow<'static, str>>,
+        name: impl Into<Cow<'static, str>>,
+        unit: &'static str,
+        show: Show,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        Self {
+            heading: Heading {
+                key: key.into(),
+                name: name.into(),
+                unit,
+                show,
+                about: "",
+                published: false,
+            },
+            value: Box::new(move |row| value(row).into()),
+        }
+    }
+
+    /// A column of text.
+    pub fn text<V: Into<Value>>(
+        key: impl Into<Cow<'static, str>>,
+        name: impl Into<Cow<'static, str>>,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        Self::new(key, name, "", Show::Text, value)
+    }
+
+    /// A column of measures with this many decimals.
+    pub fn real<V: Into<Value>>(
+        key: impl Into<Cow<'static, str>>,
+        name: impl Into<Cow<'static, str>>,
+        unit: &'static str,
+        decimals: usize,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        Self::new(key, name, unit, Show::Decimals(decimals), value)
+    }
+
+    /// Says what the figure is.
+    #[must_use]
+    pub fn about(mut self, about: &'static str) -> Self {
+        self.heading.about = about;
+        self
+    }
+
+    /// Marks published figures.
+    #[must_use]
+    pub fn published(mut self) -> Self {
+        self.heading.published = true;
+        self
+    }
+
+    /// The cell of a row.
+    pub fn value(&self, row: &R) -> Value {
+        (self.value)(row)
+    }
+}
+
+/// A row type: its columns are listed once, in the order of CSV and JSON.
+pub trait Row {
+    /// Every column.
+    fn columns() -> Vec<Column<'static, Self>>;
+}
+
+/// The columns with these keys, in the order of `keys`. A key that no column has is left out;
+/// debug builds stop at it.
+#[must_use]
+pub fn pick<R: Row>(keys: &[&str]) -> Vec<Column<'static, R>> {
+    let mut all: Vec<Option<Column<R>>> = R::columns().into_iter().map(Some).collect();
+    let mut take = |key: &&str| {
+        let found = all
+            .iter_mut()
+            .find(|c| c.as_ref().is_some_and(|c| c.heading.key == *key));
+        debug_assert!(found.is_some(), "no column `{key}`");
+        found.and_then(Option::take)
+    };
+    keys.iter().filter_map(&mut take).collect()
+}
+
+/// A row as a JSON object of the given columns.
+pub struct Record<'a, 'c, R: ?Sized> {
+    /// Columns, those with the same prefix side by side.
+    pub columns: &'a [Column<'c, R>],
+    /// The row.
+    pub row: &'a R,
+}
+
+impl<R: ?Sized> Serialize for Record<'_, '_, R> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let cells: Vec<(&str, Value)> = self
+            .columns
+            .iter()
+            .map(|c| (c.heading.key.as_ref(), c.value(self.row)))
+            .collect();
+        let prefix = |key: &str| key.split_once('.').map(|(first, _)| first.to_owned());
+        let mut map = serializer.serialize_map(None)?;
+        for group in cells.chunk_by(|a, b| prefix(a.0).is_some() && prefix(a.0) == prefix(b.0)) {
+            match prefix(group[0].0) {
+                None => map.serialize_entry(group[0].0, &group[0].1)?,
+                Some(name) if group.iter().all(|(_, v)| *v == Value::None) => {
+                    map.serialize_entry(&name, &())?;
+                }
+                Some(name) => {
+                    let inner: serde_json::Map<String, serde_json::Value> = group
+                        .iter()
+                        .map(|(key, value)| {
+                            (key[name.len() + 1..].to_owned(), serde_json::json!(value))
+                        })
+                        .collect();
+                    map.serialize_entry(&name, &inner)?;
+                }
+            }
+        }
+        map.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Point {
+        misses: u64,
+        paper: Option<f64>,
+    }
+
+    impl Row for Point {
+        fn columns() -> Vec<Column<'static, Self>> {
+            vec![
+                Column::new("misses", "misses", "M", Show::Millions(1), |p: &Self| {
+                    p.misses
+                }),
+                Column::real("paper.rate", "paper", "%", 2, |p: &Self| p.paper).published(),
+                Column::real("paper.half", "half", "%", 2, |p: &Self| {
+                    p.paper.map(|x| x / 2.0)
+                }),
+            ]
+        }
+    }
+
+    fn json(point: &Point) -> String {
+        let record = Record {
+            columns: &Point::columns(),
+            row: point,
+        };
+        serde_json::to_string(&record).unwrap()
+    }
+
+    #[test]
+    fn keys_with_dots_nest_in_json_and_an_empty_group_is_null() {
+        let (with, without) = (Some(3.0), None);
+        let point = |paper| Point { misses: 7, paper };
+        assert_eq!(
+            json(&point(with)),
+            r#"{"misses":7,"paper":{"rate":3.0,"half":1.5}}"#
+        );
+        assert_eq!(json(&point(without)), r#"{"misses":7,"paper":null}"#);
+    }
+
+    #[test]
+    fn columns_are_picked_in_the_order_asked_for() {
+        let picked = pick::<Point>(&["paper.half", "misses"]);
+        let names: Vec<_> = picked.iter().map(|c| c.heading.name.as_ref()).collect();
+        assert_eq!(names, ["half", "misses"]);
+    }
+
+    #[test]
+    fn a_table_rounds_and_what_rounds_to_zero_has_no_sign() {
+        assert_eq!(Show::Decimals(1).write(&Value::Real(-0.04)), "0.0");
+        assert_eq!(Show::Decimals(1).write(&Value::Real(-0.06)), "-0.1");
+        assert_eq!(Show::Millions(2).write(&Value::Whole(1_234_567)), "1.23");
+        assert_eq!(Show::Decimals(1).write(&Value::None), "");
+    }
+}
