@@ -16,6 +16,7 @@ pub mod text;
 pub mod textrace;
 pub mod texture;
 mod tiles;
+mod trace;
 mod varint;
 pub mod view;
 
@@ -23,3 +24,4 @@ pub mod view;
 mod spec;
 
 pub use error::{Broken, FormatError, Result};
+pub use trace::Trace;
