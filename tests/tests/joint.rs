@@ -1,21 +1,13 @@
-//! The trace file is the only joint: `replay` knows nothing of capture or of a GPU.
+//! The arrows between the rooms: who depends on whom, as `cargo tree` tells.
 
 use std::process::Command;
 
-#[test]
-fn replay_depends_neither_on_tracegen_nor_on_a_gpu() {
+/// Names of the packages that `package` is built from, itself first.
+fn tree(package: &str) -> Vec<String> {
+    let arguments = ["tree", "-p", package, "-e", "normal", "--prefix", "none"];
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args([
-            "tree",
-            "-p",
-            "replay",
-            "-e",
-            "normal",
-            "--prefix",
-            "none",
-            "--offline",
-            "--locked",
-        ])
+        .args(arguments)
+        .args(["--offline", "--locked"])
         .current_dir(parallax_tests::root())
         .output()
         .expect("cargo runs");
@@ -24,12 +16,55 @@ fn replay_depends_neither_on_tracegen_nor_on_a_gpu() {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let tree = String::from_utf8(output.stdout).expect("cargo tree prints UTF-8");
-    assert!(tree.starts_with("replay "), "unexpected tree: {tree}");
-    for forbidden in ["tracegen ", "wgpu ", "naga ", "gltf "] {
+    let text = String::from_utf8(output.stdout).expect("cargo tree prints UTF-8");
+    let name = |line: &str| line.split(' ').next().unwrap_or_default().to_owned();
+    let names: Vec<String> = text.lines().map(name).collect();
+    assert_eq!(names[0], package, "unexpected tree: {text}");
+    names
+}
+
+fn assert_free_of(package: &str, forbidden: &[&str]) {
+    let names = tree(package);
+    for name in forbidden {
         assert!(
-            !tree.lines().any(|line| line.starts_with(forbidden)),
-            "replay depends on {forbidden}"
+            !names.iter().any(|n| n == name),
+            "{package} depends on {name}"
         );
     }
+}
+
+#[test]
+fn replay_depends_neither_on_tracegen_nor_on_a_gpu() {
+    let rooms = ["scene", "scenes", "record", "raster", "rays"];
+    assert_free_of("replay", &rooms);
+    assert_free_of("replay", &["tracegen", "wgpu", "naga", "gltf"]);
+}
+
+#[test]
+fn of_our_crates_record_knows_formats_alone() {
+    let names = tree("record");
+    assert!(names.iter().any(|n| n == "formats"));
+    let others = [
+        "scene",
+        "scenes",
+        "textures",
+        "visibility",
+        "raster",
+        "rays",
+    ];
+    assert_free_of("record", &others);
+    assert_free_of("record", &["tracegen", "replay", "wgpu", "ash", "gltf"]);
+}
+
+#[test]
+fn rays_are_traced_without_a_gpu() {
+    assert_free_of("rays", &["wgpu", "naga", "ash", "raster", "record"]);
+}
+
+#[test]
+fn only_raster_knows_the_driver() {
+    for package in ["scene", "scenes", "textures", "visibility"] {
+        assert_free_of(package, &["wgpu", "naga", "raster", "rays"]);
+    }
+    assert!(tree("raster").iter().any(|n| n == "wgpu"));
 }

@@ -2,7 +2,5 @@
 //! texture sample, or traces it and captures every ray.
 
 pub mod cli;
-pub mod raster;
-pub mod rays;
-pub mod scene;
+mod picture;
 pub mod verify;

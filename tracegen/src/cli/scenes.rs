@@ -1,12 +1,11 @@
 //! `tracegen scenes`: built-in scenes, or what a file holds.
 
 use super::scene_args::load_scene;
-use crate::scene::textures::{CompressedTexture, TextureSet};
-use crate::scene::{LoadOptions, Scene, procedural};
 use clap::Args;
+use scene::{LoadOptions, Scene};
 use serde::Serialize;
-use std::io::{self, Write};
 use std::time::Instant;
+use textures::{CompressedTexture, TextureSet};
 
 /// Arguments of `tracegen scenes`.
 #[derive(Args, Debug)]
@@ -91,10 +90,7 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
             }
         }
     };
-    let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()?;
-    Ok(())
+    shell::print(&text)
 }
 
 /// Loads and compresses everything; how long that took goes to stderr.
@@ -104,14 +100,14 @@ fn read_textures(spec: &str) -> anyhow::Result<Description> {
     let loaded = start.elapsed();
     let set = TextureSet::compress_and_free(&mut scene)?;
     for note in &set.notes {
-        super::warn(note);
+        shell::warn(note);
     }
-    anstream::eprintln!(
+    shell::note(&format!(
         "loaded in {:.2} s, {} textures compressed in {:.2} s",
         loaded.as_secs_f64(),
         set.textures.len(),
         (start.elapsed() - loaded).as_secs_f64(),
-    );
+    ));
     let bytes = set.textures.iter().map(CompressedTexture::bytes).sum();
     Ok(Description {
         texture_bytes: Some(bytes),
@@ -124,10 +120,10 @@ fn json(value: &impl Serialize) -> serde_json::Result<String> {
 }
 
 fn list(as_json: bool) -> anyhow::Result<String> {
-    let scenes: Vec<Builtin> = procedural::names()
+    let scenes: Vec<Builtin> = ::scenes::names()
         .iter()
         .filter_map(|&(name, description)| {
-            let triangles = procedural::build(name)?.triangle_count();
+            let triangles = ::scenes::build(name)?.triangle_count();
             Some(Builtin {
                 name,
                 description,

@@ -1,9 +1,9 @@
 //! The brute-force rasteriser.
 
-use crate::raster::backend::View;
-use crate::raster::draws::{DrawCall, DrawList, DrawMode};
-use crate::scene::{Scene, TextureRef};
 use glam::{DVec2, DVec4, Vec4};
+use raster::backend::View;
+use raster::draws::{DrawCall, DrawList, DrawMode};
+use scene::{Scene, TextureRef};
 
 /// Steps per pixel to which llvmpipe snaps vertices.
 const SNAP: f64 = 256.0;
@@ -122,7 +122,7 @@ pub fn render(
     fragments
 }
 
-fn coordinates(texture: Option<&TextureRef>, mesh: &crate::scene::Mesh, index: usize) -> DVec2 {
+fn coordinates(texture: Option<&TextureRef>, mesh: &scene::Mesh, index: usize) -> DVec2 {
     let Some(texture) = texture else {
         return DVec2::ZERO;
     };

@@ -2,21 +2,18 @@
 
 use super::compare::{Agreement, compare, lanes};
 use super::reference;
-use crate::raster::backend::{CaptureBackend, View};
-use crate::raster::capture::CaptureJob;
-use crate::raster::cull;
-use crate::raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
-use crate::raster::lavapipe::Lavapipe;
-use crate::raster::lighting::Lighting;
-use crate::scene::textures::TextureSet;
-use crate::scene::{
-    AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd,
-};
 use formats::textrace::{SUBTEXELS, Tables, Textrace, TextraceWriter, Tile, TraceMeta};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
 use formats::view::{FrameViews, Hmd};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
+use raster::backend::{CaptureBackend, View};
+use raster::capture::CaptureJob;
+use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
+use raster::lavapipe::Lavapipe;
+use raster::lighting::Lighting;
+use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
 use std::sync::Arc;
+use textures::TextureSet;
 
 const SIZE_PX: [u32; 2] = [200, 136];
 const BUDGET: u64 = 128 << 20;
@@ -344,16 +341,10 @@ fn a_budget_below_one_tile_is_refused() {
         lighting: &lighting,
         visible: &[],
     };
-    let visible = cull::visible_draws(&draws, view.clip_from_world());
+    let visible = draws.visible(view.clip_from_world());
     view.visible = &visible;
-    let refused = crate::raster::regions::capture_view(
-        &mut backend,
-        &draws,
-        &view,
-        SIZE_PX,
-        1,
-        &mut |_, _| Ok(()),
-    );
+    let refused =
+        raster::regions::capture_view(&mut backend, &draws, &view, SIZE_PX, 1, &mut |_, _| Ok(()));
     let message = refused.unwrap_err().to_string();
     assert!(
         message.contains("alone needs") && message.contains("--record-budget"),
@@ -453,7 +444,7 @@ fn every_lane_of_a_shadowed_draw_takes_at_most_one_cascade() {
 
 #[test]
 fn a_built_in_scene_agrees_with_the_reference() {
-    let scene = crate::scene::load("atrium-plain").unwrap();
+    let scene = scenes::load("atrium-plain").unwrap();
     let captured = capture(&scene, [240, 272], 0, BUDGET);
     let a = agreement(&scene, &captured, 1, &|_, _| true);
     println!("atrium-plain: {a:?}, IoU {:.6}", a.coverage_iou());

@@ -1,0 +1,362 @@
+//! The draws of a scene in submission order, and their entries in the trace's tables.
+
+use super::error::RasterError;
+use super::groups::MaterialGroups;
+use formats::textrace::{Draw, Sample, UvGroup};
+use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
+use glam::{Affine3A, Mat4, Vec3};
+use scene::{AlphaMode, Material, Scene};
+use textures::TextureSet;
+use visibility::frustum;
+
+/// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
+pub const SHADOW_SIZE: u32 = 2048;
+
+/// Texel offsets of the four bilinear taps of the shadow lookup. Two texels apart, their 2x2
+/// footprints tile a 4x4 neighbourhood without overlap.
+pub const SHADOW_TAPS: [[i8; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
+
+/// How a draw treats alpha. Where alpha is a constant, the test is made here and not a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DrawMode {
+    /// Every fragment is kept.
+    Opaque,
+    /// Fragments are discarded by their texture's alpha.
+    Masked,
+    /// Blended over what is there, depth not written.
+    Blended,
+}
+
+impl DrawMode {
+    /// The mode of a material, or `None` where nothing of it is seen.
+    fn new(material: &Material) -> Option<Self> {
+        match material.alpha {
+            AlphaMode::Opaque => Some(Self::Opaque),
+            AlphaMode::Blend => Some(Self::Blended),
+            AlphaMode::Mask(_) if material.base_color_texture.is_some() => Some(Self::Masked),
+            AlphaMode::Mask(cutoff) => (material.base_color.w >= cutoff).then_some(Self::Opaque),
+        }
+    }
+}
+
+/// One draw call: one instance of one mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct DrawCall {
+    /// Index into the scene's meshes.
+    pub mesh: usize,
+    /// Index into the scene's materials.
+    pub material: usize,
+    /// How it treats alpha.
+    pub mode: DrawMode,
+    /// Object to world.
+    pub transform: Affine3A,
+    /// The transform mirrors: front faces wind the other way round.
+    pub mirrored: bool,
+    /// Number of its first primitive.
+    pub first_primitive: u32,
+    /// World-space bounds of the instance.
+    pub bounds: [Vec3; 2],
+}
+
+/// Every draw of a scene, the same for all views and frames.
+#[derive(Clone, Debug)]
+pub struct DrawList {
+    /// Draws in submission order.
+    pub calls: Vec<DrawCall>,
+    /// Texture groups by material.
+    pub groups: Vec<MaterialGroups>,
+    /// Shadow cascades that lit draws sample, 0 to 4.
+    pub cascades: u32,
+}
+
+impl DrawList {
+    /// Orders the scene's instances: opaque and masked ones in the scene's order, then blended
+    /// ones in the scene's order. Instances that show nothing are left out.
+    ///
+    /// # Errors
+    /// More primitives than 32 bits number, or an index out of range.
+    pub fn new(scene: &Scene, cascades: u32) -> Result<Self, RasterError> {
+        let mut calls = Vec::with_capacity(scene.instances.len());
+        let mut next_primitive = 0_u32;
+        for blended in [false, true] {
+            for instance in &scene.instances {
+                let mesh = scene.meshes.get(instance.mesh).ok_or_else(|| {
+                    RasterError::Scene(format!(
+                        "instance of mesh {} of {}",
+                        instance.mesh,
+                        scene.meshes.len()
+                    ))
+                })?;
+                let material = scene.materials.get(mesh.material).ok_or_else(|| {
+                    RasterError::Scene(format!(
+                        "mesh {} uses material {} of {}",
+                        mesh.name,
+                        mesh.material,
+                        scene.materials.len()
+                    ))
+                })?;
+                let Some(mode) = DrawMode::new(material) else {
+                    continue;
+                };
+                if (mode == DrawMode::Blended) != blended || mesh.triangles() == 0 {
+                    continue;
+                }
+                if let Some(index) = mesh
+                    .indices
+                    .iter()
+                    .find(|&&i| i as usize >= mesh.positions.len())
+                {
+                    return Err(RasterError::Scene(format!(
+                        "mesh {}: index {index} beyond its {} vertices",
+                        mesh.name,
+                        mesh.positions.len()
+                    )));
+                }
+                calls.push(DrawCall {
+                    mesh: instance.mesh,
+                    material: mesh.material,
+                    mode,
+                    transform: instance.transform,
+                    mirrored: instance.mirrored(),
+                    first_primitive: next_primitive,
+                    bounds: bounds(&mesh.positions, &instance.transform),
+                });
+                next_primitive = u32::try_from(mesh.triangles())
+                    .ok()
+                    .and_then(|n| next_primitive.checked_add(n))
+                    .ok_or_else(|| RasterError::TooLarge {
+                        what: "primitives".into(),
+                        found: scene.triangle_count(),
+                        limit: u64::from(u32::MAX),
+                    })?;
+            }
+        }
+        Ok(Self {
+            calls,
+            groups: scene.materials.iter().map(MaterialGroups::new).collect(),
+            cascades,
+        })
+    }
+
+    /// Indices of the draws that a view or a shadow cascade may see, ascending.
+    #[must_use]
+    pub fn visible(&self, clip_from_world: Mat4) -> Vec<u32> {
+        frustum::visible(self.calls.iter().map(|call| call.bounds), clip_from_world)
+    }
+
+    /// Texture table of the trace: the scene's textures in their order, then the shadow maps.
+    #[must_use]
+    pub fn textures(&self, set: &TextureSet) -> Vec<Texture> {
+        let mut textures: Vec<Texture> = set.textures.iter().map(|t| t.texture.clone()).collect();
+        if self.cascades > 0 {
+            textures.push(Texture {
+                name: "shadow cascades".into(),
+                size: [SHADOW_SIZE; 2],
+                levels: 1,
+                layers: self.cascades,
+                format: TexelFormat::R32f,
+                color_space: ColorSpace::Linear,
+            });
+        }
+        textures
+    }
+
+    /// Sampler and draw tables of the trace; `textures` is [`DrawList::textures`]' result for the
+    /// same `set`.
+    #[must_use]
+    pub fn tables(
+        &self,
+        scene: &Scene,
+        set: &TextureSet,
+        textures: &[Texture],
+    ) -> (Vec<Sampler>, Vec<Draw>) {
+        let mut samplers = Vec::new();
+        let material_groups: Vec<Vec<UvGroup>> = scene
+            .materials
+            .iter()
+            .zip(&self.groups)
+            .map(|(material, groups)| {
+                let slots = material.textures();
+                let mut result: Vec<UvGroup> = groups
+                    .groups
+                    .iter()
+                    .map(|group| {
+                        let samples = group
+                            .iter()
+                            .filter_map(|&slot| slots[slot])
+                            .filter_map(|t| {
+                                // Images that only unplaced materials use have no texture.
+                                let texture = (*set.of_image.get(t.image)?)?;
+                                Some(Sample {
+                                    texture: texture as u32,
+                                    sampler: intern(&mut samplers, t.sampler),
+                                    layer: 0,
+                                    offset: [0, 0],
+                                })
+                            })
+                            .collect();
+                        uv_group(samples, textures)
+                    })
+                    .collect();
+                for layer in 0..self.cascades {
+                    let sampler = intern(&mut samplers, Sampler::SHADOW);
+                    let samples = SHADOW_TAPS
+                        .iter()
+                        .map(|&offset| Sample {
+                            texture: set.textures.len() as u32,
+                            sampler,
+                            layer: layer as u16,
+                            offset,
+                        })
+                        .collect();
+                    result.push(uv_group(samples, textures));
+                }
+                result
+            })
+            .collect();
+        let draws = self
+            .calls
+            .iter()
+            .map(|call| Draw {
+                material: scene.materials[call.material].name.clone(),
+                first_primitive: call.first_primitive,
+                primitives: scene.meshes[call.mesh].triangles() as u32,
+                groups: material_groups[call.material].clone(),
+            })
+            .collect();
+        (samplers, draws)
+    }
+}
+
+fn uv_group(samples: Vec<Sample>, textures: &[Texture]) -> UvGroup {
+    let extent = |axis: usize| {
+        samples
+            .iter()
+            .map(|s| textures[s.texture as usize].size[axis])
+            .max()
+            .unwrap_or(1)
+    };
+    UvGroup {
+        extent: [extent(0), extent(1)],
+        samples,
+    }
+}
+
+fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
+    let index = samplers
+        .iter()
+        .position(|s| *s == sampler)
+        .unwrap_or_else(|| {
+            samplers.push(sampler);
+            samplers.len() - 1
+        });
+    index as u16
+}
+
+fn bounds(positions: &[Vec3], transform: &Affine3A) -> [Vec3; 2] {
+    let empty = [Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY)];
+    positions.iter().fold(empty, |[lo, hi], p| {
+        let p = transform.transform_point3(*p);
+        [lo.min(p), hi.max(p)]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec4;
+    use scene::{Instance, Mesh, TextureRef};
+
+    /// A scene with one mesh of `triangles[i]` triangles and material i for each entry.
+    fn scene(materials: Vec<Material>, triangles: &[usize]) -> Scene {
+        let mesh = |(material, &count): (usize, &usize)| Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            indices: [0, 1, 2].repeat(count),
+            material,
+            ..Mesh::default()
+        };
+        Scene {
+            meshes: triangles.iter().enumerate().map(mesh).collect(),
+            instances: (0..triangles.len())
+                .map(|mesh| Instance {
+                    mesh,
+                    transform: Affine3A::IDENTITY,
+                })
+                .collect(),
+            materials,
+            ..Scene::default()
+        }
+    }
+
+    fn material(alpha: AlphaMode, textured: bool) -> Material {
+        Material {
+            alpha,
+            base_color_texture: textured.then(|| TextureRef::new(0)),
+            base_color: Vec4::new(1.0, 1.0, 1.0, 0.4),
+            ..Material::default()
+        }
+    }
+
+    #[test]
+    fn blended_draws_come_last_and_primitives_are_numbered_through() {
+        let materials = vec![
+            material(AlphaMode::Blend, true),
+            material(AlphaMode::Opaque, true),
+            material(AlphaMode::Mask(0.5), true),
+        ];
+        let draws = DrawList::new(&scene(materials, &[2, 3, 4]), 0).unwrap();
+        let rows: Vec<_> = draws
+            .calls
+            .iter()
+            .map(|c| (c.mesh, c.mode, c.first_primitive))
+            .collect();
+        let expected = [
+            (1, DrawMode::Opaque, 0),
+            (2, DrawMode::Masked, 3),
+            (0, DrawMode::Blended, 7),
+        ];
+        assert_eq!(rows, expected);
+    }
+
+    #[test]
+    fn a_constant_alpha_is_tested_once_for_the_draw() {
+        let materials = vec![
+            material(AlphaMode::Mask(0.5), false),
+            material(AlphaMode::Mask(0.3), false),
+        ];
+        let draws = DrawList::new(&scene(materials, &[1, 1]), 0).unwrap();
+        assert_eq!(draws.calls.len(), 1);
+        assert_eq!(
+            (draws.calls[0].mesh, draws.calls[0].mode),
+            (1, DrawMode::Opaque)
+        );
+    }
+
+    #[test]
+    fn an_index_beyond_the_vertices_is_refused() {
+        let mut scene = scene(vec![material(AlphaMode::Opaque, true)], &[1]);
+        scene.meshes[0].indices[2] = 3;
+        let message = DrawList::new(&scene, 0).unwrap_err().to_string();
+        assert!(
+            message.contains("index 3 beyond its 3 vertices"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn each_cascade_is_a_group_of_four_taps_on_its_layer() {
+        let scene = scene(vec![material(AlphaMode::Opaque, false)], &[1]);
+        let draws = DrawList::new(&scene, 2).unwrap();
+        let set = TextureSet::default();
+        let textures = draws.textures(&set);
+        let (samplers, table) = draws.tables(&scene, &set, &textures);
+        assert_eq!(samplers, [Sampler::SHADOW]);
+        assert_eq!((textures.len(), textures[0].layers), (1, 2));
+        for (layer, group) in table[0].groups.iter().enumerate() {
+            assert_eq!(group.extent, [SHADOW_SIZE; 2]);
+            let taps: Vec<_> = group.samples.iter().map(|s| (s.layer, s.offset)).collect();
+            assert_eq!(taps, SHADOW_TAPS.map(|offset| (layer as u16, offset)));
+        }
+        assert_eq!(table[0].groups.len(), 2);
+    }
+}

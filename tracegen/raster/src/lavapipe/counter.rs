@@ -1,0 +1,134 @@
+//! Counts fragments per pixel by additive blending: a check of the capture that shares neither
+//! ballots nor atomics nor post-processing with it.
+
+use super::pipelines::{DEPTH_FORMAT, PipelineKey, Role};
+use super::uniforms::ViewData;
+use super::{Lavapipe, PassState};
+use crate::backend::View;
+use crate::draws::{DrawList, DrawMode};
+use crate::error::RasterError;
+
+impl Lavapipe {
+    /// Fragments of opaque and blended draws that pass the early depth test, by pixel.
+    pub fn count_fragments(
+        &mut self,
+        draws: &DrawList,
+        view: &View<'_>,
+    ) -> Result<Vec<u32>, RasterError> {
+        let keys: Vec<PipelineKey> = draws
+            .calls
+            .iter()
+            .map(|call| {
+                assert_ne!(
+                    call.mode,
+                    DrawMode::Masked,
+                    "alpha tests need the in-order replay"
+                );
+                let role = if call.mode == DrawMode::Blended {
+                    Role::CountBlended
+                } else {
+                    Role::Count
+                };
+                self.key(call, role, false, 0)
+            })
+            .collect();
+        for key in &keys {
+            self.pipelines.prepare(&self.gpu, *key)?;
+        }
+        let [width, height] = self.targets.size_px;
+        let size = wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        };
+        let texture = |format, usage| {
+            self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: None,
+                size,
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
+                view_formats: &[],
+            })
+        };
+        let counts = texture(wgpu::TextureFormat::R16Float, wgpu::TextureUsages::COPY_SRC);
+        let depth = texture(DEPTH_FORMAT, wgpu::TextureUsages::empty());
+        let row_bytes = (width * 2).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let readback = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: u64::from(row_bytes) * u64::from(height),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let data = ViewData::of_eye(view, self.targets.capacity);
+        self.gpu
+            .queue
+            .write_buffer(&self.targets.view_uniform, 0, bytemuck::bytes_of(&data));
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let (count_view, depth_view) = (
+            counts.create_view(&Default::default()),
+            depth.create_view(&Default::default()),
+        );
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &count_view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations::default(),
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &depth_view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(1.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &self.eye_bindings, &[]);
+        let mut state = PassState::default();
+        for ((index, call), key) in (0..).zip(&draws.calls).zip(keys) {
+            self.issue(&mut pass, &mut state, index, call, key);
+        }
+        drop(pass);
+        encoder.copy_texture_to_buffer(
+            counts.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &readback,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(row_bytes),
+                    rows_per_image: None,
+                },
+            },
+            size,
+        );
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.read(&readback, 0..readback.size(), |bytes| {
+            let row = |row: &[u8]| -> Vec<u32> {
+                row.chunks_exact(2)
+                    .take(width as usize)
+                    .map(|h| half_to_integer(u16::from_le_bytes([h[0], h[1]])))
+                    .collect()
+            };
+            Ok(bytes
+                .chunks_exact(row_bytes as usize)
+                .flat_map(row)
+                .collect())
+        })
+    }
+}
+
+/// A non-negative integer up to 2048 in half precision.
+fn half_to_integer(bits: u16) -> u32 {
+    let exponent = i32::from(bits >> 10) - 15;
+    let mantissa = f32::from(bits & 1023 | 1024) / 1024.0;
+    if bits == 0 {
+        0
+    } else {
+        (mantissa * (exponent as f32).exp2()) as u32
+    }
+}

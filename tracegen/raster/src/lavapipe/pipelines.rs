@@ -1,0 +1,341 @@
+//! The pipelines that a scene's draws need, all from one shader source.
+
+use super::device::Gpu;
+use super::upload::VERTEX_STRIDE;
+use crate::error::RasterError;
+use std::collections::BTreeMap;
+
+/// Format of the picture.
+pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+/// Format of depth and shadow maps.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+const ADDITIVE: wgpu::BlendState = {
+    let add = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::BlendState {
+        color: add,
+        alpha: add,
+    }
+};
+
+/// What a pipeline does with a draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// Colour and depth with forced early depth test.
+    Opaque,
+    /// Colour blended over what is there; depth tested early, not written.
+    Blended,
+    /// Colour and late depth of an alpha-masked draw.
+    Masked,
+    /// Records of an alpha-masked draw; writes neither colour nor depth.
+    MaskedRecord,
+    /// Depth of a shadow caster.
+    Shadow,
+    /// Depth of an alpha-masked shadow caster.
+    ShadowMasked,
+    /// Fragments of an opaque draw, added up.
+    Count,
+    /// Fragments of a blended draw, added up.
+    CountBlended,
+}
+
+/// What distinguishes pipelines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PipelineKey {
+    /// What the pipeline does.
+    pub role: Role,
+    /// Records are written.
+    pub capture: bool,
+    /// Bit per texture.
+    pub textures: u32,
+    /// Bit per texture that leads its uv group.
+    pub leaders: u32,
+    /// Shadow cascades.
+    pub cascades: u32,
+    /// Both faces are drawn.
+    pub double_sided: bool,
+    /// Front faces wind clockwise.
+    pub mirrored: bool,
+}
+
+/// Bind group layouts of the shader.
+pub struct Layouts {
+    /// Group 0: view, instances, records, shadow maps.
+    pub view: wgpu::BindGroupLayout,
+    /// Group 1: material.
+    pub material: wgpu::BindGroupLayout,
+}
+
+/// The shader and the pipelines made from it so far.
+pub struct Pipelines {
+    /// Bind group layouts.
+    pub layouts: Layouts,
+    /// Draws the background and clears the region's depth.
+    pub background: wgpu::RenderPipeline,
+    module: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+    made: BTreeMap<PipelineKey, wgpu::RenderPipeline>,
+}
+
+impl Pipelines {
+    /// Compiles the shader.
+    ///
+    /// # Errors
+    /// Driver and validation errors.
+    pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
+        gpu.checked("compiling the shader", || {
+            let module = gpu
+                .device
+                .create_shader_module(wgpu::ShaderModuleDescriptor {
+                    label: Some("capture.wgsl"),
+                    source: wgpu::ShaderSource::Wgsl(
+                        include_str!("../shaders/capture.wgsl").into(),
+                    ),
+                });
+            let layouts = Layouts {
+                view: gpu
+                    .device
+                    .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                        label: Some("view"),
+                        entries: &view_entries(),
+                    }),
+                material: gpu
+                    .device
+                    .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                        label: Some("material"),
+                        entries: &material_entries(),
+                    }),
+            };
+            let layout = gpu
+                .device
+                .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                    label: None,
+                    bind_group_layouts: &[Some(&layouts.view), Some(&layouts.material)],
+                    immediate_size: 0,
+                });
+            let background = background(gpu, &module, &layout);
+            Self {
+                layouts,
+                background,
+                module,
+                layout,
+                made: BTreeMap::new(),
+            }
+        })
+    }
+
+    /// Makes the pipeline for `key` unless it is there.
+    ///
+    /// # Errors
+    /// Driver and validation errors.
+    pub fn prepare(&mut self, gpu: &Gpu, key: PipelineKey) -> Result<(), RasterError> {
+        if !self.made.contains_key(&key) {
+            let pipeline = gpu.checked("making a pipeline", || self.make(gpu, &key))?;
+            self.made.insert(key, pipeline);
+        }
+        Ok(())
+    }
+
+    /// A prepared pipeline.
+    #[must_use]
+    pub fn get(&self, key: &PipelineKey) -> Option<&wgpu::RenderPipeline> {
+        self.made.get(key)
+    }
+
+    fn make(&self, gpu: &Gpu, key: &PipelineKey) -> wgpu::RenderPipeline {
+        let constants = [
+            ("CAPTURE", f64::from(u8::from(key.capture))),
+            ("TEXTURES", f64::from(key.textures)),
+            ("LEADERS", f64::from(key.leaders)),
+            ("CASCADES", f64::from(key.cascades)),
+            ("BLENDED", f64::from(u8::from(key.role == Role::Blended))),
+            ("MASKED", f64::from(u8::from(key.role == Role::Masked))),
+        ];
+        let compilation_options = wgpu::PipelineCompilationOptions {
+            constants: &constants,
+            ..Default::default()
+        };
+        let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4];
+        let shadow = matches!(key.role, Role::Shadow | Role::ShadowMasked);
+        let entry_point = match key.role {
+            Role::Opaque | Role::Blended => Some("fragment_early"),
+            Role::Masked => Some("fragment_masked"),
+            Role::MaskedRecord => Some("fragment_masked_record"),
+            Role::Shadow => None,
+            Role::ShadowMasked => Some("fragment_shadow"),
+            Role::Count | Role::CountBlended => Some("fragment_count"),
+        };
+        let (format, blend) = match key.role {
+            Role::Blended => (COLOR_FORMAT, Some(wgpu::BlendState::ALPHA_BLENDING)),
+            Role::Count | Role::CountBlended => (wgpu::TextureFormat::R16Float, Some(ADDITIVE)),
+            _ => (COLOR_FORMAT, None),
+        };
+        let read_only = match key.role {
+            Role::Blended | Role::MaskedRecord => true,
+            Role::CountBlended => true,
+            _ => false,
+        };
+        let color = [Some(wgpu::ColorTargetState {
+            format,
+            blend,
+            write_mask: if key.role == Role::MaskedRecord {
+                wgpu::ColorWrites::empty()
+            } else {
+                wgpu::ColorWrites::ALL
+            },
+        })];
+        gpu.device
+            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: None,
+                layout: Some(&self.layout),
+                vertex: wgpu::VertexState {
+                    module: &self.module,
+                    entry_point: Some("vertex_main"),
+                    compilation_options: compilation_options.clone(),
+                    buffers: &[Some(wgpu::VertexBufferLayout {
+                        array_stride: VERTEX_STRIDE,
+                        step_mode: wgpu::VertexStepMode::Vertex,
+                        attributes: &attributes,
+                    })],
+                },
+                primitive: wgpu::PrimitiveState {
+                    front_face: if key.mirrored {
+                        wgpu::FrontFace::Cw
+                    } else {
+                        wgpu::FrontFace::Ccw
+                    },
+                    // Shadow maps hold both faces: walls that are modelled from one side block light.
+                    cull_mode: (!key.double_sided && !shadow).then_some(wgpu::Face::Back),
+                    ..wgpu::PrimitiveState::default()
+                },
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH_FORMAT,
+                    depth_write_enabled: Some(!read_only),
+                    depth_compare: Some(wgpu::CompareFunction::Less),
+                    stencil: wgpu::StencilState::default(),
+                    bias: if shadow {
+                        wgpu::DepthBiasState {
+                            constant: 2,
+                            slope_scale: 2.0,
+                            clamp: 0.0,
+                        }
+                    } else {
+                        wgpu::DepthBiasState::default()
+                    },
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: entry_point.map(|entry_point| wgpu::FragmentState {
+                    module: &self.module,
+                    entry_point: Some(entry_point),
+                    compilation_options,
+                    targets: if shadow { &[] } else { &color },
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+    }
+}
+
+fn background(
+    gpu: &Gpu,
+    module: &wgpu::ShaderModule,
+    layout: &wgpu::PipelineLayout,
+) -> wgpu::RenderPipeline {
+    gpu.device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("background"),
+            layout: Some(layout),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some("vertex_background"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Always),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some("fragment_background"),
+                compilation_options: Default::default(),
+                targets: &[Some(COLOR_FORMAT.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+}
+
+fn entry(
+    binding: u32,
+    visibility: wgpu::ShaderStages,
+    ty: wgpu::BindingType,
+) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility,
+        ty,
+        count: None,
+    }
+}
+
+fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer {
+        ty,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    }
+}
+
+fn view_entries() -> [wgpu::BindGroupLayoutEntry; 7] {
+    let fragment = wgpu::ShaderStages::FRAGMENT;
+    let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
+    [
+        entry(
+            0,
+            wgpu::ShaderStages::VERTEX_FRAGMENT,
+            buffer(wgpu::BufferBindingType::Uniform),
+        ),
+        entry(1, wgpu::ShaderStages::VERTEX, storage(true)),
+        entry(2, fragment, storage(false)),
+        entry(3, fragment, storage(false)),
+        entry(
+            4,
+            fragment,
+            wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Depth,
+                view_dimension: wgpu::TextureViewDimension::D2Array,
+                multisampled: false,
+            },
+        ),
+        entry(
+            5,
+            fragment,
+            wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
+        ),
+        entry(6, fragment, storage(false)),
+    ]
+}
+
+fn material_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
+    let fragment = wgpu::ShaderStages::FRAGMENT;
+    let texture = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+    let mut entries = vec![entry(0, fragment, buffer(wgpu::BufferBindingType::Uniform))];
+    entries.extend((1..7).map(|binding| entry(binding, fragment, texture)));
+    entries.extend((7..13).map(|binding| entry(binding, fragment, sampler)));
+    entries
+}

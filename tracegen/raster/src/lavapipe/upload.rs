@@ -1,0 +1,357 @@
+//! The scene in the driver's memory: vertex and index buffers, textures, materials, instances.
+
+use super::device::Gpu;
+use super::pipelines::Layouts;
+use crate::draws::DrawList;
+use crate::error::RasterError;
+use crate::groups::MATERIAL_TEXTURES;
+use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
+use glam::{Mat4, Vec4};
+use scene::{AlphaMode, Material, Mesh, Scene};
+use textures::{CompressedTexture, TextureSet};
+use wgpu::util::DeviceExt;
+
+/// Interleaved vertex of the shader's `Vertex`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct VertexData {
+    position: [f32; 3],
+    normal: [f32; 3],
+    tangent: [f32; 4],
+    uv: [f32; 4],
+}
+
+/// Bytes between two vertices.
+pub const VERTEX_STRIDE: u64 = size_of::<VertexData>() as u64;
+
+/// The shader's `Instance`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct InstanceData {
+    world_from_object: [[f32; 4]; 4],
+    normal_from_object: [[f32; 4]; 4],
+}
+
+/// The shader's `Material`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct MaterialData {
+    base_color: [f32; 4],
+    emissive: [f32; 4],
+    specular: [f32; 4],
+    surface: [f32; 4],
+    uv_rows: [[f32; 4]; 2 * MATERIAL_TEXTURES],
+}
+
+/// A mesh's buffers.
+pub struct MeshBuffers {
+    /// Interleaved vertices.
+    pub vertices: wgpu::Buffer,
+    /// 32-bit indices.
+    pub indices: wgpu::Buffer,
+    /// Number of indices.
+    pub index_count: u32,
+}
+
+/// The uploaded scene.
+pub struct SceneBuffers {
+    /// By the scene's mesh number; `None` for a mesh that no draw uses.
+    pub meshes: Vec<Option<MeshBuffers>>,
+    /// Bind group 1 by the scene's material number.
+    pub materials: Vec<wgpu::BindGroup>,
+    /// One row a draw.
+    pub instances: wgpu::Buffer,
+}
+
+impl SceneBuffers {
+    /// Uploads everything that `draws` use.
+    ///
+    /// # Errors
+    /// Sizes beyond the device's limits, and driver errors.
+    pub fn new(
+        gpu: &Gpu,
+        layouts: &Layouts,
+        scene: &Scene,
+        draws: &DrawList,
+        textures: &TextureSet,
+    ) -> Result<Self, RasterError> {
+        let mut used = vec![false; scene.meshes.len()];
+        for call in &draws.calls {
+            used[call.mesh] = true;
+        }
+        let limit = gpu.device.limits().max_buffer_size;
+        let mut meshes = Vec::with_capacity(scene.meshes.len());
+        for (mesh, used) in scene.meshes.iter().zip(used) {
+            meshes.push(used.then(|| upload_mesh(gpu, mesh, limit)).transpose()?);
+        }
+        let views = textures
+            .textures
+            .iter()
+            .map(|t| upload_texture(gpu, t))
+            .collect::<Result<Vec<_>, _>>()?;
+        let absent = upload_texture(gpu, &white())?;
+        let materials = scene
+            .materials
+            .iter()
+            .map(|m| bind_material(gpu, layouts, m, textures, &views, &absent))
+            .collect();
+        let instances = instance_rows(draws);
+        let instances = gpu
+            .device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("instances"),
+                contents: bytemuck::cast_slice(&instances),
+                usage: wgpu::BufferUsages::STORAGE,
+            });
+        Ok(Self {
+            meshes,
+            materials,
+            instances,
+        })
+    }
+}
+
+fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, RasterError> {
+    let bytes = mesh.positions.len() as u64 * VERTEX_STRIDE;
+    if bytes > limit {
+        return Err(RasterError::TooLarge {
+            what: format!("bytes of vertices of mesh {}", mesh.name),
+            found: bytes,
+            limit,
+        });
+    }
+    let at2 = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
+    let vertices: Vec<VertexData> = mesh
+        .positions
+        .iter()
+        .enumerate()
+        .map(|(i, position)| {
+            let (uv0, uv1) = (at2(&mesh.uv0, i), at2(&mesh.uv1, i));
+            VertexData {
+                position: position.to_array(),
+                normal: mesh
+                    .normals
+                    .get(i)
+                    .copied()
+                    .unwrap_or(glam::Vec3::Y)
+                    .to_array(),
+                tangent: mesh
+                    .tangents
+                    .get(i)
+                    .copied()
+                    .unwrap_or(Vec4::new(1.0, 0.0, 0.0, 1.0))
+                    .to_array(),
+                uv: [uv0.x, uv0.y, uv1.x, uv1.y],
+            }
+        })
+        .collect();
+    let buffer = |contents: &[u8], usage| {
+        gpu.device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: None,
+                contents,
+                usage,
+            })
+    };
+    // A trailing partial triangle would be no primitive: leave it out of the index range.
+    Ok(MeshBuffers {
+        vertices: buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
+        indices: buffer(
+            bytemuck::cast_slice(&mesh.indices),
+            wgpu::BufferUsages::INDEX,
+        ),
+        index_count: mesh.triangles() as u32 * 3,
+    })
+}
+
+fn instance_rows(draws: &DrawList) -> Vec<InstanceData> {
+    let mut rows: Vec<InstanceData> = (0_u32..)
+        .zip(&draws.calls)
+        .map(|(draw, call)| {
+            let matrix = glam::Mat3::from(call.transform.matrix3);
+            let inverse = matrix.inverse().transpose();
+            // A flattened instance has no inverse; its normals keep the object's direction.
+            let normal = if inverse.is_finite() { inverse } else { matrix };
+            let mut normal_from_object = Mat4::from_mat3(normal);
+            normal_from_object.w_axis = Vec4::new(
+                f32::from_bits(draw),
+                f32::from_bits(call.first_primitive),
+                0.0,
+                1.0,
+            );
+            InstanceData {
+                world_from_object: Mat4::from(call.transform).to_cols_array_2d(),
+                normal_from_object: normal_from_object.to_cols_array_2d(),
+            }
+        })
+        .collect();
+    if rows.is_empty() {
+        rows.push(bytemuck::Zeroable::zeroed());
+    }
+    rows
+}
+
+/// Stands for the textures that a material lacks; the pipelines never sample it.
+fn white() -> CompressedTexture {
+    CompressedTexture {
+        texture: Texture {
+            name: "absent".into(),
+            size: [1, 1],
+            levels: 1,
+            layers: 1,
+            format: TexelFormat::Rgba8,
+            color_space: ColorSpace::Linear,
+        },
+        levels: vec![vec![255; 4]],
+    }
+}
+
+fn upload_texture(
+    gpu: &Gpu,
+    compressed: &CompressedTexture,
+) -> Result<wgpu::TextureView, RasterError> {
+    let texture = &compressed.texture;
+    let srgb = texture.color_space == ColorSpace::Srgb;
+    let format = match texture.format {
+        TexelFormat::Bc1 if srgb => wgpu::TextureFormat::Bc1RgbaUnormSrgb,
+        TexelFormat::Bc1 => wgpu::TextureFormat::Bc1RgbaUnorm,
+        TexelFormat::Bc3 if srgb => wgpu::TextureFormat::Bc3RgbaUnormSrgb,
+        TexelFormat::Bc3 => wgpu::TextureFormat::Bc3RgbaUnorm,
+        TexelFormat::Rgba8 if srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        TexelFormat::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
+        other => {
+            return Err(RasterError::Scene(format!(
+                "texture {}: expected BC1, BC3 or RGBA8, found {other:?}",
+                texture.name
+            )));
+        }
+    };
+    let limit = gpu.device.limits().max_texture_dimension_2d;
+    if let Some(&extent) = texture.size.iter().find(|&&e| e > limit) {
+        return Err(RasterError::TooLarge {
+            what: "texels along a texture's edge".into(),
+            found: extent.into(),
+            limit: limit.into(),
+        });
+    }
+    gpu.checked("uploading a texture", || {
+        gpu.device
+            .create_texture_with_data(
+                &gpu.queue,
+                &wgpu::TextureDescriptor {
+                    label: None,
+                    size: wgpu::Extent3d {
+                        width: texture.size[0],
+                        height: texture.size[1],
+                        depth_or_array_layers: 1,
+                    },
+                    mip_level_count: texture.levels,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                    view_formats: &[],
+                },
+                wgpu::util::TextureDataOrder::LayerMajor,
+                &compressed.levels.concat(),
+            )
+            .create_view(&wgpu::TextureViewDescriptor::default())
+    })
+}
+
+fn bind_material(
+    gpu: &Gpu,
+    layouts: &Layouts,
+    material: &Material,
+    set: &TextureSet,
+    views: &[wgpu::TextureView],
+    absent: &wgpu::TextureView,
+) -> wgpu::BindGroup {
+    let textures = material.textures();
+    let samplers = textures.map(|t| {
+        let state = t.map_or(Sampler::TRILINEAR_REPEAT, |t| t.sampler);
+        gpu.device.create_sampler(&sampler_descriptor(&state))
+    });
+    let data = material_data(material);
+    let uniform = gpu
+        .device
+        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("material"),
+            contents: bytemuck::bytes_of(&data),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
+    let mut entries = vec![wgpu::BindGroupEntry {
+        binding: 0,
+        resource: uniform.as_entire_binding(),
+    }];
+    for (binding, texture) in (1..).zip(&textures) {
+        let view = texture
+            .and_then(|t| (*set.of_image.get(t.image)?).and_then(|i| views.get(i)))
+            .unwrap_or(absent);
+        entries.push(wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::TextureView(view),
+        });
+    }
+    for (binding, sampler) in (1 + MATERIAL_TEXTURES as u32..).zip(&samplers) {
+        entries.push(wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::Sampler(sampler),
+        });
+    }
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("material"),
+        layout: &layouts.material,
+        entries: &entries,
+    })
+}
+
+fn material_data(material: &Material) -> MaterialData {
+    let mut uv_rows = [[0.0; 4]; 2 * MATERIAL_TEXTURES];
+    for (slot, texture) in material.textures().iter().enumerate() {
+        let Some(t) = texture else { continue };
+        for (row, m) in t.uv_transform.iter().enumerate() {
+            uv_rows[2 * slot + row] = [m[0], m[1], m[2], t.uv_set as f32];
+        }
+    }
+    let cutoff = match material.alpha {
+        AlphaMode::Mask(cutoff) => cutoff,
+        AlphaMode::Opaque | AlphaMode::Blend => 0.0,
+    };
+    MaterialData {
+        base_color: material.base_color.to_array(),
+        emissive: material.emissive.extend(material.normal_scale).to_array(),
+        specular: material.specular.extend(cutoff).to_array(),
+        surface: [material.metallic, material.roughness, 0.0, 0.0],
+        uv_rows,
+    }
+}
+
+fn sampler_descriptor(state: &Sampler) -> wgpu::SamplerDescriptor<'static> {
+    let wrap = |w| match w {
+        Wrap::Repeat => wgpu::AddressMode::Repeat,
+        Wrap::MirroredRepeat => wgpu::AddressMode::MirrorRepeat,
+        Wrap::ClampToEdge => wgpu::AddressMode::ClampToEdge,
+    };
+    let filter = |f| match f {
+        Filter::Nearest => wgpu::FilterMode::Nearest,
+        Filter::Linear => wgpu::FilterMode::Linear,
+    };
+    wgpu::SamplerDescriptor {
+        address_mode_u: wrap(state.wrap[0]),
+        address_mode_v: wrap(state.wrap[1]),
+        mag_filter: filter(state.mag),
+        min_filter: filter(state.min),
+        mipmap_filter: match state.mip {
+            MipFilter::None | MipFilter::Nearest => wgpu::MipmapFilterMode::Nearest,
+            MipFilter::Linear => wgpu::MipmapFilterMode::Linear,
+        },
+        // Vulkan has no sampler without levels; a quarter of a level above 0 never reaches 1.
+        lod_max_clamp: if state.mip == MipFilter::None {
+            0.25
+        } else {
+            32.0
+        },
+        ..wgpu::SamplerDescriptor::default()
+    }
+}

@@ -1,0 +1,19 @@
+//! Captures texture samples: a stereo raster pass through a Mesa driver.
+//!
+//! ```text
+//! scene -> DrawList -> backend (instrumented shader) -> raw quad records, one region at a time
+//!       -> binning by tile -> in-order alpha-test replay -> fixed point -> encoded tiles -> file
+//! ```
+//!
+//! Draws keep the file's order, opaque and alpha-masked ones first, then the blended ones (also in
+//! file order: a trace should not depend on a sort by distance, which differs between the eyes).
+
+pub mod backend;
+pub mod capture;
+pub mod cascades;
+pub mod draws;
+pub mod error;
+pub mod groups;
+pub mod lavapipe;
+pub mod lighting;
+pub mod regions;

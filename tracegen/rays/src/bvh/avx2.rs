@@ -1,0 +1,187 @@
+//! Boxes and triangles by AVX2 and FMA: the same operations in the same order as the plain kernel.
+
+use super::count::Counter;
+use super::kernel::{Kernel, Lanes8};
+use super::leaf::LeafTest;
+use super::node::{Block, Child, Node2, Node8};
+use crate::ray::{PreparedRay, line_hits_sheared_f64};
+use std::arch::x86_64::*;
+
+/// AVX2 and FMA. Use only where the processor has it: `Avx2::available`.
+#[derive(Clone, Copy)]
+pub struct Avx2;
+
+impl Avx2 {
+    /// True where this processor can run the kernel.
+    #[must_use]
+    pub fn available() -> bool {
+        is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+    }
+}
+
+/// The ray broadcast into registers.
+#[derive(Clone, Copy)]
+pub struct Ray {
+    /// By axis, for two boxes: minus the near reciprocal twice, the far reciprocal twice. With
+    /// entries negated, one minimum serves both ends.
+    scale2: [__m128; 3],
+    /// Added to the scaled planes.
+    offset2: [__m128; 3],
+    /// Puts near planes before far planes.
+    order2: [__m128i; 3],
+    t_min: f32,
+    near_reciprocal: [__m256; 3],
+    near_offset: [__m256; 3],
+    far_reciprocal: [__m256; 3],
+    far_offset: [__m256; 3],
+    negative: [usize; 3],
+    axes: [usize; 3],
+    /// Origin in the order of `axes`, for four triangles.
+    origin4: [__m128; 3],
+    shear4: [__m128; 2],
+}
+
+impl Kernel for Avx2 {
+    type Ray = Ray;
+
+    #[inline(always)]
+    fn load(ray: &PreparedRay) -> Ray {
+        let o = ray.ray.origin.to_array();
+        let (nr, fr) = (ray.near_reciprocal, ray.far_reciprocal);
+        let (no, fo) = (ray.near_offset, ray.far_offset);
+        // SAFETY: dispatch makes sure of AVX2.
+        unsafe {
+            Ray {
+                scale2: std::array::from_fn(|a| _mm_setr_ps(-nr[a], -nr[a], fr[a], fr[a])),
+                offset2: std::array::from_fn(|a| _mm_setr_ps(no[a], no[a], -fo[a], -fo[a])),
+                order2: std::array::from_fn(|a| {
+                    if ray.negative[a] == 1 {
+                        _mm_setr_epi32(2, 3, 0, 1)
+                    } else {
+                        _mm_setr_epi32(0, 1, 2, 3)
+                    }
+                }),
+                t_min: ray.ray.t_min,
+                near_reciprocal: std::array::from_fn(|a| _mm256_set1_ps(nr[a])),
+                near_offset: std::array::from_fn(|a| _mm256_set1_ps(no[a])),
+                far_reciprocal: std::array::from_fn(|a| _mm256_set1_ps(fr[a])),
+                far_offset: std::array::from_fn(|a| _mm256_set1_ps(fo[a])),
+                negative: ray.negative,
+                axes: ray.axes,
+                origin4: std::array::from_fn(|k| _mm_set1_ps(o[ray.axes[k]])),
+                shear4: std::array::from_fn(|k| _mm_set1_ps(ray.shear[k])),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn step2(ray: &Ray, node: &Node2, t_max: f32) -> ([f32; 2], u32) {
+        // SAFETY: dispatch makes sure of AVX2; loads are of whole arrays.
+        unsafe {
+            let ends = _mm_setr_ps(-ray.t_min, -ray.t_min, t_max, t_max);
+            let [x, y, z] = std::array::from_fn(|a| {
+                let planes = _mm_load_ps(node.bounds[a].as_ptr());
+                let planes = _mm_permutevar_ps(planes, ray.order2[a]);
+                _mm_fmadd_ps(planes, ray.scale2[a], ray.offset2[a])
+            });
+            let m = _mm_min_ps(_mm_min_ps(x, y), _mm_min_ps(z, ends));
+            // Exit minus entry: its sign says miss.
+            let gap = _mm_add_ps(_mm_movehl_ps(m, m), m);
+            let mask = !_mm_movemask_ps(gap) as u32 & 3;
+            let second = _mm_shuffle_ps::<1>(m, m);
+            ([_mm_cvtss_f32(m), _mm_cvtss_f32(second)], mask)
+        }
+    }
+
+    #[inline(always)]
+    fn step8(ray: &Ray, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32 {
+        // SAFETY: dispatch makes sure of AVX2; loads and stores are of whole arrays.
+        unsafe {
+            let mut enter = _mm256_set1_ps(ray.t_min);
+            let mut leave = _mm256_set1_ps(t_max);
+            for a in 0..3 {
+                let side = ray.negative[a] & 1;
+                let near_plane = _mm256_load_ps(node.bounds[side][a].as_ptr());
+                let far_plane = _mm256_load_ps(node.bounds[side ^ 1][a].as_ptr());
+                let t0 = _mm256_fmsub_ps(near_plane, ray.near_reciprocal[a], ray.near_offset[a]);
+                let t1 = _mm256_fmsub_ps(far_plane, ray.far_reciprocal[a], ray.far_offset[a]);
+                enter = _mm256_max_ps(enter, t0);
+                leave = _mm256_min_ps(leave, t1);
+            }
+            _mm256_store_ps(near.0.as_mut_ptr(), enter);
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32
+        }
+    }
+
+    #[inline(always)]
+    fn lines_hit(ray: &Ray, _: &PreparedRay, block: &Block) -> u32 {
+        let [kx, ky, kz] = ray.axes;
+        // SAFETY: dispatch makes sure of AVX2; loads are of whole arrays.
+        unsafe {
+            let sheared = |vertex: usize| {
+                let v = &block.vertices[vertex];
+                let load = |axis: usize, k: usize| {
+                    _mm_sub_ps(_mm_load_ps(v[axis].as_ptr()), ray.origin4[k])
+                };
+                let z = load(kz, 2);
+                (
+                    _mm_sub_ps(load(kx, 0), _mm_mul_ps(ray.shear4[0], z)),
+                    _mm_sub_ps(load(ky, 1), _mm_mul_ps(ray.shear4[1], z)),
+                )
+            };
+            let (ax, ay) = sheared(0);
+            let (bx, by) = sheared(1);
+            let (cx, cy) = sheared(2);
+            let edge = |px, py, qx, qy| _mm_sub_ps(_mm_mul_ps(px, qy), _mm_mul_ps(py, qx));
+            let u = edge(cx, cy, bx, by);
+            let v = edge(ax, ay, cx, cy);
+            let w = edge(bx, by, ax, ay);
+            let zero = _mm_setzero_ps();
+            let least = _mm_min_ps(_mm_min_ps(u, v), w);
+            let most = _mm_max_ps(_mm_max_ps(u, v), w);
+            let all = _mm_or_ps(_mm_cmpgt_ps(least, zero), _mm_cmplt_ps(most, zero));
+            let mut mask = _mm_movemask_ps(all) as u32;
+            // A lane whose product is zero has a vanishing edge: exact signs decide.
+            let on_edge = _mm_or_ps(
+                _mm_or_ps(_mm_cmpeq_ps(u, zero), _mm_cmpeq_ps(v, zero)),
+                _mm_cmpeq_ps(w, zero),
+            );
+            let mut exact = _mm_movemask_ps(on_edge) as u32;
+            while exact != 0 {
+                let lane = exact.trailing_zeros() as usize;
+                exact &= exact - 1;
+                let get = |x, y| {
+                    let mut lanes = [[0.0f32; 4]; 2];
+                    _mm_storeu_ps(lanes[0].as_mut_ptr(), x);
+                    _mm_storeu_ps(lanes[1].as_mut_ptr(), y);
+                    [lanes[0][lane & 3], lanes[1][lane & 3]]
+                };
+                let hit = line_hits_sheared_f64(get(ax, ay), get(bx, by), get(cx, cy));
+                mask |= u32::from(hit) << lane;
+            }
+            mask
+        }
+    }
+
+    #[inline(always)]
+    fn leaf_apart<C: Counter, L: LeafTest<Self, C>>(
+        test: &mut L,
+        ray: &Ray,
+        counter: &mut C,
+        leaf: Child,
+    ) -> Option<f32> {
+        // SAFETY: dispatch makes sure of AVX2.
+        unsafe { leaf_apart(test, ray, counter, leaf) }
+    }
+}
+
+#[target_feature(enable = "avx2,fma")]
+#[inline(never)]
+fn leaf_apart<C: Counter, L: LeafTest<Avx2, C>>(
+    test: &mut L,
+    ray: &Ray,
+    counter: &mut C,
+    leaf: Child,
+) -> Option<f32> {
+    test.test(ray, counter, leaf)
+}

@@ -1,0 +1,268 @@
+//! The bounding volume hierarchy: built by a library, walked and counted here.
+//!
+//! One build gives two trees over the same leaves: a binary one whose step tests both children's
+//! boxes, the unit in which T&I unit 2.0 works and in which traces count, and an eight-wide one
+//! for speed. Both find the same hits, bit for bit.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod build;
+mod collapse;
+pub mod count;
+mod kernel;
+mod leaf;
+pub mod node;
+mod traverse;
+
+#[cfg(test)]
+mod tests;
+
+use crate::ray::{LARGEST_COORDINATE, Ray};
+use count::Counter;
+use formats::raytrace::{BvhSummary, TraversalKind};
+use glam::Vec3;
+use kernel::{Kernel, Scalar};
+pub use leaf::{AllOpaque, AlphaTest, RayHit};
+use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
+pub use traverse::TraversalStack;
+use traverse::{Eight, Two, Width, closest, occluded};
+
+/// A triangle that cannot be put into the hierarchy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BvhError {
+    /// More triangles than node references can number.
+    #[error("the scene has {found} triangles; a hierarchy holds at most {limit}")]
+    TooManyTriangles {
+        /// Triangles given.
+        found: usize,
+        /// Most that fit.
+        limit: usize,
+    },
+}
+
+/// Instructions that traversal runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instructions {
+    /// Plain Rust.
+    Scalar,
+    /// AVX2 and FMA.
+    Avx2,
+}
+
+impl Instructions {
+    /// The fastest that this processor has.
+    #[must_use]
+    pub fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if avx2::Avx2::available() {
+            return Self::Avx2;
+        }
+        Self::Scalar
+    }
+}
+
+/// Both trees over a set of triangles.
+pub struct Bvh {
+    nodes2: Vec<Node2>,
+    nodes8: Vec<Node8>,
+    blocks: Vec<Block>,
+    bounds: (Vec3, Vec3),
+    triangles: u64,
+    leaves: u64,
+    depth2: u32,
+    depth8: u32,
+    sah_cost: f64,
+    instructions: Instructions,
+}
+
+impl Bvh {
+    /// Builds the trees. Triangles with a coordinate that is not finite, or beyond
+    /// [`LARGEST_COORDINATE`], are left out; they can't be hit. `masked` says of a triangle's number whether its material has an alpha mask.
+    ///
+    /// # Errors
+    /// There are more triangles than node references can number.
+    pub fn build(
+        triangles: &[[[f32; 3]; 3]],
+        masked: impl Fn(u32) -> bool,
+    ) -> Result<Self, BvhError> {
+        let limit = Child::MAX_BLOCKS as usize;
+        if triangles.len() > limit {
+            return Err(BvhError::TooManyTriangles {
+                found: triangles.len(),
+                limit,
+            });
+        }
+        let (kept, numbers): (Vec<_>, Vec<u32>) = triangles
+            .iter()
+            .zip(0u32..)
+            .filter(|(t, _)| {
+                t.as_flattened()
+                    .iter()
+                    .all(|x| x.abs() <= LARGEST_COORDINATE)
+            })
+            .map(|(t, n)| (*t, if masked(n) { n | MASKED } else { n }))
+            .unzip();
+        let points = || kept.iter().flatten().map(|p| Vec3::from(*p));
+        let bounds = points()
+            .map(|p| (p, p))
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+            .unwrap_or_default();
+        let tree = build::build_binary(&kept);
+        let layout = build::lay_out(&tree, &kept, &numbers);
+        Ok(Self {
+            nodes2: layout.nodes2,
+            nodes8: layout.nodes8,
+            blocks: layout.blocks,
+            bounds,
+            triangles: kept.len() as u64,
+            leaves: layout.leaves,
+            depth2: layout.depth2,
+            depth8: layout.depth8,
+            sah_cost: layout.sah_cost,
+            instructions: Instructions::best(),
+        })
+    }
+
+    /// Chooses the instructions; a processor without AVX2 stays with plain Rust.
+    #[must_use]
+    pub fn with_instructions(mut self, instructions: Instructions) -> Self {
+        if instructions == Instructions::Scalar || Instructions::best() == instructions {
+            self.instructions = instructions;
+        }
+        self
+    }
+
+    /// What a trace says about the tree.
+    #[must_use]
+    pub fn summary(&self, traversal: TraversalKind) -> BvhSummary {
+        let (nodes, depth, bytes) = match traversal {
+            TraversalKind::Bvh2 => (self.nodes2.len(), self.depth2, size_of::<Node2>()),
+            TraversalKind::Bvh8 => (self.nodes8.len(), self.depth8, size_of::<Node8>()),
+        };
+        BvhSummary {
+            builder: "obvhs 0.4 ploc+reinsertion, leaves by blocks".to_owned(),
+            settings: build::settings(),
+            traversal,
+            triangles: self.triangles,
+            nodes: nodes as u64,
+            leaves: self.leaves,
+            depth,
+            sah_cost: self.sah_cost,
+            bytes_per_node: bytes as u32,
+            bytes_per_triangle: TRIANGLE_BYTES,
+        }
+    }
+
+    /// Entries that a traversal stack needs.
+    fn stack_size(&self) -> usize {
+        (self.depth2 as usize).max(self.depth8 as usize * 7) + 8
+    }
+
+    /// The nearest triangle that a ray hits; of equally near ones the lowest number.
+    pub fn closest<C: Counter, A: AlphaTest>(
+        &self,
+        tree: TraversalKind,
+        ray: &Ray,
+        stack: &mut TraversalStack,
+        counter: &mut C,
+        alpha: &A,
+    ) -> Option<RayHit> {
+        match tree {
+            TraversalKind::Bvh2 => self.closest_in::<Two, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh8 => self.closest_in::<Eight, C, A>(ray, stack, counter, alpha),
+        }
+    }
+
+    /// True where any triangle lies on the ray's segment.
+    pub fn occluded<C: Counter, A: AlphaTest>(
+        &self,
+        tree: TraversalKind,
+        ray: &Ray,
+        stack: &mut TraversalStack,
+        counter: &mut C,
+        alpha: &A,
+    ) -> bool {
+        match tree {
+            TraversalKind::Bvh2 => self.occluded_in::<Two, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh8 => self.occluded_in::<Eight, C, A>(ray, stack, counter, alpha),
+        }
+    }
+
+    #[inline]
+    fn closest_in<W: Width, C: Counter, A: AlphaTest>(
+        &self,
+        ray: &Ray,
+        stack: &mut TraversalStack,
+        counter: &mut C,
+        alpha: &A,
+    ) -> Option<RayHit> {
+        if self.nodes2.is_empty() || !ray.is_valid() {
+            return None;
+        }
+        match self.instructions {
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => {
+                // SAFETY: `instructions` is Avx2 only where the processor has it.
+                unsafe { closest_avx2::<W, C, A>(self, ray, stack, counter, alpha) }
+            }
+            _ => closest_with::<Scalar, W, C, A>(self, ray, stack, counter, alpha),
+        }
+    }
+
+    #[inline]
+    fn occluded_in<W: Width, C: Counter, A: AlphaTest>(
+        &self,
+        ray: &Ray,
+        stack: &mut TraversalStack,
+        counter: &mut C,
+        alpha: &A,
+    ) -> bool {
+        if self.nodes2.is_empty() || !ray.is_valid() {
+            return false;
+        }
+        match self.instructions {
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2 => {
+                // SAFETY: `instructions` is Avx2 only where the processor has it.
+                unsafe { occluded_avx2::<W, C, A>(self, ray, stack, counter, alpha) }
+            }
+            _ => occluded::<Scalar, W, C, A>(self, ray, stack, counter, alpha),
+        }
+    }
+}
+
+fn closest_with<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
+    bvh: &Bvh,
+    ray: &Ray,
+    stack: &mut TraversalStack,
+    counter: &mut C,
+    alpha: &A,
+) -> Option<RayHit> {
+    closest::<K, W, C, A>(bvh, ray, stack, counter, alpha)
+}
+
+/// The traversal compiled for AVX2: built for the baseline it runs at an eighth of the speed.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn closest_avx2<W: Width, C: Counter, A: AlphaTest>(
+    bvh: &Bvh,
+    ray: &Ray,
+    stack: &mut TraversalStack,
+    counter: &mut C,
+    alpha: &A,
+) -> Option<RayHit> {
+    closest::<avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
+}
+
+/// See [`closest_avx2`].
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn occluded_avx2<W: Width, C: Counter, A: AlphaTest>(
+    bvh: &Bvh,
+    ray: &Ray,
+    stack: &mut TraversalStack,
+    counter: &mut C,
+    alpha: &A,
+) -> bool {
+    occluded::<avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
+}

@@ -1,0 +1,261 @@
+//! Closest-hit and any-hit traversal of both trees, over any kernel and counter.
+
+use super::Bvh;
+use super::count::Counter;
+use super::kernel::{Kernel, Lanes8};
+use super::leaf::{AlphaTest, AnyHit, Closest, LeafTest, RayHit};
+use super::node::Child;
+use crate::ray::{PreparedRay, Ray};
+
+/// Nodes to visit; kept between rays to spare the allocation.
+#[derive(Clone, Debug, Default)]
+pub struct TraversalStack {
+    /// Entry distance in the upper half (its bits sort like the number, for it is not negative),
+    /// child in the lower.
+    entries: Vec<u64>,
+}
+
+impl TraversalStack {
+    /// A stack for trees that need up to `capacity` entries.
+    #[must_use]
+    pub fn new(capacity: usize) -> Self {
+        Self {
+            entries: vec![0; capacity],
+        }
+    }
+}
+
+/// A stack entry; `near` is not negative, or has been negated.
+#[inline(always)]
+fn pack(near: f32, child: Child) -> u64 {
+    u64::from(near.to_bits() & 0x7FFF_FFFF) << 32 | u64::from(child.0)
+}
+
+#[inline(always)]
+fn unpack(entry: u64) -> (f32, Child) {
+    (f32::from_bits((entry >> 32) as u32), Child(entry as u32))
+}
+
+/// Which tree is walked.
+pub trait Width {
+    /// Whether leaf tests are kept out of the loop. The binary step is short enough to live in
+    /// registers then; the eight-wide one is not, and loses by the call.
+    const LEAVES_APART: bool;
+
+    /// Visits an inner node: pushes its hit children but for the nearest, which it returns.
+    fn visit<K: Kernel>(
+        bvh: &Bvh,
+        ray: &K::Ray,
+        node: u32,
+        t_max: f32,
+        stack: &mut [u64],
+        top: &mut usize,
+    ) -> Option<Child>;
+}
+
+/// The binary tree.
+pub struct Two;
+
+impl Width for Two {
+    const LEAVES_APART: bool = true;
+
+    #[inline(always)]
+    fn visit<K: Kernel>(
+        bvh: &Bvh,
+        ray: &K::Ray,
+        node: u32,
+        t_max: f32,
+        stack: &mut [u64],
+        top: &mut usize,
+    ) -> Option<Child> {
+        let node = &bvh.nodes2[node as usize];
+        let (minus_near, mask) = K::step2(ray, node, t_max);
+        // Nested tests rather than a match, which would become a jump table.
+        let [left, right] = node.children;
+        if mask & 1 != 0 {
+            if mask & 2 != 0 {
+                let (nearer, pushed) = if minus_near[0] >= minus_near[1] {
+                    (left, pack(minus_near[1], right))
+                } else {
+                    keep_branch();
+                    (right, pack(minus_near[0], left))
+                };
+                stack[*top] = pushed;
+                *top += 1;
+                Some(nearer)
+            } else {
+                keep_branch();
+                Some(left)
+            }
+        } else if mask & 2 != 0 {
+            Some(right)
+        } else {
+            None
+        }
+    }
+}
+
+/// Keeps a two-way choice a branch. A compiler's select (or, for four cases, a jump table) makes
+/// the next node's address wait for the box test, where a predicted branch fetches it meanwhile:
+/// measured to gain a tenth in the binary tree.
+#[inline(always)]
+fn keep_branch() {
+    // SAFETY: the assembly is empty; it has no effect but to be there.
+    unsafe { std::arch::asm!("", options(nomem, nostack, preserves_flags)) }
+}
+
+/// The eight-wide tree.
+pub struct Eight;
+
+impl Width for Eight {
+    const LEAVES_APART: bool = false;
+
+    #[inline(always)]
+    fn visit<K: Kernel>(
+        bvh: &Bvh,
+        ray: &K::Ray,
+        node: u32,
+        t_max: f32,
+        stack: &mut [u64],
+        top: &mut usize,
+    ) -> Option<Child> {
+        let node = &bvh.nodes8[node as usize];
+        let mut lanes = Lanes8([0.0; 8]);
+        let mut mask = K::step8(ray, node, t_max, &mut lanes);
+        if mask == 0 {
+            return None;
+        }
+        let first = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let child = node.children[first];
+        if mask == 0 {
+            return Some(child);
+        }
+        let near = lanes.0[first];
+        let second = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let (near1, child1) = (lanes.0[second], node.children[second]);
+        // One or two hit children, most of the cases, need no sorting.
+        let base = *top;
+        if mask == 0 {
+            *top = base + 1;
+            if near <= near1 {
+                stack[base] = pack(near1, child1);
+                return Some(child);
+            }
+            keep_branch();
+            stack[base] = pack(near, child);
+            return Some(child1);
+        }
+        // Insertion keeps the pushed entries nearest on top.
+        let (e0, e1) = (pack(near, child), pack(near1, child1));
+        let mut nearest = e0.min(e1);
+        stack[base] = e0.max(e1);
+        *top = base + 1;
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 7;
+            mask &= mask - 1;
+            let entry = pack(lanes.0[lane], node.children[lane]);
+            let pushed = nearest.max(entry);
+            nearest = nearest.min(entry);
+            let mut at = *top;
+            *top += 1;
+            while at > base && stack[at - 1] < pushed {
+                stack[at] = stack[at - 1];
+                at -= 1;
+            }
+            stack[at] = pushed;
+        }
+        Some(unpack(nearest).1)
+    }
+}
+
+/// Walks a tree from the root.
+#[inline(always)]
+fn walk<K: Kernel, W: Width, C: Counter>(
+    bvh: &Bvh,
+    ray: &K::Ray,
+    mut t_max: f32,
+    stack: &mut TraversalStack,
+    counter: &mut C,
+    leaf: &mut impl LeafTest<K, C>,
+) {
+    if stack.entries.len() < bvh.stack_size() {
+        stack.entries.resize(bvh.stack_size(), 0);
+    }
+    let entries = &mut stack.entries[..];
+    let mut top = 0;
+    let mut at = Child(0);
+    loop {
+        let next = if at.is_leaf() {
+            let tested = if W::LEAVES_APART {
+                K::leaf_apart(leaf, ray, counter, at)
+            } else {
+                leaf.test(ray, counter, at)
+            };
+            match tested {
+                Some(shorter) => t_max = shorter,
+                None => return,
+            }
+            None
+        } else {
+            counter.step(at.0);
+            W::visit::<K>(bvh, ray, at.0, t_max, entries, &mut top)
+        };
+        at = match next {
+            Some(child) => child,
+            None => loop {
+                if top == 0 {
+                    return;
+                }
+                top -= 1;
+                let (near, child) = unpack(entries[top]);
+                if near <= t_max {
+                    break child;
+                }
+            },
+        };
+    }
+}
+
+/// The nearest triangle, the lowest primitive number among equally near ones.
+#[inline(always)]
+pub(super) fn closest<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
+    bvh: &Bvh,
+    ray: &Ray,
+    stack: &mut TraversalStack,
+    counter: &mut C,
+    alpha: &A,
+) -> Option<RayHit> {
+    let prepared = PreparedRay::new(ray, bvh.bounds);
+    let loaded = K::load(&prepared);
+    let mut leaf = Closest {
+        bvh,
+        prepared: &prepared,
+        alpha,
+        best: None,
+    };
+    walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
+    leaf.best
+}
+
+/// True where something blocks the ray. Counts the triangles up to the first that does.
+#[inline(always)]
+pub(super) fn occluded<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
+    bvh: &Bvh,
+    ray: &Ray,
+    stack: &mut TraversalStack,
+    counter: &mut C,
+    alpha: &A,
+) -> bool {
+    let prepared = PreparedRay::new(ray, bvh.bounds);
+    let loaded = K::load(&prepared);
+    let mut leaf = AnyHit {
+        bvh,
+        prepared: &prepared,
+        alpha,
+        blocked: false,
+    };
+    walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
+    leaf.blocked
+}

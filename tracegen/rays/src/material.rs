@@ -1,0 +1,212 @@
+//! What a scene's materials mean to a ray.
+
+use super::soup::{Attributes, Soup};
+use super::texture::{Pyramid, SrgbTable, fast_log2};
+use formats::raytrace::RayMaterial;
+use glam::{Vec2, Vec3, Vec4};
+use scene::{AlphaMode, Material, Scene, TextureRef};
+
+/// Smoother dielectrics get a highlight.
+const GLOSSY_ROUGHNESS: f32 = 0.7;
+/// Smoother metals mirror their surroundings.
+const MIRROR_ROUGHNESS: f32 = 0.35;
+
+/// Smoother dielectrics do, as far as Fresnel's law goes.
+const POLISHED_ROUGHNESS: f32 = 0.15;
+
+/// The sampled properties of a material at a hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// Diffuse albedo, linear.
+    pub albedo: Vec3,
+    /// Reflectance at normal incidence, linear.
+    pub specular: Vec3,
+    /// Fraction mirrored beyond what Fresnel's law gives.
+    pub mirror: f32,
+    /// Colour of that fraction.
+    pub mirror_tint: Vec3,
+    /// True where the surface is smooth enough to see a picture in it.
+    pub polished: bool,
+    /// Blinn-Phong exponent, 0 for no highlight.
+    pub exponent: u32,
+    /// Fraction of light that passes, refracted.
+    pub transmission: f32,
+    /// Colour of the passing light.
+    pub tint: Vec3,
+    /// Index of refraction.
+    pub ior: f32,
+    /// Coverage: 1 but for blended surfaces.
+    pub alpha: f32,
+    /// Emitted radiance.
+    pub emissive: Vec3,
+}
+
+/// Materials and their textures.
+pub struct Materials {
+    materials: Vec<Material>,
+    pyramids: Vec<Option<Pyramid>>,
+    srgb: SrgbTable,
+}
+
+impl Materials {
+    /// Makes the pyramids of the images that rays sample.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        use rayon::prelude::*;
+        let used: Vec<bool> = (0..scene.images.len())
+            .map(|i| {
+                let mut refs = scene.materials.iter().flat_map(ray_textures);
+                refs.any(|t| t.image == i)
+            })
+            .collect();
+        let pyramids = scene
+            .images
+            .par_iter()
+            .zip(used)
+            .map(|(image, used)| used.then(|| Pyramid::new(image)).flatten())
+            .collect();
+        Self {
+            materials: scene.materials.clone(),
+            pyramids,
+            srgb: SrgbTable::default(),
+        }
+    }
+
+    /// The table of a trace.
+    #[must_use]
+    pub fn table(&self) -> Vec<RayMaterial> {
+        self.materials.iter().map(describe).collect()
+    }
+
+    /// Properties at a hit. `footprint_m` is the ray's width there.
+    #[must_use]
+    pub fn surface(&self, material: usize, at: &Attributes, footprint_m: f32) -> Surface {
+        let m = &self.materials[material];
+        let sample = |t: &Option<TextureRef>| self.sample(t.as_ref(), at, footprint_m);
+        let base = m.base_color * sample(&m.base_color_texture).unwrap_or(Vec4::ONE);
+        let rough_metal = sample(&m.metallic_roughness_texture).unwrap_or(Vec4::ONE);
+        let roughness = (m.roughness * rough_metal.y).clamp(0.0, 1.0);
+        let metallic = (m.metallic * rough_metal.z).clamp(0.0, 1.0);
+        let emissive = m.emissive * sample(&m.emissive_texture).unwrap_or(Vec4::ONE).truncate();
+        let color = base.truncate();
+        let specular = (0.04 * m.specular).lerp(color, metallic);
+        let smooth_metal = if roughness < MIRROR_ROUGHNESS {
+            metallic
+        } else {
+            0.0
+        };
+        let mirror = m.mirror.max(smooth_metal * (1.0 - roughness));
+        let opaque = (1.0 - m.transmission) * (1.0 - m.mirror);
+        Surface {
+            albedo: color * (1.0 - metallic) * opaque,
+            specular,
+            mirror,
+            mirror_tint: Vec3::ONE.lerp(color, metallic),
+            polished: mirror > 0.0 || m.transmission > 0.0 || roughness < POLISHED_ROUGHNESS,
+            exponent: highlight_exponent(roughness),
+            transmission: m.transmission,
+            tint: color,
+            ior: m.ior.max(1.0),
+            alpha: match m.alpha {
+                AlphaMode::Blend => base.w.clamp(0.0, 1.0),
+                _ => 1.0,
+            },
+            emissive,
+        }
+    }
+
+    /// Alpha of a masked or blended material at full resolution.
+    fn alpha(&self, material: &Material, uv: impl Fn(u32) -> Vec2) -> f32 {
+        let texel = material.base_color_texture.as_ref().and_then(|t| {
+            let pyramid = self.pyramids.get(t.image)?.as_ref()?;
+            Some(pyramid.sample(t, uv(t.uv_set), 0.0, &self.srgb).w)
+        });
+        material.base_color.w * texel.unwrap_or(1.0)
+    }
+
+    /// True where the surface stops a ray that looks for its closest hit.
+    #[must_use]
+    pub fn stops(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
+        let material = &self.materials[soup.material(scene, primitive)];
+        let uv = |set| soup.uv(scene, primitive, bary, set);
+        match material.alpha {
+            AlphaMode::Opaque => true,
+            AlphaMode::Mask(cutoff) => self.alpha(material, uv) >= cutoff,
+            AlphaMode::Blend => self.alpha(material, uv) >= 1.0 / 255.0,
+        }
+    }
+
+    /// True where the surface shades what lies behind: glass and thin veils do not.
+    #[must_use]
+    pub fn shades(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
+        let material = &self.materials[soup.material(scene, primitive)];
+        let uv = |set| soup.uv(scene, primitive, bary, set);
+        match material.alpha {
+            _ if material.transmission > 0.5 => false,
+            AlphaMode::Opaque => true,
+            AlphaMode::Mask(cutoff) => self.alpha(material, uv) >= cutoff,
+            AlphaMode::Blend => self.alpha(material, uv) >= 0.5,
+        }
+    }
+
+    fn sample(
+        &self,
+        texture: Option<&TextureRef>,
+        at: &Attributes,
+        footprint_m: f32,
+    ) -> Option<Vec4> {
+        let texture = texture?;
+        let pyramid = self.pyramids.get(texture.image)?.as_ref()?;
+        let set = usize::from(texture.uv_set == 1);
+        let [[a, b, _], [d, e, _]] = texture.uv_transform;
+        let [width, height] = pyramid.size();
+        let scale = (a * e - b * d).abs() * width as f32 * height as f32;
+        // Texels across the footprint, squared.
+        let texels = at.uv_density[set] * scale * footprint_m * footprint_m;
+        let lod = 0.5 * fast_log2(texels);
+        Some(pyramid.sample(texture, at.uv[set], lod, &self.srgb))
+    }
+}
+
+/// True where rays must look at alpha or may pass unhindered.
+#[must_use]
+pub fn needs_alpha_test(m: &Material) -> bool {
+    m.alpha != AlphaMode::Opaque || m.transmission > 0.0
+}
+
+/// The textures that rays read of a material.
+fn ray_textures(m: &Material) -> impl Iterator<Item = TextureRef> {
+    [
+        m.base_color_texture,
+        m.metallic_roughness_texture,
+        m.emissive_texture,
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// Blinn-Phong exponent of a roughness (Karis 2013), 0 where there is no visible highlight.
+fn highlight_exponent(roughness: f32) -> u32 {
+    if roughness >= GLOSSY_ROUGHNESS {
+        return 0;
+    }
+    let a = roughness.max(0.05);
+    (2.0 / (a * a * a * a) - 2.0).clamp(1.0, 4096.0) as u32
+}
+
+fn describe(m: &Material) -> RayMaterial {
+    let glass = m.transmission > 0.0 || m.alpha == AlphaMode::Blend;
+    // Textures scale both factors down: a smoother texel or a metal one can be anywhere.
+    let may_be_smooth = m.metallic_roughness_texture.is_some() || m.roughness < MIRROR_ROUGHNESS;
+    let metal = m.metallic > 0.0 && may_be_smooth;
+    let polished = m.metallic_roughness_texture.is_some() || m.roughness < POLISHED_ROUGHNESS;
+    let glossy = m.metallic_roughness_texture.is_some() || m.roughness < GLOSSY_ROUGHNESS;
+    RayMaterial {
+        name: m.name.clone(),
+        diffuse: m.transmission < 1.0 && m.mirror < 1.0 && (m.metallic < 1.0 || may_be_smooth),
+        mirror: m.mirror > 0.0 || metal || polished,
+        glass,
+        glossy,
+        alpha_masked: matches!(m.alpha, AlphaMode::Mask(_)),
+    }
+}

@@ -1,0 +1,109 @@
+//! Everything that rays need of a scene, prepared once and shared by all threads.
+
+use super::bvh::{AlphaTest, Bvh, BvhError};
+use super::light::Sky;
+use super::material::Materials;
+use super::soup::Soup;
+use formats::raytrace::RayLight;
+use scene::{Light, Scene};
+
+/// A scene ready to be traced.
+pub struct TraceScene {
+    /// The scene without its images.
+    pub scene: Scene,
+    /// Its triangles.
+    pub soup: Soup,
+    /// The hierarchy over them.
+    pub bvh: Bvh,
+    /// Its materials with their textures.
+    pub materials: Materials,
+    /// Its lights, relative to the soup's origin.
+    pub lights: Vec<RayLight>,
+    /// Background and ambient light.
+    pub sky: Sky,
+}
+
+impl TraceScene {
+    /// Prepares a scene.
+    ///
+    /// # Errors
+    /// The scene has too many triangles.
+    pub fn new(mut scene: Scene) -> Result<Self, BvhError> {
+        let soup = Soup::new(&scene);
+        let (bvh, materials) = rayon::join(
+            || {
+                let masked: Vec<bool> = scene
+                    .materials
+                    .iter()
+                    .map(super::material::needs_alpha_test)
+                    .collect();
+                Bvh::build(&soup.triangles, |p| {
+                    masked
+                        .get(soup.material(&scene, p))
+                        .copied()
+                        .unwrap_or(false)
+                })
+            },
+            || Materials::new(&scene),
+        );
+        let bvh = bvh?;
+        scene.images = Vec::new();
+        let lights = scene
+            .lights
+            .iter()
+            .map(|light| match *light {
+                Light::Directional { direction, color } => RayLight::Directional {
+                    direction: direction.normalize_or(-glam::Vec3::Y).to_array(),
+                    color: color.to_array(),
+                },
+                Light::Point { position, color } => RayLight::Point {
+                    position: (position.as_dvec3() - soup.origin).as_vec3().to_array(),
+                    color: color.to_array(),
+                },
+            })
+            .collect();
+        let sky = Sky::new(&scene);
+        Ok(Self {
+            scene,
+            soup,
+            bvh,
+            materials,
+            lights,
+            sky,
+        })
+    }
+
+    /// The test of rays that look for their closest hit.
+    #[must_use]
+    pub fn stopping(&self) -> Stopping<'_> {
+        Stopping(self)
+    }
+
+    /// The test of shadow rays.
+    #[must_use]
+    pub fn shading(&self) -> Shading<'_> {
+        Shading(self)
+    }
+}
+
+/// Masked-out texels let rays through.
+#[derive(Clone, Copy)]
+pub struct Stopping<'a>(&'a TraceScene);
+
+impl AlphaTest for Stopping<'_> {
+    fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool {
+        let s = self.0;
+        s.materials.stops(&s.scene, &s.soup, primitive, bary)
+    }
+}
+
+/// Masked-out texels and glass let light through.
+#[derive(Clone, Copy)]
+pub struct Shading<'a>(&'a TraceScene);
+
+impl AlphaTest for Shading<'_> {
+    fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool {
+        let s = self.0;
+        s.materials.shades(&s.scene, &s.soup, primitive, bary)
+    }
+}

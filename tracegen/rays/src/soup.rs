@@ -1,0 +1,156 @@
+//! A scene as one list of world-space triangles, with a way back to the mesh of each.
+
+use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3};
+use scene::{Mesh, Scene};
+
+/// All triangles of all instances, in submission order, relative to `origin`.
+pub struct Soup {
+    /// World position that the triangles are relative to: the middle of the scene's bounds, so
+    /// that rounding to `f32` is as fine as it can be.
+    pub origin: DVec3,
+    /// Vertices, counter-clockwise from the front.
+    pub triangles: Vec<[[f32; 3]; 3]>,
+    /// Object (instance) of each triangle.
+    pub objects: Vec<u32>,
+    /// First triangle of each object.
+    first_of_object: Vec<u32>,
+    /// Inverse transpose of each object's transform.
+    normal_matrices: Vec<Mat3>,
+    /// Objects whose transform turns the winding round.
+    mirrored: Vec<bool>,
+}
+
+/// Attributes at a point of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attributes {
+    /// Unit normal on the triangle's front side, from the vertices.
+    pub geometric_normal: Vec3,
+    /// Unit interpolated normal; the geometric one where the mesh has none of use.
+    pub shading_normal: Vec3,
+    /// Texture coordinates of both sets.
+    pub uv: [Vec2; 2],
+    /// Areas of the triangle in each texture set per area in the world.
+    pub uv_density: [f32; 2],
+}
+
+impl Soup {
+    /// Flattens a scene. Positions are transformed and recentred in `f64`.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        let transforms: Vec<DAffine3> = scene
+            .instances
+            .iter()
+            .map(|i| DAffine3 {
+                matrix3: i.transform.matrix3.as_dmat3(),
+                translation: i.transform.translation.as_dvec3(),
+            })
+            .collect();
+        let world = || {
+            scene.instances.iter().zip(&transforms).flat_map(|(i, t)| {
+                let positions = &scene.meshes[i.mesh].positions;
+                positions.iter().map(|p| t.transform_point3(p.as_dvec3()))
+            })
+        };
+        let bounds = world()
+            .filter(|p| p.is_finite())
+            .map(|p| (p, p))
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let origin = bounds.map_or(DVec3::ZERO, |(lo, hi)| (lo + hi) / 2.0);
+        let mut soup = Self {
+            origin,
+            triangles: Vec::new(),
+            objects: Vec::new(),
+            first_of_object: Vec::new(),
+            normal_matrices: Vec::new(),
+            mirrored: Vec::new(),
+        };
+        let mut moved: Vec<[f32; 3]> = Vec::new();
+        for (object, (instance, transform)) in (0u32..).zip(scene.instances.iter().zip(&transforms))
+        {
+            let mesh = &scene.meshes[instance.mesh];
+            moved.clear();
+            moved.extend(mesh.positions.iter().map(|p| {
+                (transform.transform_point3(p.as_dvec3()) - origin)
+                    .as_vec3()
+                    .to_array()
+            }));
+            let mirrored = instance.mirrored();
+            soup.first_of_object.push(soup.triangles.len() as u32);
+            soup.normal_matrices.push(instance.normal_matrix());
+            soup.mirrored.push(mirrored);
+            for triangle in 0..mesh.triangles() {
+                let corners = corners(mesh, triangle, mirrored);
+                soup.triangles.push(corners.map(|v| moved[v]));
+                soup.objects.push(object);
+            }
+        }
+        soup
+    }
+
+    /// Attributes of a primitive at the weights of its second and third vertex.
+    #[must_use]
+    pub fn attributes(&self, scene: &Scene, primitive: u32, bary: [f32; 2]) -> Attributes {
+        let object = self.objects[primitive as usize] as usize;
+        let mesh = &scene.meshes[scene.instances[object].mesh];
+        let triangle = (primitive - self.first_of_object[object]) as usize;
+        let corners = corners(mesh, triangle, self.mirrored[object]);
+        let weights = [1.0 - bary[0] - bary[1], bary[0], bary[1]];
+
+        let [a, b, c] = self.triangles[primitive as usize].map(Vec3::from);
+        let cross = (b - a).as_dvec3().cross((c - a).as_dvec3());
+        let geometric_normal = cross.normalize_or_zero().as_vec3();
+        let interpolated: Vec3 = (0..3)
+            .map(|i| weights[i] * mesh.normals.get(corners[i]).copied().unwrap_or_default())
+            .sum();
+        let shading = (self.normal_matrices[object] * interpolated).normalize_or_zero();
+        let shading_normal = if shading == Vec3::ZERO || !shading.is_finite() {
+            geometric_normal
+        } else {
+            shading
+        };
+        let area = cross.length() as f32;
+        let set = |uvs: &[Vec2]| {
+            let [p, q, r] = corners.map(|v| uvs.get(v).copied().unwrap_or_default());
+            let uv = p * weights[0] + q * weights[1] + r * weights[2];
+            let uv_area = (q - p).perp_dot(r - p).abs();
+            (uv, if area > 0.0 { uv_area / area } else { 0.0 })
+        };
+        let (uv0, density0) = set(&mesh.uv0);
+        let (uv1, density1) = set(&mesh.uv1);
+        Attributes {
+            geometric_normal,
+            shading_normal,
+            uv: [uv0, uv1],
+            uv_density: [density0, density1],
+        }
+    }
+
+    /// Texture coordinates only: all that an alpha test needs.
+    #[must_use]
+    pub fn uv(&self, scene: &Scene, primitive: u32, bary: [f32; 2], set: u32) -> Vec2 {
+        let object = self.objects[primitive as usize] as usize;
+        let mesh = &scene.meshes[scene.instances[object].mesh];
+        let triangle = (primitive - self.first_of_object[object]) as usize;
+        let uvs = if set == 0 { &mesh.uv0 } else { &mesh.uv1 };
+        let [p, q, r] = corners(mesh, triangle, self.mirrored[object])
+            .map(|v| uvs.get(v).copied().unwrap_or_default());
+        p * (1.0 - bary[0] - bary[1]) + q * bary[0] + r * bary[1]
+    }
+
+    /// Material of a primitive.
+    #[must_use]
+    pub fn material(&self, scene: &Scene, primitive: u32) -> usize {
+        let object = self.objects[primitive as usize] as usize;
+        scene.meshes[scene.instances[object].mesh].material
+    }
+}
+
+/// Vertex numbers of a triangle, counter-clockwise from its front in the world.
+fn corners(mesh: &Mesh, triangle: usize, mirrored: bool) -> [usize; 3] {
+    let at = |i: usize| mesh.indices[triangle * 3 + i] as usize;
+    if mirrored {
+        [at(0), at(2), at(1)]
+    } else {
+        [at(0), at(1), at(2)]
+    }
+}

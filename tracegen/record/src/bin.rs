@@ -1,0 +1,193 @@
+//! Sorts the records of a region by tile, primitive, quad and group.
+//!
+//! Records arrive in the driver's order, which depends on its threads. The sort key names every
+//! record of a region uniquely, so the result does not.
+
+use super::raw::RawRecord;
+use formats::textrace::quad_morton;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A rectangle of tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileRect {
+    /// First column and row.
+    pub origin: [u32; 2],
+    /// Columns and rows.
+    pub size: [u32; 2],
+}
+
+impl TileRect {
+    /// Number of tiles.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
+    }
+
+    /// Column and row of the `index`th tile, row by row.
+    #[must_use]
+    pub fn tile(&self, index: usize) -> [u32; 2] {
+        let index = index as u32;
+        [
+            self.origin[0] + index % self.size[0],
+            self.origin[1] + index / self.size[0],
+        ]
+    }
+
+    /// Position of the tile that holds a record's quad, or `None` where it is outside.
+    fn index(&self, record: &RawRecord) -> Option<usize> {
+        let column = (record.qx() / 8)
+            .checked_sub(self.origin[0])
+            .filter(|c| *c < self.size[0])?;
+        let row = (record.qy() / 8)
+            .checked_sub(self.origin[1])
+            .filter(|r| *r < self.size[1])?;
+        Some((row * self.size[0] + column) as usize)
+    }
+}
+
+/// Indices of a region's records by tile, in no order within a tile.
+pub struct Bins {
+    chunks: Vec<Chunk>,
+}
+
+struct Chunk {
+    /// Where each tile's indices start; one more than there are tiles.
+    starts: Vec<u32>,
+    indices: Vec<u32>,
+}
+
+impl Bins {
+    /// Counting sort by tile, in parallel over chunks of the records. Records outside `rect` are
+    /// left out.
+    #[must_use]
+    pub fn new(records: &[RawRecord], rect: &TileRect) -> Self {
+        let chunk_len = records
+            .len()
+            .div_ceil(4 * rayon::current_num_threads())
+            .max(4096);
+        let chunks = records
+            .par_chunks(chunk_len)
+            .enumerate()
+            .map(|(number, records)| Chunk::new(records, (number * chunk_len) as u32, rect))
+            .collect();
+        Self { chunks }
+    }
+
+    /// Calls `visit` with every record index of a tile.
+    pub fn visit(&self, tile: usize, mut visit: impl FnMut(u32)) {
+        for chunk in &self.chunks {
+            chunk.indices[chunk.range(tile)]
+                .iter()
+                .for_each(|&i| visit(i));
+        }
+    }
+}
+
+impl Chunk {
+    fn new(records: &[RawRecord], first: u32, rect: &TileRect) -> Self {
+        let mut starts = vec![0_u32; rect.count() + 1];
+        let tiles: Vec<Option<usize>> = records.iter().map(|r| rect.index(r)).collect();
+        for &tile in tiles.iter().flatten() {
+            starts[tile + 1] += 1;
+        }
+        for tile in 0..rect.count() {
+            starts[tile + 1] += starts[tile];
+        }
+        let mut next = starts.clone();
+        let mut indices = vec![0; tiles.iter().flatten().count()];
+        for (index, tile) in (first..).zip(tiles) {
+            if let Some(tile) = tile {
+                indices[next[tile] as usize] = index;
+                next[tile] += 1;
+            }
+        }
+        Self { starts, indices }
+    }
+
+    fn range(&self, tile: usize) -> Range<usize> {
+        self.starts[tile] as usize..self.starts[tile + 1] as usize
+    }
+}
+
+/// Sort key within a tile: primitive, Morton position of the quad, group, mask. A primitive that
+/// was clipped into several triangles may cover one quad twice, with disjoint masks.
+#[must_use]
+pub fn sort_key(record: &RawRecord) -> u64 {
+    let morton = quad_morton((record.qx() & 7) as u8, (record.qy() & 7) as u8);
+    u64::from(record.primitive) << 32
+        | u64::from(morton) << 8
+        | u64::from(record.group()) << 4
+        | u64::from(record.mask())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn records(count: u32) -> Vec<RawRecord> {
+        let mut state = 7_u32;
+        (0..count)
+            .map(|i| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                RawRecord {
+                    header: RawRecord::pack(state >> 8 & 63, state >> 16 & 31, 15, 0),
+                    primitive: i,
+                    ..RawRecord::default()
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_record_lies_in_its_tile_once() {
+        let records = records(20_000);
+        let rect = TileRect {
+            origin: [0, 0],
+            size: [8, 4],
+        };
+        let bins = Bins::new(&records, &rect);
+        let mut seen = vec![0; records.len()];
+        for tile in 0..rect.count() {
+            let [column, row] = rect.tile(tile);
+            bins.visit(tile, |i| {
+                let r = &records[i as usize];
+                assert_eq!([r.qx() / 8, r.qy() / 8], [column, row]);
+                seen[i as usize] += 1;
+            });
+        }
+        assert!(seen.iter().all(|&n| n == 1));
+    }
+
+    #[test]
+    fn records_outside_the_rectangle_are_left_out() {
+        let records = records(20_000);
+        let rect = TileRect {
+            origin: [2, 1],
+            size: [3, 2],
+        };
+        let bins = Bins::new(&records, &rect);
+        let mut found = 0;
+        for tile in 0..rect.count() {
+            bins.visit(tile, |_| found += 1);
+        }
+        let inside =
+            |r: &&RawRecord| (2..5).contains(&(r.qx() / 8)) && (1..3).contains(&(r.qy() / 8));
+        assert_eq!(found, records.iter().filter(inside).count());
+    }
+
+    #[test]
+    fn keys_order_primitives_then_quads_then_groups() {
+        let key = |primitive, qx, qy, group| {
+            sort_key(&RawRecord {
+                header: RawRecord::pack(qx, qy, 1, group),
+                primitive,
+                ..RawRecord::default()
+            })
+        };
+        assert!(key(1, 7, 7, 15) < key(2, 0, 0, 0));
+        assert!(key(1, 1, 0, 15) < key(1, 0, 1, 0));
+        assert!(key(1, 8, 0, 0) < key(1, 9, 0, 0));
+        assert!(key(1, 3, 3, 2) < key(1, 3, 3, 3));
+    }
+}

@@ -1,0 +1,102 @@
+//! Replays the depth test inside an alpha-masked draw.
+//!
+//! A masked draw is captured with a forced early test against the depth of the draws before it
+//! (see `fragment_masked_record`), so the driver has not tested its primitives against each other.
+//! An in-order GPU with early test and late write would have: a lane survives if it is nearer than
+//! every earlier primitive of the draw whose alpha passed at that pixel.
+
+use super::raw::RawDepth;
+
+/// Pixels along a tile's edge.
+const EDGE: usize = formats::view::TILE_SIZE_PX as usize;
+
+/// Depth that one masked draw has written so far in one tile.
+#[derive(Clone, Debug)]
+pub struct MaskedDepth {
+    draw: Option<u32>,
+    nearest: [f32; EDGE * EDGE],
+}
+
+impl Default for MaskedDepth {
+    fn default() -> Self {
+        Self {
+            draw: None,
+            nearest: [f32::INFINITY; EDGE * EDGE],
+        }
+    }
+}
+
+impl MaskedDepth {
+    /// Forgets everything, for the next tile.
+    pub fn clear(&mut self) {
+        self.draw = None;
+    }
+
+    /// Lanes of a covered quad of `draw` that survive; quads must come in submission order. `x`
+    /// and `y` are the quad's column and row in the tile.
+    pub fn survivors(&mut self, draw: u32, x: u8, y: u8, covered: u8, record: &RawDepth) -> u8 {
+        if self.draw.replace(draw) != Some(draw) {
+            self.nearest.fill(f32::INFINITY);
+        }
+        let mut survivors = 0;
+        for (lane, &depth) in record.depth.iter().enumerate() {
+            let pixel = (2 * usize::from(y) + (lane >> 1)) * EDGE + 2 * usize::from(x) + (lane & 1);
+            let Some(nearest) = self.nearest.get_mut(pixel) else {
+                continue;
+            };
+            if covered >> lane & 1 == 1 && depth < *nearest {
+                survivors |= 1 << lane;
+                if record.passing >> lane & 1 == 1 {
+                    *nearest = depth;
+                }
+            }
+        }
+        survivors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(passing: u32, depth: [f32; 4]) -> RawDepth {
+        RawDepth { depth, passing }
+    }
+
+    #[test]
+    fn a_lane_behind_an_earlier_passing_primitive_is_killed() {
+        let mut depth = MaskedDepth::default();
+        assert_eq!(
+            depth.survivors(3, 7, 7, 0b1111, &record(0b0101, [0.5; 4])),
+            0b1111
+        );
+        assert_eq!(
+            depth.survivors(3, 7, 7, 0b1111, &record(0b1111, [0.6; 4])),
+            0b1010
+        );
+    }
+
+    #[test]
+    fn a_nearer_lane_survives_and_equal_depth_does_not() {
+        let mut depth = MaskedDepth::default();
+        depth.survivors(3, 0, 0, 0b1111, &record(0b1111, [0.5; 4]));
+        let next = record(0, [0.4, 0.5, 0.6, 0.1]);
+        assert_eq!(depth.survivors(3, 0, 0, 0b0111, &next), 0b0001);
+    }
+
+    #[test]
+    fn a_killed_lane_writes_no_depth() {
+        let mut depth = MaskedDepth::default();
+        depth.survivors(3, 0, 0, 1, &record(1, [0.5; 4]));
+        depth.survivors(3, 0, 0, 1, &record(1, [0.7; 4]));
+        assert_eq!(depth.survivors(3, 0, 0, 1, &record(1, [0.6; 4])), 0);
+        assert_eq!(depth.survivors(3, 0, 0, 1, &record(1, [0.45; 4])), 1);
+    }
+
+    #[test]
+    fn draws_do_not_see_each_others_depth() {
+        let mut depth = MaskedDepth::default();
+        depth.survivors(3, 0, 0, 1, &record(1, [0.5; 4]));
+        assert_eq!(depth.survivors(4, 0, 0, 1, &record(1, [0.9; 4])), 1);
+    }
+}

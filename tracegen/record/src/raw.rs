@@ -1,0 +1,79 @@
+//! What a capturer hands over.
+
+/// Bytes of one raw record.
+pub const RECORD_BYTES: u64 = 44;
+
+/// Bytes of one raw depth.
+pub const DEPTH_BYTES: u64 = 20;
+
+/// One covered quad in one uv group as the instrumented shader writes it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct RawRecord {
+    /// `qx:12 | qy:12 << 12 | mask:4 << 24 | group:4 << 28`, quads of the whole view.
+    pub header: u32,
+    /// Global primitive number.
+    pub primitive: u32,
+    /// Index into the draw table.
+    pub draw: u32,
+    /// Coordinates of the top-left lane, covered or not.
+    pub uv: [f32; 2],
+    /// Horizontal derivative of the top row.
+    pub dx: [f32; 2],
+    /// Vertical derivative of the left column.
+    pub dy: [f32; 2],
+    /// Change of the horizontal derivative from the top row to the bottom row.
+    pub cross: [f32; 2],
+}
+
+impl RawRecord {
+    /// Quad column in the view.
+    #[must_use]
+    pub fn qx(&self) -> u32 {
+        self.header & 0xfff
+    }
+
+    /// Quad row in the view.
+    #[must_use]
+    pub fn qy(&self) -> u32 {
+        self.header >> 12 & 0xfff
+    }
+
+    /// Covered lanes, bit 0 top left, 1 top right, 2 bottom left, 3 bottom right.
+    #[must_use]
+    pub fn mask(&self) -> u8 {
+        (self.header >> 24 & 15) as u8
+    }
+
+    /// Uv group or `NO_GROUP`.
+    #[must_use]
+    pub fn group(&self) -> u8 {
+        (self.header >> 28) as u8
+    }
+
+    /// Packs position, mask and group.
+    #[must_use]
+    pub fn pack(qx: u32, qy: u32, mask: u8, group: u8) -> u32 {
+        qx & 0xfff | (qy & 0xfff) << 12 | u32::from(mask & 15) << 24 | u32::from(group) << 28
+    }
+}
+
+/// What the in-order replay of an alpha-masked draw needs to know about a quad.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct RawDepth {
+    /// Depth of each lane.
+    pub depth: [f32; 4],
+    /// Covered lanes whose alpha passes the test.
+    pub passing: u32,
+}
+
+/// The raw records of one region, in no particular order.
+#[derive(Clone, Copy, Debug)]
+pub struct RawRecords<'a> {
+    /// One a quad and uv group.
+    pub quads: &'a [RawRecord],
+    /// `depths[i]` belongs to `quads[i]` where that is group 0 of a masked draw, and means nothing
+    /// elsewhere; empty where no draw is masked.
+    pub depths: &'a [RawDepth],
+}

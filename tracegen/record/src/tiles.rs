@@ -1,0 +1,196 @@
+//! From a tile's raw records to the trace's `Tile`.
+
+use super::bin::{Bins, sort_key};
+use super::masked::MaskedDepth;
+use super::quantise::{GroupScale, Quantiser};
+use super::raw::{RawRecord, RawRecords};
+use formats::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, Tables, Tile};
+use std::ops::AddAssign;
+
+/// What a capture counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CaptureCounts {
+    /// Covered quads, counted once whatever the number of their uv groups.
+    pub quads: u64,
+    /// Covered lanes of those quads.
+    pub fragments: u64,
+    /// Records in the trace.
+    pub records: u64,
+    /// Lanes of masked draws that the in-order depth test killed.
+    pub masked_lanes_killed: u64,
+    /// Records left out because a coordinate was not finite.
+    pub not_finite: u64,
+    /// Bytes of the encoded tiles.
+    pub tile_bytes: u64,
+}
+
+impl AddAssign for CaptureCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.quads += other.quads;
+        self.fragments += other.fragments;
+        self.records += other.records;
+        self.masked_lanes_killed += other.masked_lanes_killed;
+        self.not_finite += other.not_finite;
+        self.tile_bytes += other.tile_bytes;
+    }
+}
+
+/// What building tiles needs to know about the draws.
+pub struct TileRules {
+    /// By draw and group.
+    scales: Vec<Vec<GroupScale>>,
+    /// By draw: its quads carry depths.
+    masked: Vec<bool>,
+}
+
+/// Memory that building a tile reuses.
+#[derive(Default)]
+pub struct Scratch {
+    order: Vec<(u64, u32)>,
+    depth: MaskedDepth,
+    quantisers: [Quantiser; 16],
+    /// The last tile built.
+    pub tile: Tile,
+}
+
+impl TileRules {
+    /// Rules for the draws of `tables`; `masked` tells of each whether its quads carry depths.
+    #[must_use]
+    pub fn new(tables: &Tables, masked: Vec<bool>) -> Self {
+        Self {
+            scales: tables
+                .draws
+                .iter()
+                .map(|draw| {
+                    draw.groups
+                        .iter()
+                        .map(|g| GroupScale::new(g, &tables.samplers))
+                        .collect()
+                })
+                .collect(),
+            masked,
+        }
+    }
+
+    /// Builds tile `tile` of the bins into `scratch.tile`.
+    pub fn build(
+        &self,
+        records: RawRecords<'_>,
+        bins: &Bins,
+        tile: usize,
+        scratch: &mut Scratch,
+    ) -> CaptureCounts {
+        scratch.order.clear();
+        bins.visit(tile, |i| {
+            scratch
+                .order
+                .push((sort_key(&records.quads[i as usize]), i))
+        });
+        scratch.order.sort_unstable();
+        scratch.tile.clear();
+        scratch.depth.clear();
+        let mut counts = CaptureCounts::default();
+        let order = std::mem::take(&mut scratch.order);
+        for quad in order.chunk_by(|a, b| a.0 >> 8 == b.0 >> 8) {
+            self.add_quad(records, quad, scratch, &mut counts);
+        }
+        scratch.order = order;
+        if scratch.tile.runs.last().is_some_and(|run| run.count == 0) {
+            scratch.tile.runs.pop();
+        }
+        counts.records = scratch.tile.records.len() as u64;
+        counts
+    }
+
+    /// Adds the records of one quad of one primitive.
+    fn add_quad(
+        &self,
+        records: RawRecords<'_>,
+        quad: &[(u64, u32)],
+        scratch: &mut Scratch,
+        counts: &mut CaptureCounts,
+    ) {
+        let of = |entry: &(u64, u32)| &records.quads[entry.1 as usize];
+        let Some(first) = quad.first().map(of) else {
+            return;
+        };
+        let (x, y) = ((first.qx() & 7) as u8, (first.qy() & 7) as u8);
+        let mut alive = 15;
+        if self.masked.get(first.draw as usize) == Some(&true) {
+            alive = 0;
+            for &(_, index) in quad.iter().filter(|entry| of(entry).group() == 0) {
+                let (Some(depth), covered) =
+                    (records.depths.get(index as usize), of(&(0, index)).mask())
+                else {
+                    continue;
+                };
+                let survivors = scratch.depth.survivors(first.draw, x, y, covered, depth);
+                counts.masked_lanes_killed += u64::from((covered & !survivors).count_ones());
+                alive |= survivors;
+            }
+        }
+        let mut lanes = 0;
+        for record in quad.iter().map(of) {
+            let mask = record.mask() & alive;
+            if mask == 0 {
+                continue;
+            }
+            lanes |= mask;
+            let mut result = QuadRecord {
+                x,
+                y,
+                mask,
+                group: record.group(),
+                ..QuadRecord::default()
+            };
+            self.open_run(record, scratch);
+            if record.group() != NO_GROUP {
+                let rule = self
+                    .scales
+                    .get(record.draw as usize)
+                    .and_then(|g| g.get(usize::from(record.group())));
+                let quantiser = &mut scratch.quantisers[usize::from(record.group())];
+                let Some(fixed) = rule.and_then(|rule| quantiser.quantise(rule, record)) else {
+                    counts.not_finite += 1;
+                    continue;
+                };
+                result.uv = fixed.uv;
+                result.dx = fixed.dx;
+                result.dy = fixed.dy;
+                result.cross = fixed.cross;
+            }
+            push(&mut scratch.tile, result);
+        }
+        counts.quads += u64::from(lanes != 0);
+        counts.fragments += u64::from(lanes.count_ones());
+    }
+
+    /// Starts the run of the record's primitive unless it is the one under way.
+    fn open_run(&self, record: &RawRecord, scratch: &mut Scratch) {
+        let tile = &mut scratch.tile;
+        if tile
+            .runs
+            .last()
+            .is_none_or(|run| run.primitive != record.primitive)
+        {
+            // A run whose records were all left out makes room for the next.
+            if tile.runs.last().is_some_and(|run| run.count == 0) {
+                tile.runs.pop();
+            }
+            tile.runs.push(PrimitiveRun {
+                primitive: record.primitive,
+                draw: record.draw,
+                first: tile.records.len() as u32,
+                count: 0,
+            });
+            scratch.quantisers = Default::default();
+        }
+    }
+}
+
+fn push(tile: &mut Tile, record: QuadRecord) {
+    tile.records.push(record);
+    if let Some(run) = tile.runs.last_mut() {
+        run.count += 1;
+    }
+}

@@ -1,0 +1,257 @@
+//! Range-checked reading of accessors.
+
+use crate::SceneError;
+use crate::files::Origin;
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
+use std::sync::Arc;
+
+/// Most elements of an accessor without a buffer view: zeros cost a hostile file nothing.
+const MAX_ZEROS: u64 = 1 << 22;
+
+/// The JSON tables and the bytes that they describe.
+pub(super) struct Buffers<'a> {
+    pub root: &'a Root,
+    pub origin: &'a Origin,
+    bytes: Vec<Arc<[u8]>>,
+}
+
+/// Elements of an accessor: `count` of them, `stride` bytes apart.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+}
+
+impl<'a> Buffers<'a> {
+    pub fn new(root: &'a Root, bytes: Vec<Arc<[u8]>>, origin: &'a Origin) -> Self {
+        Self {
+            root,
+            origin,
+            bytes,
+        }
+    }
+
+    /// The bytes of a buffer view.
+    pub fn view(&self, index: usize) -> Result<&[u8], SceneError> {
+        let place = || format!("bufferViews[{index}]");
+        let Some(view) = self.root.buffer_views.get(index) else {
+            return Err(self.origin.invalid(
+                place(),
+                format!("one of {} buffer views", self.root.buffer_views.len()),
+                index.to_string(),
+            ));
+        };
+        let buffer = view.buffer.value();
+        let start = view.byte_offset.map_or(0, |o| o.0);
+        let length = view.byte_length.0;
+        let bytes = self.bytes.get(buffer).map_or(&[][..], |b| b);
+        slice(bytes, start, length).ok_or_else(|| {
+            self.origin.invalid(
+                place(),
+                format!("a range inside buffers[{buffer}] of {} bytes", bytes.len()),
+                format!("{length} bytes at {start}"),
+            )
+        })
+    }
+
+    /// Elements of `N` floats; integers are converted, normalized ones as glTF says.
+    pub fn floats<const N: usize>(
+        &self,
+        index: usize,
+        expected: &str,
+    ) -> Result<Vec<[f32; N]>, SceneError> {
+        let (accessor, component) = self.accessor(index)?;
+        let wanted = match N {
+            1 => Type::Scalar,
+            2 => Type::Vec2,
+            3 => Type::Vec3,
+            _ => Type::Vec4,
+        };
+        let allowed = component == ComponentType::F32
+            || (accessor.normalized && component != ComponentType::U32);
+        if accessor.type_ != Checked::Valid(wanted) || !allowed {
+            return Err(self.origin.invalid(
+                format!("accessors[{index}]"),
+                expected,
+                format!("{:?} of {component:?}", valid(&accessor.type_)),
+            ));
+        }
+        let read = |bytes: &[u8]| {
+            std::array::from_fn(|i| read_float(&bytes[i * component.size()..], component))
+        };
+        self.elements(index, accessor, N * component.size(), [0.0; N], read)
+    }
+
+    /// Unsigned scalars.
+    pub fn indices(&self, index: usize) -> Result<Vec<u32>, SceneError> {
+        let (accessor, component) = self.accessor(index)?;
+        let unsigned = matches!(
+            component,
+            ComponentType::U8 | ComponentType::U16 | ComponentType::U32
+        );
+        if accessor.type_ != Checked::Valid(Type::Scalar) || !unsigned {
+            return Err(self.origin.invalid(
+                format!("accessors[{index}]"),
+                "indices: scalars of U8, U16 or U32",
+                format!("{:?} of {component:?}", valid(&accessor.type_)),
+            ));
+        }
+        let read = |bytes: &[u8]| read_index(bytes, component);
+        self.elements(index, accessor, component.size(), 0, read)
+    }
+
+    fn accessor(&self, index: usize) -> Result<(&Accessor, ComponentType), SceneError> {
+        let accessor = self.root.accessors.get(index);
+        match accessor.map(|a| (a, valid(&a.component_type))) {
+            Some((accessor, Some(component))) => Ok((accessor, component.0)),
+            _ => Err(self.origin.invalid(
+                format!("accessors[{index}]"),
+                format!("one of {} valid accessors", self.root.accessors.len()),
+                "none",
+            )),
+        }
+    }
+
+    fn elements<T: Clone>(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        size: usize,
+        zero: T,
+        read: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>, SceneError> {
+        let count = accessor.count.0;
+        let place = || format!("accessors[{index}]");
+        let mut values = match accessor.buffer_view {
+            Some(view) => {
+                let offset = accessor.byte_offset.map_or(0, |o| o.0);
+                let elements = self.strided(place(), view.value(), offset, count, size)?;
+                elements.iter(size).map(&read).collect()
+            }
+            None if count <= MAX_ZEROS => vec![zero; count as usize],
+            None => {
+                return Err(self.origin.invalid(
+                    place(),
+                    format!("at most {MAX_ZEROS} elements without a buffer view"),
+                    count.to_string(),
+                ));
+            }
+        };
+        if let Some(sparse) = &accessor.sparse {
+            let place = format!("accessors[{index}].sparse");
+            let Some(component) = valid(&sparse.indices.component_type) else {
+                return Err(self.origin.invalid(place, "valid indices", "others"));
+            };
+            let component = component.0;
+            let at = self.strided(
+                format!("{place}.indices"),
+                sparse.indices.buffer_view.value(),
+                sparse.indices.byte_offset.0,
+                sparse.count.0,
+                component.size(),
+            )?;
+            let new = self.strided(
+                format!("{place}.values"),
+                sparse.values.buffer_view.value(),
+                sparse.values.byte_offset.0,
+                sparse.count.0,
+                size,
+            )?;
+            for (at, new) in at.iter(component.size()).zip(new.iter(size)) {
+                let at = read_index(at, component);
+                let Some(value) = values.get_mut(at as usize) else {
+                    return Err(self.origin.invalid(
+                        place,
+                        format!("indices below {count}"),
+                        at.to_string(),
+                    ));
+                };
+                *value = read(new);
+            }
+        }
+        Ok(values)
+    }
+
+    /// `count` elements of `size` bytes, checked to lie inside the view before any is read.
+    fn strided(
+        &self,
+        place: String,
+        view: usize,
+        offset: u64,
+        count: u64,
+        size: usize,
+    ) -> Result<Elements<'_>, SceneError> {
+        let bytes = self.view(view)?;
+        let stride = self.root.buffer_views[view]
+            .byte_stride
+            .map_or(size, |s| s.0)
+            .max(1);
+        let needed = match count.checked_sub(1) {
+            None => Some(0),
+            Some(last) => last
+                .checked_mul(stride as u64)
+                .and_then(|n| n.checked_add(size as u64)),
+        };
+        needed
+            .and_then(|needed| slice(bytes, offset, needed))
+            .map(|bytes| Elements { bytes, stride })
+            .ok_or_else(|| {
+                self.origin.invalid(
+                    place,
+                    format!(
+                        "a range inside bufferViews[{view}] of {} bytes",
+                        bytes.len()
+                    ),
+                    format!("{count} elements of {size} bytes, {stride} apart, at {offset}"),
+                )
+            })
+    }
+}
+
+impl<'a> Elements<'a> {
+    fn iter(&self, size: usize) -> impl Iterator<Item = &'a [u8]> + use<'a> {
+        self.bytes
+            .chunks(self.stride)
+            .map(move |chunk| &chunk[..size])
+    }
+}
+
+/// The index's table position.
+pub(super) fn at<T>(index: &Index<T>) -> usize {
+    index.value()
+}
+
+fn valid<T: Copy>(checked: &Checked<T>) -> Option<T> {
+    match checked {
+        Checked::Valid(value) => Some(*value),
+        Checked::Invalid => None,
+    }
+}
+
+fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
+    let start = usize::try_from(start).ok()?;
+    let length = usize::try_from(length).ok()?;
+    bytes.get(start..start.checked_add(length)?)
+}
+
+fn read_float(bytes: &[u8], component: ComponentType) -> f32 {
+    match component {
+        ComponentType::F32 => f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+        ComponentType::U8 => f32::from(bytes[0]) / 255.0,
+        ComponentType::I8 => (f32::from(bytes[0] as i8) / 127.0).max(-1.0),
+        ComponentType::U16 => f32::from(u16::from_le_bytes([bytes[0], bytes[1]])) / 65535.0,
+        ComponentType::I16 => {
+            (f32::from(i16::from_le_bytes([bytes[0], bytes[1]])) / 32767.0).max(-1.0)
+        }
+        ComponentType::U32 => read_index(bytes, component) as f32,
+    }
+}
+
+fn read_index(bytes: &[u8], component: ComponentType) -> u32 {
+    match component.size() {
+        1 => u32::from(bytes[0]),
+        2 => u32::from(u16::from_le_bytes([bytes[0], bytes[1]])),
+        _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+    }
+}

@@ -1,0 +1,375 @@
+//! Materials and the textures that they sample.
+//!
+//! For the ray tracer, which follows mirror and glass paths and no glossy ones:
+//! - `transmission` is KHR_materials_transmission's factor; without it, a blended material without
+//!   a base colour texture counts as glass that lets `1 - alpha` through;
+//! - `mirror` is `metallic * (1 - roughness / 0.3)` for metals (metallic above 0.5) smoother than
+//!   0.3, and 0 for everything else. Only factors count: textured metalness is left to the maps.
+//!
+//! KHR_materials_pbrSpecularGlossiness becomes base colour, specular colour and
+//! roughness = 1 - glossiness; the glossiness channel of its texture is not used.
+
+use super::accessors::Buffers;
+use crate::files::Origin;
+use crate::images::{Request, Requests, Source, Usage};
+use crate::uri::{self, Uri};
+use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef};
+use formats::texture::{Filter, MipFilter, Sampler, Wrap};
+use glam::{Vec3, Vec4};
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::material::AlphaMode as JsonAlphaMode;
+use gltf::texture::{Info, MagFilter, MinFilter, Texture, WrappingMode};
+use serde::Deserialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Perceptual roughness from which on a metal is no mirror.
+const MIRROR_MAX_ROUGHNESS: f32 = 0.3;
+
+const TRANSFORM: &str = "KHR_texture_transform";
+
+/// What a mesh must have for its material.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Uses {
+    pub uv0: bool,
+    pub uv1: bool,
+    /// The normal map's texture coordinate set.
+    pub normal_map_uv: Option<u32>,
+}
+
+/// The materials that placed meshes use, in order of first use; others are not read.
+pub(super) struct Table<'a> {
+    document: &'a gltf::Document,
+    buffers: &'a Buffers<'a>,
+    origin: &'a Origin,
+    options: &'a LoadOptions,
+    /// glTF material of each used material (`None` is glTF's default material) and its needs.
+    used: Vec<(Option<usize>, Uses)>,
+    /// The used materials.
+    pub materials: Vec<Material>,
+    /// The images that they sample.
+    pub requests: Requests,
+    /// What was odd about them.
+    pub warnings: Vec<String>,
+    /// The material being read, for errors.
+    place: String,
+}
+
+/// One slot of a material, in the order of [`Material::textures`].
+#[derive(Clone, Copy)]
+enum Slot {
+    BaseColor = 0,
+    Normal,
+    MetallicRoughness,
+    Specular,
+    Occlusion,
+    Emissive,
+}
+
+impl<'a> Table<'a> {
+    pub fn new(
+        document: &'a gltf::Document,
+        buffers: &'a Buffers<'a>,
+        origin: &'a Origin,
+        options: &'a LoadOptions,
+    ) -> Self {
+        Self {
+            document,
+            buffers,
+            origin,
+            options,
+            used: Vec::new(),
+            materials: Vec::new(),
+            requests: Requests::default(),
+            warnings: Vec::new(),
+            place: String::new(),
+        }
+    }
+
+    /// The scene's index of a glTF material and what it needs of a mesh.
+    pub fn index(&mut self, material: Option<usize>) -> Result<(usize, Uses), SceneError> {
+        if let Some(index) = self.used.iter().position(|(m, _)| *m == material) {
+            return Ok((index, self.used[index].1));
+        }
+        let read = match material.and_then(|m| self.document.materials().nth(m)) {
+            Some(json) => self.build(&json)?,
+            // glTF's default material is fully metallic; a dielectric shows its shape better.
+            None => Material {
+                name: "default".into(),
+                ..Material::default()
+            },
+        };
+        let textures = || read.textures().into_iter().flatten();
+        let uses = Uses {
+            uv0: textures().any(|t| t.uv_set == 0),
+            uv1: textures().any(|t| t.uv_set == 1),
+            normal_map_uv: read.normal_texture.map(|t| t.uv_set),
+        };
+        self.used.push((material, uses));
+        self.materials.push(read);
+        Ok((self.materials.len() - 1, uses))
+    }
+
+    fn build(&mut self, json: &gltf::Material<'_>) -> Result<Material, SceneError> {
+        let index = json.index().unwrap_or_default();
+        let name = json
+            .name()
+            .map_or_else(|| format!("material-{index}"), str::to_owned);
+        self.place = format!("materials[{index}] '{name}'");
+        let pbr = json.pbr_metallic_roughness();
+        let mut material = Material {
+            name,
+            base_color: Vec4::from(pbr.base_color_factor()),
+            metallic: pbr.metallic_factor(),
+            roughness: pbr.roughness_factor(),
+            emissive: Vec3::from(json.emissive_factor()) * json.emissive_strength().unwrap_or(1.0),
+            double_sided: json.double_sided(),
+            ior: json.ior().filter(|&n| n > 0.0).unwrap_or(1.5),
+            alpha: match json.alpha_mode() {
+                JsonAlphaMode::Opaque => AlphaMode::Opaque,
+                JsonAlphaMode::Mask => AlphaMode::Mask(json.alpha_cutoff().unwrap_or(0.5)),
+                JsonAlphaMode::Blend => AlphaMode::Blend,
+            },
+            ..Material::default()
+        };
+        material.base_color_texture =
+            self.info(Slot::BaseColor, pbr.base_color_texture(), Usage::Color)?;
+        material.metallic_roughness_texture = self.info(
+            Slot::MetallicRoughness,
+            pbr.metallic_roughness_texture(),
+            Usage::Data,
+        )?;
+        if let Some(normal) = json.normal_texture() {
+            material.normal_scale = normal.scale();
+            let transform = self.transform(normal.extension_value(TRANSFORM))?;
+            let (texture, set) = (normal.texture(), normal.tex_coord());
+            material.normal_texture =
+                self.texture(Slot::Normal, &texture, set, transform, Usage::Data)?;
+        }
+        if let Some(occlusion) = json.occlusion_texture() {
+            let transform = self.transform(occlusion.extension_value(TRANSFORM))?;
+            let (texture, set) = (occlusion.texture(), occlusion.tex_coord());
+            material.occlusion_texture =
+                self.texture(Slot::Occlusion, &texture, set, transform, Usage::Data)?;
+        }
+        material.emissive_texture =
+            self.info(Slot::Emissive, json.emissive_texture(), Usage::Color)?;
+        if let Some(specular) = json.specular() {
+            material.specular =
+                Vec3::from(specular.specular_color_factor()) * specular.specular_factor();
+            material.specular_texture = match specular.specular_color_texture() {
+                Some(info) => self.info(Slot::Specular, Some(info), Usage::Color)?,
+                None => self.info(
+                    Slot::Specular,
+                    specular.specular_texture(),
+                    Usage::AlphaFactor,
+                )?,
+            };
+        }
+        if let Some(old) = json.pbr_specular_glossiness() {
+            material.base_color = Vec4::from(old.diffuse_factor());
+            material.metallic = 0.0;
+            material.roughness = 1.0 - old.glossiness_factor();
+            material.specular = Vec3::from(old.specular_factor());
+            material.base_color_texture =
+                self.info(Slot::BaseColor, old.diffuse_texture(), Usage::Color)?;
+            material.specular_texture = self.info(
+                Slot::Specular,
+                old.specular_glossiness_texture(),
+                Usage::Color,
+            )?;
+        }
+        if json.unlit() {
+            // Shown as it is: emitted, and nothing reflected.
+            material.emissive = material.base_color.truncate();
+            material.emissive_texture = material.base_color_texture;
+            material.base_color = Vec3::ZERO.extend(material.base_color.w);
+            material.specular = Vec3::ZERO;
+            (material.metallic, material.roughness) = (0.0, 1.0);
+        }
+        self.check_factors(&mut material);
+        material.transmission = match json.transmission() {
+            Some(transmission) => transmission.transmission_factor(),
+            None if material.alpha == AlphaMode::Blend && material.base_color_texture.is_none() => {
+                1.0 - material.base_color.w
+            }
+            None => 0.0,
+        };
+        if material.metallic > 0.5 && material.metallic_roughness_texture.is_none() {
+            let smooth = 1.0 - material.roughness / MIRROR_MAX_ROUGHNESS;
+            material.mirror = material.metallic * smooth.max(0.0);
+        }
+        Ok(material)
+    }
+
+    /// Brings factors into their ranges; NaN becomes the default.
+    fn check_factors(&mut self, material: &mut Material) {
+        let defaults = Material::default();
+        let mut bad = false;
+        let mut fix = |value: &mut f32, low: f32, high: f32, default: f32| {
+            let fixed = if value.is_nan() {
+                default
+            } else {
+                value.clamp(low, high)
+            };
+            bad |= fixed != *value;
+            *value = fixed;
+        };
+        for value in material.base_color.as_mut() {
+            fix(value, 0.0, 1.0, 1.0);
+        }
+        fix(&mut material.metallic, 0.0, 1.0, defaults.metallic);
+        fix(&mut material.roughness, 0.0, 1.0, defaults.roughness);
+        fix(&mut material.normal_scale, -100.0, 100.0, 1.0);
+        for value in material.emissive.as_mut() {
+            fix(value, 0.0, 1e6, 0.0);
+        }
+        for value in material.specular.as_mut() {
+            fix(value, 0.0, 100.0, 1.0);
+        }
+        if bad {
+            self.warnings
+                .push(format!("{} has factors out of range; clamped", self.place));
+        }
+    }
+
+    fn info(
+        &mut self,
+        slot: Slot,
+        info: Option<Info<'_>>,
+        usage: Usage,
+    ) -> Result<Option<TextureRef>, SceneError> {
+        let Some(info) = info else {
+            return Ok(None);
+        };
+        let transform = info.texture_transform().map(|t| TextureTransform {
+            offset: gltf::json::extensions::texture::TextureTransformOffset(t.offset()),
+            rotation: gltf::json::extensions::texture::TextureTransformRotation(t.rotation()),
+            scale: gltf::json::extensions::texture::TextureTransformScale(t.scale()),
+            tex_coord: t.tex_coord(),
+            extras: None,
+        });
+        self.texture(slot, &info.texture(), info.tex_coord(), transform, usage)
+    }
+
+    /// KHR_texture_transform of a normal or occlusion texture, which the crate leaves as JSON.
+    fn transform(
+        &self,
+        json: Option<&serde_json::Value>,
+    ) -> Result<Option<TextureTransform>, SceneError> {
+        json.map(TextureTransform::deserialize)
+            .transpose()
+            .map_err(|e| {
+                let place = format!("{}, {TRANSFORM}", self.place);
+                self.origin
+                    .invalid(place, "a texture transform", e.to_string())
+            })
+    }
+
+    fn texture(
+        &mut self,
+        slot: Slot,
+        texture: &Texture<'_>,
+        uv_set: u32,
+        transform: Option<TextureTransform>,
+        usage: Usage,
+    ) -> Result<Option<TextureRef>, SceneError> {
+        if !self.options.slots[slot as usize] {
+            return Ok(None);
+        }
+        let uv_set = transform
+            .as_ref()
+            .and_then(|t| t.tex_coord)
+            .unwrap_or(uv_set);
+        if uv_set > 1 {
+            self.warnings.push(format!(
+                "{} uses TEXCOORD_{uv_set}; only 0 and 1 are read, the texture is left out",
+                self.place
+            ));
+            return Ok(None);
+        }
+        let request = self.request(texture.source().index(), usage)?;
+        let uv_transform = transform.map_or(TextureRef::IDENTITY, |t| matrix(&t));
+        if !uv_transform.as_flattened().iter().all(|v| v.is_finite()) {
+            return Err(self.origin.invalid(
+                format!("{}, {TRANSFORM}", self.place),
+                "finite numbers",
+                format!("{uv_transform:?}"),
+            ));
+        }
+        Ok(Some(TextureRef {
+            image: self.requests.index(request),
+            sampler: sampler(&texture.sampler()),
+            uv_set,
+            uv_transform,
+        }))
+    }
+
+    fn request(&self, index: usize, usage: Usage) -> Result<Request, SceneError> {
+        let origin = self.origin;
+        let json = &self.buffers.root.images[index];
+        let place = format!("images[{index}], used by {}", self.place);
+        let given = json.name.clone().filter(|n| !n.is_empty());
+        let (source, name) = match (&json.uri, &json.buffer_view) {
+            (Some(uri), _) => match uri::parse(uri) {
+                Ok(Uri::Path(path)) => {
+                    let file = origin.sibling(Path::new(&path));
+                    let name = Path::new(&path).file_name();
+                    let name = name.map(|n| n.to_string_lossy().into_owned());
+                    (Source::File(file), name)
+                }
+                Ok(Uri::Data(bytes)) => (Source::Bytes(index, bytes.into()), None),
+                Err(found) => {
+                    return Err(origin.invalid(place, "a data URI or relative path", found));
+                }
+            },
+            (None, Some(view)) => {
+                let bytes: Arc<[u8]> = self.buffers.view(view.value())?.into();
+                (Source::Bytes(index, bytes), None)
+            }
+            (None, None) => {
+                return Err(origin.invalid(place, "a uri or a bufferView", "neither"));
+            }
+        };
+        Ok(Request {
+            source,
+            usage,
+            name: name.or(given).unwrap_or_else(|| format!("image-{index}")),
+            place,
+        })
+    }
+}
+
+/// KHR_texture_transform: translation * rotation * scale, rows of the 2x3 matrix.
+fn matrix(transform: &TextureTransform) -> [[f32; 3]; 2] {
+    let ([tx, ty], [sx, sy]) = (transform.offset.0, transform.scale.0);
+    let (sin, cos) = transform.rotation.0.sin_cos();
+    // The extension turns counter-clockwise with v growing downwards.
+    [[cos * sx, sin * sy, tx], [-sin * sx, cos * sy, ty]]
+}
+
+/// What a glTF sampler leaves out is trilinear.
+fn sampler(json: &gltf::texture::Sampler<'_>) -> Sampler {
+    let wrap = |mode| match mode {
+        WrappingMode::ClampToEdge => Wrap::ClampToEdge,
+        WrappingMode::MirroredRepeat => Wrap::MirroredRepeat,
+        WrappingMode::Repeat => Wrap::Repeat,
+    };
+    let (min, mip) = match json.min_filter() {
+        Some(MinFilter::Nearest) => (Filter::Nearest, MipFilter::None),
+        Some(MinFilter::Linear) => (Filter::Linear, MipFilter::None),
+        Some(MinFilter::NearestMipmapNearest) => (Filter::Nearest, MipFilter::Nearest),
+        Some(MinFilter::LinearMipmapNearest) => (Filter::Linear, MipFilter::Nearest),
+        Some(MinFilter::NearestMipmapLinear) => (Filter::Nearest, MipFilter::Linear),
+        Some(MinFilter::LinearMipmapLinear) | None => (Filter::Linear, MipFilter::Linear),
+    };
+    Sampler {
+        wrap: [wrap(json.wrap_s()), wrap(json.wrap_t())],
+        mag: match json.mag_filter() {
+            Some(MagFilter::Nearest) => Filter::Nearest,
+            Some(MagFilter::Linear) | None => Filter::Linear,
+        },
+        min,
+        mip,
+    }
+}

@@ -1,0 +1,298 @@
+//! Primitives to meshes: attributes, indices, and what the file left out.
+
+use super::accessors::Buffers;
+use super::materials::Table;
+use crate::Mesh;
+use crate::SceneError;
+use crate::geometry::{triangulate_fan, triangulate_strip, vertex_normals, vertex_tangents};
+use glam::{Vec2, Vec3, Vec4};
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+
+/// Reads every triangle primitive of a glTF mesh.
+pub(super) fn read(
+    index: usize,
+    buffers: &Buffers<'_>,
+    materials: &mut Table<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Mesh>, SceneError> {
+    let mesh = &buffers.root.meshes[index];
+    let mut meshes = Vec::with_capacity(mesh.primitives.len());
+    for (number, primitive) in mesh.primitives.iter().enumerate() {
+        let reader = Reader {
+            buffers,
+            primitive,
+            place: match &mesh.name {
+                Some(name) => format!("meshes[{index}] '{name}'.primitives[{number}]"),
+                None => format!("meshes[{index}].primitives[{number}]"),
+            },
+        };
+        if let Some(mut read) = reader.read(materials, warnings)? {
+            let name = mesh.name.clone().unwrap_or_else(|| format!("mesh-{index}"));
+            read.name = if mesh.primitives.len() > 1 {
+                format!("{name}.{number}")
+            } else {
+                name
+            };
+            meshes.push(read);
+        }
+    }
+    Ok(meshes)
+}
+
+struct Reader<'a> {
+    buffers: &'a Buffers<'a>,
+    primitive: &'a Primitive,
+    /// For errors.
+    place: String,
+}
+
+impl Reader<'_> {
+    /// `None` for what holds no triangles.
+    fn read(
+        &self,
+        materials: &mut Table<'_>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Mesh>, SceneError> {
+        let place = &self.place;
+        let mode = match self.primitive.mode {
+            Checked::Valid(mode) => mode,
+            Checked::Invalid => Mode::Points,
+        };
+        if !matches!(
+            mode,
+            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+        ) {
+            warnings.push(format!("{place} is {mode:?}, not triangles; skipped"));
+            return Ok(None);
+        }
+        if self.primitive.targets.is_some() {
+            warnings.push(format!("{place} has morph targets; the rest pose is used"));
+        }
+        let Some(positions) = self.vectors(&Semantic::Positions, "positions: Vec3 of F32")? else {
+            warnings.push(format!("{place} has no positions; skipped"));
+            return Ok(None);
+        };
+        let positions: Vec<Vec3> = positions.into_iter().map(Vec3::from_array).collect();
+        self.check_positions(&positions)?;
+        let mut indices = self.indices(mode, positions.len(), warnings)?;
+        if indices.is_empty() {
+            warnings.push(format!("{place} has no triangles; skipped"));
+            return Ok(None);
+        }
+
+        let (material, uses) = materials.index(self.primitive.material.map(|m| m.value()))?;
+        let count = positions.len();
+        let uv0 = self.texture_coordinates(0, count, warnings)?;
+        if uv0.is_none() && uses.uv0 {
+            warnings.push(format!(
+                "{place} has a textured material and no TEXCOORD_0; (0, 0) is used"
+            ));
+        }
+        let uv1 = if uses.uv1 {
+            self.texture_coordinates(1, count, warnings)?
+        } else {
+            None
+        };
+        let normals = self.vectors(&Semantic::Normals, "normals: Vec3 of F32")?;
+        let tangents = self.vectors(&Semantic::Tangents, "tangents: Vec4 of F32")?;
+
+        let mut mesh = Mesh {
+            positions,
+            uv0: uv0.unwrap_or_else(|| vec![Vec2::ZERO; count]),
+            uv1: uv1.unwrap_or_default(),
+            normals: normals
+                .map(|n| n.into_iter().map(Vec3::from_array).collect())
+                .unwrap_or_default(),
+            tangents: tangents
+                .map(|t| t.into_iter().map(Vec4::from_array).collect())
+                .unwrap_or_default(),
+            material,
+            ..Mesh::default()
+        };
+        self.check_length("NORMAL", mesh.normals.len(), count)?;
+        self.check_length("TANGENT", mesh.tangents.len(), count)?;
+        compact(&mut mesh, &mut indices);
+        mesh.indices = indices;
+        complete(&mut mesh, uses.normal_map_uv);
+        Ok(Some(mesh))
+    }
+
+    fn accessor(&self, semantic: &Semantic) -> Option<usize> {
+        let attributes = &self.primitive.attributes;
+        (attributes.iter())
+            .find(|(key, _)| matches!(key, Checked::Valid(s) if s == semantic))
+            .map(|(_, accessor)| accessor.value())
+    }
+
+    fn vectors<const N: usize>(
+        &self,
+        semantic: &Semantic,
+        expected: &str,
+    ) -> Result<Option<Vec<[f32; N]>>, SceneError> {
+        self.accessor(semantic)
+            .map(|accessor| self.buffers.floats::<N>(accessor, expected))
+            .transpose()
+    }
+
+    fn check_positions(&self, positions: &[Vec3]) -> Result<(), SceneError> {
+        let Some(vertex) = positions.iter().position(|p| !p.is_finite()) else {
+            return Ok(());
+        };
+        let accessor = self.accessor(&Semantic::Positions).unwrap_or_default();
+        Err(self.buffers.origin.invalid(
+            format!("{}, accessors[{accessor}], vertex {vertex}", self.place),
+            "a finite position",
+            positions[vertex].to_string(),
+        ))
+    }
+
+    /// An attribute that is there must have one value a position.
+    fn check_length(&self, what: &str, found: usize, count: usize) -> Result<(), SceneError> {
+        if found == 0 || found == count {
+            return Ok(());
+        }
+        Err(self.buffers.origin.invalid(
+            format!("{}.{what}", self.place),
+            format!("{count} elements, one a position"),
+            found.to_string(),
+        ))
+    }
+
+    fn texture_coordinates(
+        &self,
+        set: u32,
+        count: usize,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Vec<Vec2>>, SceneError> {
+        let expected = "texture coordinates: Vec2 of F32 or normalized integers";
+        let Some(uv) = self.vectors::<2>(&Semantic::TexCoords(set), expected)? else {
+            return Ok(None);
+        };
+        self.check_length(&format!("TEXCOORD_{set}"), uv.len(), count)?;
+        let mut bad = 0;
+        let uv = uv
+            .into_iter()
+            .map(Vec2::from_array)
+            .map(|c| {
+                if c.is_finite() {
+                    return c;
+                }
+                bad += 1;
+                Vec2::ZERO
+            })
+            .collect();
+        if bad > 0 {
+            warnings.push(format!(
+                "{}.TEXCOORD_{set} has {bad} coordinates that are not finite; (0, 0) is used",
+                self.place
+            ));
+        }
+        Ok(Some(uv))
+    }
+
+    /// Three indices a triangle, all inside the vertices.
+    fn indices(
+        &self,
+        mode: Mode,
+        vertices: usize,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<u32>, SceneError> {
+        let accessor = self.primitive.indices.map(|i| i.value());
+        let indices = match accessor {
+            Some(accessor) => self.buffers.indices(accessor)?,
+            None => (0..u32::try_from(vertices).unwrap_or(u32::MAX)).collect(),
+        };
+        if let Some(at) = indices.iter().position(|&i| i as usize >= vertices) {
+            return Err(self.buffers.origin.invalid(
+                format!(
+                    "{}, accessors[{}], index {at}",
+                    self.place,
+                    accessor.unwrap_or_default()
+                ),
+                format!("a vertex below {vertices}"),
+                indices[at].to_string(),
+            ));
+        }
+        Ok(match mode {
+            Mode::TriangleStrip => triangulate_strip(&indices),
+            Mode::TriangleFan => triangulate_fan(&indices),
+            _ => {
+                let mut triangles = indices;
+                let left_over = triangles.len() % 3;
+                if left_over > 0 {
+                    warnings.push(format!(
+                        "{} has {left_over} indices after its last triangle; ignored",
+                        self.place
+                    ));
+                    triangles.truncate(triangles.len() - left_over);
+                }
+                triangles
+            }
+        })
+    }
+}
+
+/// Drops vertices that no triangle uses, where that is at least half of them: files that share
+/// one vertex buffer among many primitives would otherwise be held once a primitive.
+fn compact(mesh: &mut Mesh, indices: &mut [u32]) {
+    let count = mesh.positions.len();
+    let mut used = vec![false; count];
+    for &i in indices.iter() {
+        used[i as usize] = true;
+    }
+    let kept = used.iter().filter(|&&u| u).count();
+    if kept * 2 > count {
+        return;
+    }
+    let mut new_index = vec![0u32; count];
+    let mut next = 0;
+    for (slot, &used) in new_index.iter_mut().zip(&used) {
+        *slot = next;
+        next += u32::from(used);
+    }
+    for i in indices.iter_mut() {
+        *i = new_index[*i as usize];
+    }
+    fn keep<T>(values: &mut Vec<T>, used: &[bool]) {
+        let mut flags = used.iter();
+        values.retain(|_| flags.next().is_some_and(|&u| u));
+        values.shrink_to_fit();
+    }
+    keep(&mut mesh.positions, &used);
+    keep(&mut mesh.normals, &used);
+    keep(&mut mesh.tangents, &used);
+    keep(&mut mesh.uv0, &used);
+    keep(&mut mesh.uv1, &used);
+}
+
+/// Fills normals and tangents, and replaces those that are not unit vectors.
+fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
+    let good = |n: &Vec3| n.is_finite() && n.length_squared() > 1e-12;
+    if mesh.normals.is_empty() {
+        mesh.normals = vertex_normals(&mesh.positions, &mesh.indices);
+    } else if !mesh.normals.iter().all(good) {
+        let computed = vertex_normals(&mesh.positions, &mesh.indices);
+        for (n, computed) in mesh.normals.iter_mut().zip(computed) {
+            if !good(n) {
+                *n = computed;
+            }
+        }
+    }
+    for n in &mut mesh.normals {
+        *n = n.normalize();
+    }
+    let usable = |t: &Vec4| t.is_finite() && t.truncate().length_squared() > 1e-12;
+    if mesh.tangents.is_empty() || !mesh.tangents.iter().all(usable) {
+        mesh.tangents = match normal_map_uv {
+            Some(1) if !mesh.uv1.is_empty() => {
+                vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv1, &mesh.indices)
+            }
+            Some(_) => vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv0, &mesh.indices),
+            // Nothing reads them: any perpendicular will do.
+            None => (mesh.normals.iter())
+                .map(|n| n.any_orthonormal_vector().extend(1.0))
+                .collect(),
+        };
+    }
+}

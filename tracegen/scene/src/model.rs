@@ -1,0 +1,281 @@
+//! The scene model that every loader fills and every renderer reads.
+//!
+//! World space is right-handed, y up, metres. Front faces wind counter-clockwise.
+
+use formats::texture::{ColorSpace, Sampler};
+use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
+use std::sync::Arc;
+
+/// A whole scene.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Name for reports: the built-in's name or the file's stem.
+    pub name: String,
+    /// Triangle meshes, each with one material.
+    pub meshes: Vec<Mesh>,
+    /// Meshes placed in the world, in submission order.
+    pub instances: Vec<Instance>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Images with their colour space (an image used in both spaces is listed twice).
+    pub images: Vec<Image>,
+    /// Named cameras; never empty once loaded (`cameras::default_camera` fills it).
+    pub cameras: Vec<Camera>,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// Background and ambient radiance, linear RGB.
+    pub sky: Vec3,
+    /// The scene's own choice of `--shadows`: 0 none, 1 one shadow map, more: that many cascades.
+    pub shadow_cascades: u32,
+}
+
+/// An indexed triangle list with one material.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name for reports.
+    pub name: String,
+    /// Positions, object space.
+    pub positions: Vec<Vec3>,
+    /// Unit normals, one a position.
+    pub normals: Vec<Vec3>,
+    /// Tangents with the bitangent's sign in w, one a position (computed where the file has none).
+    pub tangents: Vec<Vec4>,
+    /// Texture coordinates set 0, one a position (zero where the file has none).
+    pub uv0: Vec<Vec2>,
+    /// Texture coordinates set 1, empty where no material of the mesh uses it.
+    pub uv1: Vec<Vec2>,
+    /// Three indices a triangle.
+    pub indices: Vec<u32>,
+    /// Index into the scene's materials.
+    pub material: usize,
+}
+
+impl Mesh {
+    /// Number of triangles.
+    #[must_use]
+    pub fn triangles(&self) -> usize {
+        self.indices.len() / 3
+    }
+}
+
+/// A mesh placed in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Instance {
+    /// Index into the scene's meshes.
+    pub mesh: usize,
+    /// Object to world; may mirror and scale unevenly.
+    pub transform: Affine3A,
+}
+
+impl Instance {
+    /// True where the transform mirrors, which turns the winding round.
+    #[must_use]
+    pub fn mirrored(&self) -> bool {
+        self.transform.matrix3.determinant() < 0.0
+    }
+
+    /// Inverse transpose for normals.
+    #[must_use]
+    pub fn normal_matrix(&self) -> Mat3 {
+        Mat3::from(self.transform.matrix3).inverse().transpose()
+    }
+}
+
+/// How a material treats alpha.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    #[default]
+    Opaque,
+    /// Fragments whose alpha is below the cutoff are discarded.
+    Mask(f32),
+    /// Blended over what is behind, depth tested and not written.
+    Blend,
+}
+
+/// A texture as a material uses it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into the scene's images.
+    pub image: usize,
+    /// Wrap and filter modes.
+    pub sampler: Sampler,
+    /// Texture coordinate set, 0 or 1.
+    pub uv_set: u32,
+    /// `uv' = m * (u, v, 1)`: rows of KHR_texture_transform's 2x3 matrix.
+    pub uv_transform: [[f32; 3]; 2],
+}
+
+impl TextureRef {
+    /// The transform that changes nothing.
+    pub const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    /// Set 0, repeat, trilinear.
+    #[must_use]
+    pub fn new(image: usize) -> Self {
+        Self {
+            image,
+            sampler: Sampler::TRILINEAR_REPEAT,
+            uv_set: 0,
+            uv_transform: Self::IDENTITY,
+        }
+    }
+}
+
+/// A metallic-roughness material with what Whitted-style ray tracing adds.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Name for reports.
+    pub name: String,
+    /// Linear base colour and alpha.
+    pub base_color: Vec4,
+    /// Base colour texture.
+    pub base_color_texture: Option<TextureRef>,
+    /// Tangent-space normal map.
+    pub normal_texture: Option<TextureRef>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Metalness, 0 to 1.
+    pub metallic: f32,
+    /// Perceptual roughness, 0 to 1.
+    pub roughness: f32,
+    /// Roughness in G, metalness in B.
+    pub metallic_roughness_texture: Option<TextureRef>,
+    /// Specular colour (KHR_materials_specular), linear.
+    pub specular: Vec3,
+    /// Specular colour texture.
+    pub specular_texture: Option<TextureRef>,
+    /// Ambient occlusion in R.
+    pub occlusion_texture: Option<TextureRef>,
+    /// Emitted radiance, linear.
+    pub emissive: Vec3,
+    /// Emissive texture.
+    pub emissive_texture: Option<TextureRef>,
+    /// Alpha mode.
+    pub alpha: AlphaMode,
+    /// Both faces are drawn.
+    pub double_sided: bool,
+    /// Fraction of light that passes through (glass), 0 to 1. Ray tracing only.
+    pub transmission: f32,
+    /// Index of refraction. Ray tracing only.
+    pub ior: f32,
+    /// Fraction mirrored at normal incidence beyond Fresnel's (chrome, polished floors), 0 to 1.
+    /// Ray tracing only; a loader sets it for smooth metals.
+    pub mirror: f32,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: Vec4::ONE,
+            base_color_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            metallic: 0.0,
+            roughness: 0.8,
+            metallic_roughness_texture: None,
+            specular: Vec3::ONE,
+            specular_texture: None,
+            occlusion_texture: None,
+            emissive: Vec3::ZERO,
+            emissive_texture: None,
+            alpha: AlphaMode::Opaque,
+            double_sided: false,
+            transmission: 0.0,
+            ior: 1.5,
+            mirror: 0.0,
+        }
+    }
+}
+
+impl Material {
+    /// The textures that the raster shader samples, in shader order: base colour, normal,
+    /// metallic-roughness, specular, occlusion, emissive.
+    #[must_use]
+    pub fn textures(&self) -> [Option<TextureRef>; 6] {
+        [
+            self.base_color_texture,
+            self.normal_texture,
+            self.metallic_roughness_texture,
+            self.specular_texture,
+            self.occlusion_texture,
+            self.emissive_texture,
+        ]
+    }
+}
+
+/// Uncompressed texels of level 0.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// File name, or the procedural texture's name.
+    pub name: String,
+    /// Width and height in texels.
+    pub size: [u32; 2],
+    /// RGBA8, row by row from the top (v = 0).
+    pub rgba: Arc<[u8]>,
+    /// Colour space of RGB.
+    pub color_space: ColorSpace,
+}
+
+/// A named camera: the head's pose. The HMD decides field of view and eyes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Name.
+    pub name: String,
+    /// Midpoint between the eyes, metres.
+    pub eye: Vec3,
+    /// Point looked at.
+    pub target: Vec3,
+    /// Up direction.
+    pub up: Vec3,
+    /// The file's vertical field of view in degrees, used with `--vfov file` only.
+    pub vfov_deg: f32,
+    /// Near plane, metres.
+    pub near: f32,
+    /// Far plane, metres.
+    pub far: f32,
+}
+
+/// A light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// Parallel light.
+    Directional {
+        /// Direction in which the light travels, unit length.
+        direction: Vec3,
+        /// Irradiance, linear RGB.
+        color: Vec3,
+    },
+    /// A point light.
+    Point {
+        /// Position, metres.
+        position: Vec3,
+        /// Radiant intensity, linear RGB.
+        color: Vec3,
+    },
+}
+
+impl Scene {
+    /// Triangles with instances counted.
+    #[must_use]
+    pub fn triangle_count(&self) -> u64 {
+        self.instances
+            .iter()
+            .map(|i| self.meshes[i.mesh].triangles() as u64)
+            .sum()
+    }
+
+    /// World-space bounds, `None` for an empty scene.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let mut points = self.instances.iter().flat_map(|i| {
+            self.meshes[i.mesh]
+                .positions
+                .iter()
+                .map(move |p| i.transform.transform_point3(*p))
+        });
+        let first = points.next()?;
+        Some(points.fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p))))
+    }
+}

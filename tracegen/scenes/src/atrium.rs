@@ -1,0 +1,584 @@
+//! A two-storey colonnaded courtyard: stands for the Sponza scenes.
+//!
+//! Everything sits on a lattice of 3.5 m bays: an open court of 8 x 2 bays, ringed by an arcade
+//! one bay deep with a gallery on top.
+
+use super::atrium_materials::{self as materials, Palette};
+use super::atrium_parts::{Bay, Column, baluster, cornice, groin_vault, moulding, rib};
+use super::mesh_builder::MeshBuilder;
+use super::scene_builder::{MaterialId, SceneBuilder};
+use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use scene::Scene;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// Edge of a bay in metres.
+const BAY: f32 = 3.5;
+/// Half extents of the court and of the whole building in metres.
+const COURT: (f32, f32) = (4.0 * BAY, BAY);
+const OUTER: (f32, f32) = (5.0 * BAY, 2.0 * BAY);
+/// Heights in metres: spring of the lower arches, upper floor, spring of the upper arches, eaves.
+const SPRING: f32 = 3.3;
+const FLOOR2: f32 = 5.6;
+const SPRING2: f32 = FLOOR2 + 2.4;
+const EAVES: f32 = 10.0;
+
+/// How finely the architecture is modelled.
+#[derive(Clone, Copy, Debug)]
+struct Detail {
+    column: Column,
+    column_high: Column,
+    arch_segments: usize,
+    moulding_steps: usize,
+    vault_cells: usize,
+    baluster: (usize, usize),
+    balusters: usize,
+    dentils: bool,
+    /// Chamfer the edges of blocks.
+    chamfer: bool,
+    floor_cells: usize,
+    furnished: bool,
+}
+
+const RICH: Detail = Detail {
+    column: Column {
+        radius: 0.33,
+        height: SPRING,
+        segments: 22,
+        rows: 8,
+        flutes: 8,
+        steps: 2,
+    },
+    column_high: Column {
+        radius: 0.21,
+        height: SPRING2 - FLOOR2,
+        segments: 12,
+        rows: 6,
+        flutes: 6,
+        steps: 2,
+    },
+    arch_segments: 18,
+    moulding_steps: 2,
+    vault_cells: 7,
+    baluster: (8, 1),
+    balusters: 7,
+    dentils: true,
+    chamfer: true,
+    floor_cells: 4,
+    furnished: true,
+};
+
+const PLAIN: Detail = Detail {
+    column: Column {
+        radius: 0.33,
+        height: SPRING,
+        segments: 14,
+        rows: 4,
+        flutes: 0,
+        steps: 1,
+    },
+    column_high: Column {
+        radius: 0.21,
+        height: SPRING2 - FLOOR2,
+        segments: 8,
+        rows: 3,
+        flutes: 0,
+        steps: 1,
+    },
+    arch_segments: 12,
+    moulding_steps: 1,
+    vault_cells: 4,
+    baluster: (5, 1),
+    balusters: 5,
+    dentils: false,
+    chamfer: false,
+    floor_cells: 2,
+    furnished: false,
+};
+
+/// Crytek Sponza's stand-in: many textures a material.
+#[must_use]
+pub fn rich() -> Scene {
+    let mut scene = SceneBuilder::new("atrium");
+    let palette = materials::rich(&mut scene, materials::rich_textures());
+    build(&mut scene, &palette, &RICH);
+    scene.finish(vec3(0.62, 0.74, 0.92), 0)
+}
+
+/// The L-Bench Sponza's stand-in: few simple textures.
+#[must_use]
+pub fn plain() -> Scene {
+    simple("atrium-plain", 0)
+}
+
+/// [`plain`] with cascaded shadow maps.
+#[must_use]
+pub fn shadows() -> Scene {
+    simple("atrium-shadows", 4)
+}
+
+fn simple(name: &str, cascades: u32) -> Scene {
+    let mut scene = SceneBuilder::new(name);
+    let palette = materials::plain(&mut scene);
+    build(&mut scene, &palette, &PLAIN);
+    scene.finish(vec3(0.62, 0.74, 0.92), cascades)
+}
+
+/// A turn about the vertical, then a move.
+fn at(position: Vec3, turn: f32) -> Affine3A {
+    Affine3A::from_rotation_translation(Quat::from_rotation_y(turn), position)
+}
+
+/// One side of the court: centres of its bays and the turn that makes +z face the court.
+struct Side {
+    bays: Vec<Vec3>,
+    turn: f32,
+}
+
+fn sides() -> [Side; 4] {
+    let along = |n: i32| (0..n).map(move |i| (i as f32 + 0.5 - n as f32 * 0.5) * BAY);
+    [
+        Side {
+            bays: along(8).map(|x| vec3(x, 0.0, -COURT.1)).collect(),
+            turn: 0.0,
+        },
+        Side {
+            bays: along(8).map(|x| vec3(x, 0.0, COURT.1)).collect(),
+            turn: PI,
+        },
+        Side {
+            bays: along(2).map(|z| vec3(-COURT.0, 0.0, z)).collect(),
+            turn: FRAC_PI_2,
+        },
+        Side {
+            bays: along(2).map(|z| vec3(COURT.0, 0.0, z)).collect(),
+            turn: -FRAC_PI_2,
+        },
+    ]
+}
+
+/// Axes of the columns around the court.
+fn column_axes() -> Vec<Vec3> {
+    let mut axes = Vec::new();
+    for z in [-COURT.1, COURT.1] {
+        axes.extend((-4..=4).map(|i| vec3(i as f32 * BAY, 0.0, z)));
+    }
+    axes.extend([vec3(-COURT.0, 0.0, 0.0), vec3(COURT.0, 0.0, 0.0)]);
+    axes
+}
+
+fn place_all(
+    scene: &mut SceneBuilder,
+    name: &str,
+    mesh: MeshBuilder,
+    material: MaterialId,
+    places: &[Affine3A],
+) {
+    let mesh = scene.mesh(name, mesh, material);
+    for place in places {
+        scene.place(mesh, *place);
+    }
+}
+
+fn build(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+    floors_and_walls(scene, p, d);
+    colonnades(scene, p, d);
+    arcade_ceilings(scene, p, d);
+    mouldings_and_roof(scene, p, d);
+    if d.furnished {
+        super::atrium_furnishing::furnish(scene, p);
+    }
+    scene.camera(
+        "default",
+        vec3(-11.6, 1.7, -0.4),
+        vec3(11.0, 3.7, 0.1),
+        0.1,
+        100.0,
+    );
+    scene.camera(
+        "gallery",
+        vec3(-9.6, FLOOR2 + 1.7, 4.2),
+        vec3(8.0, 5.2, -2.2),
+        0.1,
+        100.0,
+    );
+    scene.camera(
+        "arcade",
+        vec3(12.2, 1.6, -5.3),
+        vec3(-6.0, 2.1, -4.4),
+        0.1,
+        100.0,
+    );
+    // Sun along the court, onto its north wall and the floor.
+    scene.sun(vec3(0.38, -0.84, -0.39), vec3(3.3, 3.0, 2.55));
+}
+
+fn floors_and_walls(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+    let n = d.floor_cells;
+    let mut court = MeshBuilder::new();
+    let (cx, cz) = COURT;
+    court.panel(
+        vec3(-cx, 0.0, cz),
+        Vec3::X * 2.0 * cx,
+        Vec3::NEG_Z * 2.0 * cz,
+        8 * n,
+        2 * n,
+    );
+    scene.add("court", court, p.court_floor);
+
+    let mut tiles = MeshBuilder::new();
+    let mut ceiling = MeshBuilder::new();
+    let (ox, oz) = OUTER;
+    // Four strips around the court on both floors; the wooden ceiling mirrors them.
+    let strips = [
+        (vec3(-ox, 0.0, -cz), 2.0 * ox, oz - cz),
+        (vec3(-ox, 0.0, oz), 2.0 * ox, oz - cz),
+        (vec3(-ox, 0.0, cz), ox - cx, 2.0 * cz),
+        (vec3(cx, 0.0, cz), ox - cx, 2.0 * cz),
+    ];
+    for (corner, w, h) in strips {
+        let cells = |m: f32| (m / BAY).round() as usize * n;
+        for y in [0.0, FLOOR2] {
+            tiles.panel(
+                corner + Vec3::Y * y,
+                Vec3::X * w,
+                Vec3::NEG_Z * h,
+                cells(w),
+                cells(h),
+            );
+        }
+        let far = corner + vec3(0.0, EAVES - 0.08, -h);
+        ceiling.panel(far, Vec3::X * w, Vec3::Z * h, cells(w), 1);
+    }
+    scene.add("arcade-floors", tiles, p.arcade_floor);
+    scene.add("gallery-ceiling", ceiling, p.beam);
+
+    // Outer walls: corner, direction seen from inside, width.
+    let walls = [
+        (vec3(-ox, 0.0, -oz), Vec3::X, 2.0 * ox),
+        (vec3(ox, 0.0, oz), Vec3::NEG_X, 2.0 * ox),
+        (vec3(ox, 0.0, -oz), Vec3::Z, 2.0 * oz),
+        (vec3(-ox, 0.0, oz), Vec3::NEG_Z, 2.0 * oz),
+    ];
+    let (mut low, mut dado, mut high) =
+        (MeshBuilder::new(), MeshBuilder::new(), MeshBuilder::new());
+    for (corner, right, w) in walls {
+        let cells = (w / BAY).round() as usize * n;
+        let dado_height = 1.15;
+        low.panel(
+            corner + Vec3::Y * dado_height,
+            right * w,
+            Vec3::Y * (FLOOR2 - dado_height),
+            cells,
+            n,
+        );
+        high.panel(
+            corner + Vec3::Y * FLOOR2,
+            right * w,
+            Vec3::Y * (EAVES - FLOOR2),
+            cells,
+            n,
+        );
+        let inward = Vec3::Y.cross(right) * -0.06;
+        let inward = if inward.dot(corner) > 0.0 {
+            -inward
+        } else {
+            inward
+        };
+        dado.panel(corner + inward, right * w, Vec3::Y * dado_height, cells, 1);
+        dado.panel(
+            corner + inward + Vec3::Y * dado_height,
+            right * w,
+            -inward,
+            cells,
+            1,
+        );
+    }
+    scene.add("wall-low", low, p.wall_low);
+    scene.add("dado", dado, p.dado);
+    scene.add("wall-high", high, p.wall_high);
+}
+
+fn colonnades(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+    let bevel = f32::from(u8::from(d.chamfer));
+    let axes: Vec<Affine3A> = column_axes().into_iter().map(|c| at(c, 0.0)).collect();
+    let raised: Vec<Affine3A> = column_axes()
+        .into_iter()
+        .map(|c| at(c + Vec3::Y * FLOOR2, 0.0))
+        .collect();
+    place_all(scene, "column", d.column.shaft(), p.shaft, &axes);
+    place_all(scene, "capital", d.column.capital(), p.capital, &axes);
+    place_all(
+        scene,
+        "column-high",
+        d.column_high.shaft(),
+        p.shaft_high,
+        &raised,
+    );
+    place_all(
+        scene,
+        "capital-high",
+        d.column_high.capital(),
+        p.capital,
+        &raised,
+    );
+
+    let bays: Vec<Affine3A> = sides()
+        .iter()
+        .flat_map(|s| s.bays.iter().map(|c| at(*c, s.turn)).collect::<Vec<_>>())
+        .collect();
+    let low = Bay {
+        pitch: BAY,
+        radius: 0.5 * BAY - 0.43,
+        spring: SPRING,
+        top: FLOOR2,
+        thickness: 0.75,
+        segments: d.arch_segments,
+    };
+    let high = Bay {
+        radius: 0.5 * BAY - 0.29,
+        spring: SPRING2,
+        top: EAVES,
+        thickness: 0.5,
+        ..low
+    };
+    place_all(scene, "spandrel", low.spandrel(), p.spandrel, &bays);
+    place_all(
+        scene,
+        "arch",
+        low.archivolt(d.moulding_steps),
+        p.arch,
+        &bays,
+    );
+    place_all(scene, "spandrel-high", high.spandrel(), p.spandrel, &bays);
+    place_all(
+        scene,
+        "arch-high",
+        high.archivolt(d.moulding_steps),
+        p.arch,
+        &bays,
+    );
+
+    // Balustrade between the upper columns: plinth, balusters, rail.
+    let (half, foot) = (0.5 * BAY - 0.3, FLOOR2);
+    let mut rails = MeshBuilder::new();
+    rails.block(
+        vec3(-half, foot, -0.12),
+        vec3(half, foot + 0.12, 0.12),
+        0.015 * bevel,
+    );
+    rails.block(
+        vec3(-half, foot + 0.82, -0.13),
+        vec3(half, foot + 0.95, 0.13),
+        0.03 * bevel,
+    );
+    let one = baluster(d.baluster.0, d.baluster.1);
+    for i in 0..d.balusters {
+        let x = ((i as f32 + 0.5) / d.balusters as f32 * 2.0 - 1.0) * half;
+        rails.merge(&one, Affine3A::from_translation(vec3(x, foot + 0.12, 0.0)));
+    }
+    place_all(scene, "balustrade", rails, p.rail, &bays);
+}
+
+fn arcade_ceilings(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+    let bevel = f32::from(u8::from(d.chamfer));
+    let mut vaults = Vec::new();
+    for i in -5..5 {
+        for j in -2..2 {
+            let c = vec3((i as f32 + 0.5) * BAY, 0.0, (j as f32 + 0.5) * BAY);
+            if c.x.abs() > COURT.0 || c.z.abs() > COURT.1 {
+                vaults.push(at(c, 0.0));
+            }
+        }
+    }
+    let half = 0.5 * BAY;
+    place_all(
+        scene,
+        "vault",
+        groin_vault(vec2(half, half), SPRING, half, d.vault_cells),
+        p.vault,
+        &vaults,
+    );
+
+    // Ribs from each column to the wall, on pilasters.
+    let mut ribs = Vec::new();
+    let mut pilasters = Vec::new();
+    for side in [-1.0, 1.0] {
+        for i in -4..=4 {
+            let x = i as f32 * BAY;
+            ribs.push(at(vec3(x, 0.0, side * (COURT.1 + half)), FRAC_PI_2));
+            pilasters.push(at(vec3(x, 0.0, side * OUTER.1), 0.0));
+        }
+        for z in [-BAY, 0.0, BAY] {
+            ribs.push(at(vec3(side * (COURT.0 + half), 0.0, z), 0.0));
+            pilasters.push(at(vec3(side * OUTER.0, 0.0, z), 0.0));
+        }
+    }
+    place_all(
+        scene,
+        "rib",
+        rib(half, SPRING, 0.42, 0.14, d.arch_segments),
+        p.rib,
+        &ribs,
+    );
+    let mut pilaster = MeshBuilder::new();
+    pilaster.block(vec3(-0.3, 0.0, -0.3), vec3(0.3, 0.35, 0.3), 0.02 * bevel);
+    pilaster.block(
+        vec3(-0.24, 0.35, -0.24),
+        vec3(0.24, SPRING - 0.28, 0.24),
+        0.02 * bevel,
+    );
+    pilaster.block(
+        vec3(-0.29, SPRING - 0.28, -0.29),
+        vec3(0.29, SPRING - 0.2, 0.29),
+        0.015 * bevel,
+    );
+    pilaster.block(
+        vec3(-0.34, SPRING - 0.2, -0.34),
+        vec3(0.34, SPRING, 0.34),
+        0.03 * bevel,
+    );
+    place_all(scene, "pilaster", pilaster, p.rib, &pilasters);
+
+    // Joists under the gallery's ceiling, every 0.7 m along the long sides.
+    let mut joist = MeshBuilder::new();
+    joist.block(
+        vec3(-0.09, EAVES - 0.32, -half),
+        vec3(0.09, EAVES - 0.08, half),
+        0.012 * bevel,
+    );
+    let joists: Vec<Affine3A> = (-20..=20)
+        .flat_map(|i| [-1.0, 1.0].map(|s| at(vec3(i as f32 * 0.7, 0.0, s * (COURT.1 + half)), 0.0)))
+        .chain((-4..=4).flat_map(|i| {
+            [-1.0, 1.0].map(|s| at(vec3(s * (COURT.0 + half), 0.0, i as f32 * 0.7), FRAC_PI_2))
+        }))
+        .collect();
+    place_all(scene, "joist", joist, p.beam, &joists);
+
+    // Doors in the outer wall, every other bay.
+    let mut door = MeshBuilder::new();
+    door.block(
+        vec3(-0.75, 0.0, -0.05),
+        vec3(-0.01, 2.55, 0.1),
+        0.015 * bevel,
+    );
+    door.block(vec3(0.01, 0.0, -0.05), vec3(0.75, 2.55, 0.1), 0.015 * bevel);
+    for (x, y) in [(-0.64, 0.25), (0.12, 0.25), (-0.64, 1.45), (0.12, 1.45)] {
+        door.block(
+            vec3(x, y, 0.09),
+            vec3(x + 0.52, y + 0.95, 0.13),
+            0.03 * bevel,
+        );
+    }
+    let mut frame = MeshBuilder::new();
+    frame.block(
+        vec3(-1.0, 0.0, -0.05),
+        vec3(-0.75, 2.55, 0.18),
+        0.03 * bevel,
+    );
+    frame.block(vec3(0.75, 0.0, -0.05), vec3(1.0, 2.55, 0.18), 0.03 * bevel);
+    frame.block(
+        vec3(-1.08, 2.55, -0.05),
+        vec3(1.08, 2.85, 0.24),
+        0.04 * bevel,
+    );
+    let doors: Vec<Affine3A> = (0..4)
+        .flat_map(|i| {
+            let x = (i as f32 * 2.0 - 3.5) * BAY;
+            [
+                at(vec3(x, 0.0, -OUTER.1), 0.0),
+                at(vec3(x + BAY, 0.0, OUTER.1), PI),
+            ]
+        })
+        .chain([
+            at(vec3(-OUTER.0, 0.0, -0.5 * BAY), FRAC_PI_2),
+            at(vec3(OUTER.0, 0.0, 0.5 * BAY), -FRAC_PI_2),
+        ])
+        .collect();
+    let above: Vec<Affine3A> = doors
+        .iter()
+        .map(|a| Affine3A::from_translation(Vec3::Y * FLOOR2) * *a)
+        .collect();
+    let all: Vec<Affine3A> = doors.into_iter().chain(above).collect();
+    place_all(scene, "door", door, p.door, &all);
+    place_all(scene, "door-frame", frame, p.rib, &all);
+}
+
+fn mouldings_and_roof(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+    let bevel = f32::from(u8::from(d.chamfer));
+    let steps = d.moulding_steps + 1;
+    let (string, top) = (cornice(0.24, 0.32, steps), cornice(0.5, 0.6, steps));
+    for side in sides() {
+        let length = side.bays.len() as f32 * BAY;
+        let mid = side.bays.iter().copied().sum::<Vec3>() / side.bays.len() as f32;
+        let places = |z: f32| -> Vec<Affine3A> {
+            side.bays
+                .iter()
+                .map(|c| at(*c, side.turn) * Affine3A::from_translation(vec3(-0.5 * BAY, 0.0, z)))
+                .collect()
+        };
+        place_all(
+            scene,
+            "string-course",
+            moulding(&string, BAY, FLOOR2 - 0.32),
+            p.cornice,
+            &places(0.375),
+        );
+        place_all(
+            scene,
+            "cornice",
+            moulding(&top, BAY, EAVES),
+            p.cornice,
+            &places(0.25),
+        );
+        if d.dentils {
+            let mut row = MeshBuilder::new();
+            let count = (length / 0.35) as usize;
+            for i in 0..count {
+                let x = (i as f32 + 0.5) / count as f32 * length - 0.5 * length;
+                row.block(
+                    vec3(x - 0.08, EAVES - 0.16, 0.2),
+                    vec3(x + 0.08, EAVES + 0.02, 0.40),
+                    0.012 * bevel,
+                );
+            }
+            place_all(scene, "dentils", row, p.cornice, &[at(mid, side.turn)]);
+        }
+        // The roof slopes up from the eaves to the outer wall.
+        let mut roof = MeshBuilder::new();
+        let (half, rise, depth) = (0.5 * length + BAY, 1.5, BAY + 0.6);
+        roof.panel(
+            vec3(-half, EAVES + 0.6, 0.75),
+            Vec3::X * 2.0 * half,
+            vec3(0.0, rise, -depth),
+            side.bays.len() * 2,
+            4,
+        );
+        place_all(scene, "roof", roof, p.roof, &[at(mid, side.turn)]);
+    }
+    // Tie beams and purlins over the open court.
+    let mut beams = MeshBuilder::new();
+    for i in -4..=4 {
+        let x = i as f32 * BAY;
+        beams.block(
+            vec3(x - 0.11, EAVES + 0.6, -COURT.1 - 0.3),
+            vec3(x + 0.11, EAVES + 0.88, COURT.1 + 0.3),
+            0.015 * bevel,
+        );
+        for s in [-1.0f32, 1.0] {
+            let (z0, z1) = (s * (COURT.1 - 0.25), s * (COURT.1 - 0.05));
+            beams.block(
+                vec3(x - 0.09, EAVES + 0.1, z0.min(z1)),
+                vec3(x + 0.09, EAVES + 0.6, z0.max(z1)),
+                0.01 * bevel,
+            );
+        }
+    }
+    for z in [-1.75, 0.0, 1.75] {
+        beams.block(
+            vec3(-COURT.0, EAVES + 0.88, z - 0.08),
+            vec3(COURT.0, EAVES + 1.06, z + 0.08),
+            0.01 * bevel,
+        );
+    }
+    scene.add("roof-beams", beams, p.beam);
+}

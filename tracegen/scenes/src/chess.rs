@@ -1,0 +1,440 @@
+//! A full chess set on a reflective board, a few moves into the Italian game: 42 K triangles.
+
+use super::masonry::carved_stone;
+use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
+use super::noise::smoothstep;
+use super::organic::polished_wood;
+use super::scene_builder::{MaterialId, SceneBuilder};
+use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use scene::Scene;
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
+
+/// Edge of a square in metres (tournament size).
+const SQUARE: f32 = 0.057;
+/// Segments around a piece.
+const SEGMENTS: usize = 16;
+
+/// The foot that all pieces share, up to `height`, with radius `r`.
+fn foot(r: f32) -> Vec<Knot> {
+    vec![
+        sharp(0.0, 0.0),
+        sharp(0.94 * r, 0.0),
+        smooth(r, 0.004),
+        sharp(0.97 * r, 0.009),
+        sharp(0.88 * r, 0.0105),
+        smooth(0.86 * r, 0.014),
+        sharp(0.72 * r, 0.018),
+    ]
+}
+
+fn collar(r: f32, y: f32) -> [Knot; 4] {
+    [
+        sharp(0.72 * r, y),
+        smooth(r, y + 0.0016),
+        smooth(r, y + 0.0032),
+        sharp(0.7 * r, y + 0.005),
+    ]
+}
+
+fn turned(radius: f32, upper: &[Knot]) -> MeshBuilder {
+    let mut knots = foot(radius);
+    knots.extend_from_slice(upper);
+    let mut m = MeshBuilder::new();
+    m.lathe(&curve(&knots, 2), SEGMENTS);
+    m
+}
+
+fn pawn() -> MeshBuilder {
+    let mut upper = vec![smooth(0.0085, 0.026), smooth(0.0062, 0.036)];
+    upper.extend(collar(0.0105, 0.0395));
+    upper.extend([
+        smooth(0.0088, 0.0462),
+        smooth(0.0108, 0.0515),
+        smooth(0.0088, 0.0575),
+        smooth(0.0, 0.0622),
+    ]);
+    turned(0.0165, &upper)
+}
+
+fn rook() -> MeshBuilder {
+    let upper = [
+        smooth(0.0118, 0.027),
+        smooth(0.0102, 0.042),
+        sharp(0.0104, 0.046),
+        smooth(0.0145, 0.0485),
+        sharp(0.0148, 0.052),
+        sharp(0.0148, 0.0535),
+        sharp(0.0, 0.0535),
+    ];
+    let mut m = turned(0.0195, &upper);
+    // Six merlons: arcs of a ring.
+    for i in 0..6 {
+        let (from, span) = (TAU * i as f32 / 6.0, TAU / 6.0 * 0.68);
+        let wall = |s: f32, r: f32, y: f32| {
+            let (sin, cos) = (from + span * s).sin_cos();
+            vec3(r * cos, y, -r * sin)
+        };
+        let (r0, r1, y0, y1) = (0.0098, 0.0148, 0.0535, 0.0608);
+        m.surface(5, 1, |s, t| {
+            (wall(s, r1, y0 + t * (y1 - y0)), vec2(s, -t) * 0.01)
+        });
+        m.surface(5, 1, |s, t| {
+            (wall(1.0 - s, r0, y0 + t * (y1 - y0)), vec2(s, -t) * 0.01)
+        });
+        m.surface(5, 1, |s, t| {
+            (wall(s, r1 + t * (r0 - r1), y1), vec2(s, -t) * 0.01)
+        });
+        for (s, turn) in [(0.0, 1.0f32), (1.0, -1.0)] {
+            m.surface(1, 1, |a, t| {
+                let a = if turn > 0.0 { a } else { 1.0 - a };
+                (
+                    wall(s, r0 + a * (r1 - r0), y0 + t * (y1 - y0)),
+                    vec2(a, -t) * 0.01,
+                )
+            });
+        }
+    }
+    m
+}
+
+fn bishop() -> MeshBuilder {
+    let mut knots = foot(0.0185);
+    knots.extend([smooth(0.0095, 0.028), smooth(0.0066, 0.044)]);
+    knots.extend(collar(0.0125, 0.0495));
+    knots.extend([
+        smooth(0.0085, 0.0575),
+        smooth(0.0118, 0.0645),
+        smooth(0.0088, 0.0735),
+        smooth(0.0032, 0.0800),
+        sharp(0.0018, 0.0818),
+        smooth(0.0034, 0.0842),
+        smooth(0.0, 0.0872),
+    ]);
+    let mut m = MeshBuilder::new();
+    // The mitre's cut: a notch that climbs round one side.
+    m.lathe_shaped(&curve(&knots, 2), SEGMENTS + 5, |angle, y| {
+        let turn = (angle + PI).rem_euclid(TAU) - PI;
+        let cut = (-((y - 0.0700 - 0.004 * turn) / 0.0016).powi(2)).exp();
+        1.0 - 0.34 * cut * smoothstep(1.1, 0.5, turn.abs())
+    });
+    m
+}
+
+fn queen() -> MeshBuilder {
+    let mut knots = foot(0.0212);
+    knots.extend([smooth(0.0108, 0.032), smooth(0.0074, 0.056)]);
+    knots.extend(collar(0.0142, 0.0615));
+    knots.extend([
+        smooth(0.0085, 0.0695),
+        smooth(0.0112, 0.0775),
+        sharp(0.0148, 0.0835),
+        sharp(0.0118, 0.0832),
+        smooth(0.0072, 0.0852),
+        sharp(0.0030, 0.0870),
+        smooth(0.0042, 0.0892),
+        smooth(0.0, 0.0925),
+    ]);
+    let mut m = MeshBuilder::new();
+    m.lathe_shaped(&curve(&knots, 2), 27, |angle, y| {
+        let crown = smoothstep(0.0785, 0.0825, y) * smoothstep(0.0845, 0.0838, y);
+        1.0 + 0.10 * crown * (9.0 * angle).cos()
+    });
+    m
+}
+
+fn king() -> MeshBuilder {
+    let mut upper = vec![smooth(0.0112, 0.033), smooth(0.0078, 0.060)];
+    upper.extend(collar(0.0148, 0.0655));
+    upper.extend([
+        smooth(0.0088, 0.0735),
+        smooth(0.0112, 0.0820),
+        sharp(0.0142, 0.0885),
+        smooth(0.0105, 0.0905),
+        sharp(0.0034, 0.0928),
+        sharp(0.0, 0.0930),
+    ]);
+    let mut m = turned(0.0218, &upper);
+    // A cross whose arms widen outwards.
+    m.block(
+        vec3(-0.0014, 0.0925, -0.0014),
+        vec3(0.0014, 0.1055, 0.0014),
+        0.0005,
+    );
+    m.block(
+        vec3(-0.0046, 0.0975, -0.0013),
+        vec3(0.0046, 0.1005, 0.0013),
+        0.0005,
+    );
+    m.block(
+        vec3(-0.0021, 0.1040, -0.0016),
+        vec3(0.0021, 0.1062, 0.0016),
+        0.0005,
+    );
+    m
+}
+
+/// Catmull-Rom through evenly spaced values.
+fn spline<const N: usize>(values: &[[f32; 4]; N], t: f32) -> [f32; 4] {
+    let x = t.clamp(0.0, 1.0) * (N - 1) as f32;
+    let i = (x as usize).min(N - 2);
+    let f = x - i as f32;
+    let at = |k: isize| values[(i as isize + k).clamp(0, N as isize - 1) as usize];
+    let (a, b, c, d) = (at(-1), at(0), at(1), at(2));
+    std::array::from_fn(|k| {
+        0.5 * (2.0 * b[k]
+            + (c[k] - a[k]) * f
+            + (2.0 * a[k] - 5.0 * b[k] + 4.0 * c[k] - d[k]) * f * f
+            + (3.0 * b[k] - a[k] - 3.0 * c[k] + d[k]) * f * f * f)
+    })
+}
+
+/// The horse: an oval swept from the chest over the poll down to the muzzle.
+fn knight() -> MeshBuilder {
+    let upper = [
+        smooth(0.0145, 0.0195),
+        sharp(0.0150, 0.0215),
+        sharp(0.0, 0.0225),
+    ];
+    let mut m = turned(0.0195, &upper);
+    // Forward, height, half depth in the plane, half width; millimetres.
+    let spine: [[f32; 4]; 10] = [
+        [-0.5, 20.0, 12.8, 11.0],
+        [-1.5, 28.0, 12.2, 9.4],
+        [-3.4, 37.0, 11.4, 8.0],
+        [-4.6, 46.0, 10.6, 7.2],
+        [-3.6, 54.0, 9.8, 6.6],
+        [1.2, 58.6, 9.0, 6.4],
+        [7.0, 56.6, 7.8, 6.0],
+        [12.6, 51.0, 6.0, 4.6],
+        [17.2, 45.0, 5.4, 4.3],
+        [20.4, 41.6, 4.2, 3.6],
+    ];
+    let shape = |s: f32, t: f32| {
+        let [x, y, depth, width] = spline(&spine, t);
+        let ahead = spline(&spine, (t + 0.01).min(1.0));
+        let behind = spline(&spine, (t - 0.01).max(0.0));
+        let along = vec2(ahead[0] - behind[0], ahead[1] - behind[1]).normalize_or_zero();
+        let out = vec2(along.y, -along.x);
+        let (sin, cos) = (TAU * s).sin_cos();
+        // The mane stands up along the back in waves; jaw and cheek swell at the head.
+        let back =
+            smoothstep(0.55, 1.0, -cos) * smoothstep(0.04, 0.2, t) * smoothstep(0.72, 0.55, t);
+        let mane = back * (1.6 + 0.9 * (t * 62.0).sin());
+        let cheek = 1.0 + 0.16 * (-((t - 0.62) / 0.09).powi(2)).exp() * smoothstep(-0.6, 0.3, cos);
+        let socket = 1.0
+            - 0.14
+                * (-((t - 0.73) / 0.04).powi(2)).exp()
+                * smoothstep(0.3, 0.9, sin.abs())
+                * smoothstep(0.3, -0.2, cos);
+        let end = (1.0 - ((t - 0.94) / 0.06).max(0.0).powi(2)).max(0.0).sqrt();
+        let radial = (depth * cos * cheek - mane) * end;
+        let side = width * sin * cheek * socket * end * (1.0 - 0.25 * back);
+        let p = vec3(x + out.x * radial, y + out.y * radial, side);
+        (p * 1e-3, vec2(s * 0.05, -t * 0.08))
+    };
+    let mut head = MeshBuilder::new();
+    head.surface(16, 26, shape);
+    head.orient(|p| vec3(0.0, 0.0, p.z.signum()));
+    m.merge(&head, Affine3A::IDENTITY);
+    for side in [-1.0f32, 1.0] {
+        let mut ear = MeshBuilder::new();
+        ear.lathe(
+            &curve(
+                &[
+                    sharp(0.0026, 0.0),
+                    smooth(0.0022, 0.003),
+                    smooth(0.0, 0.0078),
+                ],
+                2,
+            ),
+            8,
+        );
+        let tilt = Quat::from_rotation_z(0.25) * Quat::from_rotation_x(side * 0.3);
+        m.merge(
+            &ear,
+            Affine3A::from_rotation_translation(tilt, vec3(0.0005, 0.0655, side * 0.0035)),
+        );
+        let mut eye = MeshBuilder::new();
+        eye.lathe(
+            &curve(
+                &[
+                    smooth(0.0, -0.0016),
+                    smooth(0.0016, 0.0),
+                    smooth(0.0, 0.0016),
+                ],
+                3,
+            ),
+            8,
+        );
+        m.merge(
+            &eye,
+            Affine3A::from_translation(vec3(0.0078, 0.0578, side * 0.0050)),
+        );
+    }
+    m
+}
+
+fn board(scene: &mut SceneBuilder, light: MaterialId, dark: MaterialId, wood: MaterialId) {
+    let mut fields = [MeshBuilder::new(), MeshBuilder::new()];
+    for rank in 0..8 {
+        for file in 0..8 {
+            let (x, z) = ((file as f32 - 4.0) * SQUARE, (rank as f32 - 4.0) * SQUARE);
+            let gap = 0.0003;
+            fields[(rank + file) % 2].block(
+                vec3(x + gap, -0.006, z + gap),
+                vec3(x + SQUARE - gap, 0.0, z + SQUARE - gap),
+                0.0006,
+            );
+        }
+    }
+    let [a, b] = fields;
+    scene.add("light-squares", a, light);
+    scene.add("dark-squares", b, dark);
+    let mut frame = MeshBuilder::new();
+    let (inner, outer) = (4.0 * SQUARE, 4.0 * SQUARE + 0.042);
+    for turn in 0..4 {
+        let mut side = MeshBuilder::new();
+        side.block(
+            vec3(-outer, -0.022, inner),
+            vec3(inner, 0.002, outer),
+            0.004,
+        );
+        let rotation = Quat::from_rotation_y(turn as f32 * FRAC_PI_2);
+        frame.merge(&side, Affine3A::from_quat(rotation));
+    }
+    scene.add("board-frame", frame, wood);
+}
+
+/// The scene.
+#[must_use]
+pub fn scene() -> Scene {
+    let mut scene = SceneBuilder::new("chess");
+    let recipe = |name, tile_m, surface| Recipe {
+        name,
+        size: 512,
+        maps: Maps::Color,
+        tile_m,
+        surface,
+    };
+    let mut sets = synthesize_all(&[
+        recipe(
+            "light-marble",
+            0.25,
+            carved_stone([rgb(0xe6dfd0), rgb(0xcfc2ac)], 0.5, 0.0, 0.2),
+        ),
+        recipe(
+            "dark-marble",
+            0.25,
+            carved_stone([rgb(0x2c3a34), rgb(0x16211d)], 0.0, 0.0, 0.2),
+        ),
+        recipe(
+            "walnut",
+            0.4,
+            polished_wood([rgb(0x6a4026), rgb(0x3c2212)], 0.3),
+        ),
+        recipe(
+            "table-oak",
+            0.8,
+            polished_wood([rgb(0xa9794a), rgb(0x7d5430)], 0.45),
+        ),
+    ])
+    .into_iter();
+    let mut textured = |scene: &mut SceneBuilder, mirror: f32, roughness: f32| match sets.next() {
+        Some(set) => scene.textured(set, |m| {
+            m.mirror = mirror;
+            m.roughness = roughness;
+        }),
+        None => scene.plain("missing", rgb(0xff_00ff), roughness, |_| {}),
+    };
+    let light = textured(&mut scene, 0.22, 0.1);
+    let dark = textured(&mut scene, 0.22, 0.1);
+    let walnut = textured(&mut scene, 0.06, 0.3);
+    let oak = textured(&mut scene, 0.02, 0.45);
+    let ivory = scene.plain("ivory", rgb(0xe2d0a8), 0.18, |m| m.mirror = 0.04);
+    let ebony = scene.plain("ebony", rgb(0x241a16), 0.12, |m| m.mirror = 0.14);
+    board(&mut scene, light, dark, walnut);
+    let mut table = MeshBuilder::new();
+    table.panel(
+        vec3(-1.2, -0.022, 1.2),
+        Vec3::X * 2.4,
+        Vec3::NEG_Z * 2.4,
+        8,
+        8,
+    );
+    scene.add("table", table, oak);
+
+    let back = [
+        "rook", "knight", "bishop", "queen", "king", "bishop", "knight", "rook",
+    ];
+    let square = |file: usize, rank: usize| {
+        vec3(
+            (file as f32 - 3.5) * SQUARE,
+            0.0,
+            (3.5 - rank as f32) * SQUARE,
+        )
+    };
+    for (color, material) in [ivory, ebony].into_iter().enumerate() {
+        let (home, forward) = if color == 0 {
+            (0, FRAC_PI_2)
+        } else {
+            (7, -FRAC_PI_2)
+        };
+        let pieces: [(&str, MeshBuilder); 6] = [
+            ("pawn", pawn()),
+            ("rook", rook()),
+            ("knight", knight()),
+            ("bishop", bishop()),
+            ("queen", queen()),
+            ("king", king()),
+        ];
+        let kinds: Vec<(&str, usize)> = pieces
+            .into_iter()
+            .map(|(name, m)| (name, scene.mesh(name, m, material)))
+            .collect();
+        let mesh = |name: &str| kinds.iter().find(|(n, _)| *n == name).map_or(0, |k| k.1);
+        for (file, name) in back.into_iter().enumerate() {
+            // 1. e4 e5 2. Nf3 Nc6 3. Bc4 Bc5 4. c3 Nf6 5. d3 d6
+            let (f, r) = match (color, name, file) {
+                (0, "knight", 6) => (5, 2),
+                (1, "knight", 1) => (2, 5),
+                (0, "bishop", 5) => (2, 3),
+                (1, "bishop", 5) => (2, 4),
+                (1, "knight", 6) => (5, 5),
+                _ => (file, home),
+            };
+            let turn = forward + 0.06 * ((file * 7 + color * 3) as f32).sin();
+            let place =
+                Affine3A::from_rotation_translation(Quat::from_rotation_y(turn), square(f, r));
+            scene.place(mesh(name), place);
+        }
+        for file in 0..8 {
+            let rank = match (color, file) {
+                (0, 4) => 3,
+                (0, 2 | 3) => 2,
+                (0, _) => 1,
+                (_, 4) => 4,
+                (_, 3) => 5,
+                _ => 6,
+            };
+            scene.place(mesh("pawn"), Affine3A::from_translation(square(file, rank)));
+        }
+    }
+    scene.camera(
+        "default",
+        vec3(0.05, 0.20, 0.30),
+        vec3(0.0, 0.0, 0.03),
+        0.01,
+        20.0,
+    );
+    scene.camera(
+        "low",
+        vec3(0.20, 0.10, 0.26),
+        vec3(-0.05, 0.03, 0.0),
+        0.01,
+        20.0,
+    );
+    scene.sun(vec3(-0.5, -0.8, -0.35), vec3(1.3, 1.2, 1.05));
+    scene.lamp(vec3(0.5, 0.7, 0.3), vec3(0.36, 0.32, 0.26));
+    scene.finish(vec3(0.28, 0.32, 0.38), 0)
+}

@@ -1,0 +1,514 @@
+//! A jungle clearing with a temple ruin: stands for GFXBench's T-Rex.
+//!
+//! A winding path leads to the ruin; foliage with alpha masks is instanced from few meshes.
+
+use super::creature::{self, Creature};
+use super::jungle_plants as plants;
+use super::masonry::{carved_band, carved_stone, dressed_stone};
+use super::mesh_builder::MeshBuilder;
+use super::noise::{Rng, bank, smoothstep};
+use super::organic::{LeafShape, bark, leaf, rock, skin, soil};
+use super::scene_builder::{MaterialId, SceneBuilder};
+use super::texture_synth::{Maps, Recipe, Surface, rgb, synthesize_all};
+use super::{jungle_temple, texture_synth::TextureSet};
+use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use scene::{AlphaMode, Scene};
+use std::f32::consts::TAU;
+
+/// Half extent of the ground in metres.
+const HALF: f32 = 34.0;
+/// Centre of the temple's platform.
+const TEMPLE: Vec3 = vec3(15.0, 0.0, 0.0);
+
+/// Where the creature stands.
+const CREATURE: Vec3 = vec3(1.4, 0.0, -3.6);
+
+/// Where the path runs: z as a function of x.
+fn path_z(x: f32) -> f32 {
+    1.6 * (0.16 * x + 2.2).sin() * smoothstep(12.0, 2.0, x)
+}
+
+/// Height of the ground in metres.
+fn ground(x: f32, z: f32) -> f32 {
+    let noise = bank();
+    let aside = (z - path_z(x)).abs();
+    let clearing = smoothstep(9.0, 14.0, vec2(x - TEMPLE.x, z - TEMPLE.z).length());
+    let bank_height = 2.6 * smoothstep(2.0, 16.0, aside) * clearing;
+    let hummocks = noise.cloud.smooth(x / 70.0 + 0.5, z / 70.0 + 0.5) - 0.4;
+    let bumps = noise.mottle.smooth(x / 40.0, z / 40.0) - 0.5;
+    let rough = smoothstep(0.8, 4.0, aside) * (0.3 + 0.7 * clearing);
+    bank_height + rough * (2.2 * hummocks + 0.5 * bumps) + 0.05 * bumps
+}
+
+struct Leaves {
+    ferns: [MaterialId; 2],
+    palms: [MaterialId; 2],
+    broad: [MaterialId; 2],
+    bushes: [MaterialId; 3],
+    grasses: [MaterialId; 2],
+    canopies: [MaterialId; 2],
+    ivy: MaterialId,
+}
+
+struct Solids {
+    litter: MaterialId,
+    path: MaterialId,
+    barks: [MaterialId; 2],
+    palm_bark: MaterialId,
+    liana: MaterialId,
+    rocks: [MaterialId; 2],
+    masonry: MaterialId,
+    carved: MaterialId,
+    steps: MaterialId,
+    idol: MaterialId,
+    hide: MaterialId,
+    teeth: MaterialId,
+    eye: MaterialId,
+}
+
+fn textures() -> Vec<TextureSet> {
+    use LeafShape::{Blade, Frond, Grass, Ivy, Palm, Spray};
+    let color = |name, size, surface: Surface| Recipe {
+        name,
+        size,
+        maps: Maps::Color,
+        tile_m: 1.0,
+        surface,
+    };
+    let normal = |name, tile_m, surface: Surface| Recipe {
+        name,
+        size: 1024,
+        maps: Maps::ColorNormal,
+        tile_m,
+        surface,
+    };
+    let full = |name, tile_m, surface: Surface| Recipe {
+        name,
+        size: 1024,
+        maps: Maps::Full,
+        tile_m,
+        surface,
+    };
+    let moss_stone = [rgb(0x8d8a72), rgb(0x6b6d55)];
+    synthesize_all(&[
+        color(
+            "fern-bright",
+            1024,
+            leaf(Frond, [rgb(0x3c6a1c), rgb(0x86ac3c)]),
+        ),
+        color(
+            "fern-dark",
+            1024,
+            leaf(Frond, [rgb(0x24491a), rgb(0x4f7d30)]),
+        ),
+        color(
+            "palm-feather",
+            1024,
+            leaf(Frond, [rgb(0x35601f), rgb(0x7d9c40)]),
+        ),
+        color("palm-fan", 1024, leaf(Palm, [rgb(0x335c22), rgb(0x6f9440)])),
+        normal(
+            "banana-leaf",
+            1.0,
+            leaf(Blade, [rgb(0x3f7a24), rgb(0x90b848)]),
+        ),
+        normal(
+            "philodendron",
+            1.0,
+            leaf(Blade, [rgb(0x1f4a24), rgb(0x467c3c)]),
+        ),
+        color(
+            "bush-bright",
+            1024,
+            leaf(Spray, [rgb(0x41701f), rgb(0x8aa83a)]),
+        ),
+        color(
+            "bush-dark",
+            1024,
+            leaf(Spray, [rgb(0x21451c), rgb(0x4a7530)]),
+        ),
+        color("bush-red", 512, leaf(Spray, [rgb(0x6d2a2c), rgb(0x9c5a3c)])),
+        color(
+            "grass-green",
+            512,
+            leaf(Grass, [rgb(0x466e22), rgb(0x94ac48)]),
+        ),
+        color(
+            "grass-dry",
+            512,
+            leaf(Grass, [rgb(0x7a6f34), rgb(0xb4a458)]),
+        ),
+        color(
+            "canopy-near",
+            1024,
+            leaf(Spray, [rgb(0x35601d), rgb(0x7ba03a)]),
+        ),
+        color(
+            "canopy-far",
+            1024,
+            leaf(Spray, [rgb(0x2a5220), rgb(0x5c8a36)]),
+        ),
+        color("ivy", 512, leaf(Ivy, [rgb(0x2a5223), rgb(0x5f8f3f)])),
+        full(
+            "forest-floor",
+            3.0,
+            soil([rgb(0x3c2f1e), rgb(0x5d4a2e)], Some(rgb(0x8a6a36)), 0.5),
+        ),
+        full(
+            "trodden-earth",
+            2.5,
+            soil([rgb(0x6e5638), rgb(0x8a7048)], None, 1.0),
+        ),
+        normal("bark-grey", 2.0, bark([rgb(0x3a3026), rgb(0x84745c)], 0.7)),
+        normal("bark-brown", 2.0, bark([rgb(0x3b2818), rgb(0x7c5a3a)], 0.4)),
+        normal("palm-bark", 1.2, bark([rgb(0x4c4030), rgb(0x94826a)], 0.1)),
+        color("liana", 512, bark([rgb(0x3a2e1c), rgb(0x6a5834)], 0.6)),
+        normal("rock-mossy", 2.2, rock([rgb(0x6a665c), rgb(0x8f897c)], 1.0)),
+        normal("rock-bare", 2.2, rock([rgb(0x7a6c5a), rgb(0x9c8f7c)], 0.3)),
+        full("temple-blocks", 2.6, dressed_stone(moss_stone, 3, 6, 1.0)),
+        full(
+            "temple-frieze",
+            1.6,
+            carved_band([rgb(0x948f74), rgb(0x73745a)]),
+        ),
+        normal(
+            "temple-steps",
+            2.0,
+            dressed_stone([rgb(0x98917a), rgb(0x77745e)], 4, 5, 0.9),
+        ),
+        normal(
+            "idol",
+            1.0,
+            carved_stone([rgb(0x7f8468), rgb(0x5b634a)], 0.2, 0.8, 0.7),
+        ),
+        full("hide", 1.4, skin([rgb(0x857650), rgb(0x474c36)])),
+    ])
+}
+
+fn materials(scene: &mut SceneBuilder) -> (Leaves, Solids) {
+    let mut sets = textures().into_iter();
+    let mut next = |foliage: bool| match sets.next() {
+        Some(set) => scene.textured(set, |m| {
+            if foliage {
+                m.alpha = AlphaMode::Mask(0.5);
+                m.double_sided = true;
+                m.roughness = 0.6;
+            }
+        }),
+        None => scene.plain("missing", rgb(0xff_00ff), 0.8, |_| {}),
+    };
+    let leaves = Leaves {
+        ferns: [next(true), next(true)],
+        palms: [next(true), next(true)],
+        broad: [next(true), next(true)],
+        bushes: [next(true), next(true), next(true)],
+        grasses: [next(true), next(true)],
+        canopies: [next(true), next(true)],
+        ivy: next(true),
+    };
+    let [litter, path] = [next(false), next(false)];
+    let barks = [next(false), next(false)];
+    let [palm_bark, liana] = [next(false), next(false)];
+    let rocks = [next(false), next(false)];
+    let [masonry, carved, steps] = [next(false), next(false), next(false)];
+    let [idol, hide] = [next(false), next(false)];
+    let teeth = scene.plain("teeth", rgb(0xd8ceb0), 0.4, |_| {});
+    let eye = scene.plain("eye", rgb(0xc89a20), 0.1, |_| {});
+    let solids = Solids {
+        litter,
+        path,
+        barks,
+        palm_bark,
+        liana,
+        rocks,
+        masonry,
+        carved,
+        steps,
+        idol,
+        hide,
+        teeth,
+        eye,
+    };
+    (leaves, solids)
+}
+
+/// The scene.
+#[must_use]
+pub fn scene() -> Scene {
+    let mut scene = SceneBuilder::new("jungle");
+    let (leaves, solids) = materials(&mut scene);
+    terrain(&mut scene, &solids);
+    jungle_temple::build(
+        &mut scene,
+        TEMPLE,
+        &jungle_temple::Stones {
+            blocks: solids.masonry,
+            frieze: solids.carved,
+            steps: solids.steps,
+            idol: solids.idol,
+        },
+    );
+    let Creature { hide, teeth, eyes } = creature::tyrannosaur();
+    let stand = Affine3A::from_rotation_translation(
+        Quat::from_rotation_y(4.3),
+        vec3(
+            CREATURE.x,
+            ground(CREATURE.x, CREATURE.z) - 0.03,
+            CREATURE.z,
+        ),
+    );
+    for (name, mesh, material) in [
+        ("creature", hide, solids.hide),
+        ("creature-teeth", teeth, solids.teeth),
+        ("creature-eyes", eyes, solids.eye),
+    ] {
+        let mesh = scene.mesh(name, mesh, material);
+        scene.place(mesh, stand);
+    }
+    let mut rng = Rng::new(2014);
+    trees(&mut scene, &leaves, &solids, &mut rng);
+    undergrowth(&mut scene, &leaves, &solids, &mut rng);
+
+    let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.65, z);
+    scene.camera(
+        "default",
+        eye(-8.5, path_z(-8.5)),
+        vec3(6.0, 2.3, -0.9),
+        0.1,
+        120.0,
+    );
+    scene.camera(
+        "ruin",
+        eye(3.8, path_z(3.8)),
+        vec3(15.0, 3.4, -0.3),
+        0.1,
+        120.0,
+    );
+    scene.camera(
+        "thicket",
+        eye(-17.0, path_z(-17.0) + 2.4),
+        vec3(-6.0, 1.2, -1.5),
+        0.1,
+        120.0,
+    );
+    scene.sun(vec3(0.42, -0.80, -0.43), vec3(3.4, 3.1, 2.4));
+    scene.finish(vec3(0.55, 0.66, 0.60), 1)
+}
+
+fn terrain(scene: &mut SceneBuilder, solids: &Solids) {
+    let mut floor = MeshBuilder::new();
+    floor.surface(72, 72, |s, t| {
+        let (x, z) = (HALF * (2.0 * s - 1.0), HALF * (1.0 - 2.0 * t));
+        (vec3(x, ground(x, z), z), vec2(x, z))
+    });
+    scene.add("forest-floor", floor, solids.litter);
+    let mut path = MeshBuilder::new();
+    path.surface(8, 120, |s, t| {
+        let x = -HALF + t * (HALF + 8.5);
+        let ragged = 1.15 + 0.35 * (bank().mottle.smooth(x / 16.0, 0.5 + s.round() * 0.2) - 0.5);
+        let z = path_z(x) + ragged * (2.0 * s - 1.0);
+        // Just above the floor in the middle, below it at the rims.
+        let lift = 0.045 - 0.12 * (2.0 * s - 1.0).powi(4);
+        (vec3(x, ground(x, z) + lift, z), vec2(x, z))
+    });
+    path.orient(|_| Vec3::Y);
+    scene.add("path", path, solids.path);
+}
+
+/// Whether a plant that keeps `clear` metres off the path would stand in the creature or before it.
+fn hides_creature(x: f32, z: f32, clear: f32) -> bool {
+    let eye = vec2(-8.5, path_z(-8.5));
+    let (to, at) = (vec2(CREATURE.x, CREATURE.z) - eye, vec2(x, z) - eye);
+    let along = (at.dot(to) / to.length_squared()).clamp(0.0, 1.0);
+    let aside = at.distance(to * along);
+    let room = if along > 0.7 {
+        2.0 + 0.4 * clear
+    } else {
+        0.35 * clear + 0.9 * along
+    };
+    clear > 1.2 && aside < room || at.distance(to) < 2.6
+}
+
+/// A spot at least `clear` metres off the path and off the temple, within `reach` of the path.
+fn spot(rng: &mut Rng, clear: f32, reach: f32, temple: f32) -> Vec3 {
+    loop {
+        let x = rng.range(-28.0, 28.0);
+        let side = if rng.bits() & 1 == 0 { 1.0 } else { -1.0 };
+        // Denser beside the path, where it is seen.
+        let z = path_z(x) + side * (clear + (reach - clear) * rng.unit().powf(1.6));
+        if z.abs() < HALF - 2.0
+            && !hides_creature(x, z, clear)
+            && vec2(x - TEMPLE.x, z - TEMPLE.z).length() > temple
+        {
+            return vec3(x, ground(x, z), z);
+        }
+    }
+}
+
+fn upright(position: Vec3, turn: f32, scale: f32) -> Affine3A {
+    Affine3A::from_scale_rotation_translation(
+        Vec3::splat(scale),
+        Quat::from_rotation_y(turn),
+        position,
+    )
+}
+
+fn trees(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: &mut Rng) {
+    let kinds: Vec<[usize; 3]> = (0..3)
+        .map(|i| {
+            let (radius, height) = ([0.42, 0.55, 0.34][i], [9.5, 12.0, 8.0][i]);
+            let crown = [4.6, 5.6, 3.8][i];
+            let bark = solids.barks[i % 2];
+            let trunk =
+                plants::buttressed_trunk(radius, height, [5.0, 6.0, 4.0][i], [30, 18], i as u64);
+            [
+                scene.mesh("trunk", trunk, bark),
+                scene.mesh(
+                    "boughs",
+                    plants::boughs(height, crown, 7, radius * 0.4, rng),
+                    bark,
+                ),
+                scene.mesh(
+                    "canopy",
+                    plants::canopy(height, crown, 140, rng),
+                    leaves.canopies[i % 2],
+                ),
+            ]
+        })
+        .collect();
+    for i in 0..50 {
+        let place = match i {
+            0..14 => spot(rng, 3.2, 22.0, 10.0),
+            14..34 => spot(rng, 5.0, 22.0, 10.0),
+            _ => {
+                // A wall of trees behind the ruin closes the view.
+                let (sin, cos) = (0.16 * (i as f32 - 41.5) + rng.jitter(0.05)).sin_cos();
+                let (x, z) = (4.0 + 27.0 * cos, 25.0 * sin);
+                vec3(x, ground(x, z), z)
+            }
+        };
+        let place = upright(place, rng.range(0.0, TAU), rng.range(0.85, 1.25));
+        for mesh in kinds[rng.below(3)] {
+            scene.place(mesh, place);
+        }
+    }
+    let palms: Vec<(usize, usize, Vec3)> = (0..3)
+        .map(|i| {
+            let (trunk, top) = plants::palm_trunk([4.2, 5.6, 3.1][i], [0.7, -1.2, 0.4][i]);
+            let crown = plants::palm_crown(15, [2.3, 2.6, 1.9][i], rng);
+            (
+                scene.mesh("palm-trunk", trunk, solids.palm_bark),
+                scene.mesh("palm-crown", crown, leaves.palms[0]),
+                top,
+            )
+        })
+        .collect();
+    for _ in 0..34 {
+        let (trunk, crown, top) = palms[rng.below(3)];
+        let place = upright(
+            spot(rng, 2.4, 15.0, 8.6),
+            rng.range(0.0, TAU),
+            rng.range(0.8, 1.2),
+        );
+        scene.place(trunk, place);
+        scene.place(crown, place * Affine3A::from_translation(top));
+    }
+    // Lianas hang across the path from tree to tree.
+    for i in 0..12 {
+        let x = -24.0 + 2.6 * i as f32 + rng.jitter(1.0);
+        let (a, b) = (
+            path_z(x) - rng.range(2.5, 5.0),
+            path_z(x) + rng.range(2.5, 5.0),
+        );
+        let (a, b) = (
+            vec3(x, 5.5 + rng.jitter(1.2), a),
+            vec3(x + rng.jitter(2.0), 5.5 + rng.jitter(1.2), b),
+        );
+        let sag = rng.range(0.8, 2.0);
+        scene.add("liana", plants::liana(a, b, sag, 0.035), solids.liana);
+        scene.add(
+            "liana-leaves",
+            plants::liana_leaves(a, b, sag, 60, rng),
+            leaves.ivy,
+        );
+    }
+}
+
+fn undergrowth(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: &mut Rng) {
+    let mut scatter = |scene: &mut SceneBuilder,
+                       meshes: &[usize],
+                       count: usize,
+                       clear: f32,
+                       reach: f32,
+                       temple: f32,
+                       size: [f32; 2]| {
+        for _ in 0..count {
+            let place = spot(rng, clear, reach, temple);
+            scene.place(
+                meshes[rng.below(meshes.len())],
+                upright(place, rng.range(0.0, TAU), rng.range(size[0], size[1])),
+            );
+        }
+    };
+    let mut seeds = Rng::new(99);
+    let ferns: Vec<usize> = (0..4)
+        .map(|i| {
+            scene.mesh(
+                "fern",
+                plants::fern(12, 0.95, &mut seeds),
+                leaves.ferns[i % 2],
+            )
+        })
+        .collect();
+    scatter(scene, &ferns, 250, 1.35, 12.0, 7.2, [0.7, 1.4]);
+    let fans: Vec<usize> = (0..2)
+        .map(|_| {
+            scene.mesh(
+                "fan-palm",
+                plants::bush(16, 1.3, &mut seeds),
+                leaves.palms[1],
+            )
+        })
+        .collect();
+    scatter(scene, &fans, 50, 2.2, 14.0, 8.4, [0.8, 1.3]);
+    let broad: Vec<usize> = (0..4)
+        .map(|i| {
+            scene.mesh(
+                "broadleaf",
+                plants::broadleaf(9, [1.7, 1.0][i % 2], &mut seeds),
+                leaves.broad[i % 2],
+            )
+        })
+        .collect();
+    scatter(scene, &broad, 90, 1.9, 13.0, 8.0, [0.75, 1.3]);
+    let bushes: Vec<usize> = (0..6)
+        .map(|i| {
+            scene.mesh(
+                "bush",
+                plants::bush(22, 0.95, &mut seeds),
+                leaves.bushes[i % 3],
+            )
+        })
+        .collect();
+    scatter(scene, &bushes, 140, 2.0, 16.0, 7.8, [0.7, 1.6]);
+    let grasses: Vec<usize> = (0..4)
+        .map(|i| {
+            scene.mesh(
+                "grass",
+                plants::grass(9, 0.5, 0.42, &mut seeds),
+                leaves.grasses[i % 2],
+            )
+        })
+        .collect();
+    scatter(scene, &grasses, 260, 1.0, 9.0, 6.6, [0.7, 1.3]);
+    let rocks: Vec<usize> = (0..4)
+        .map(|i| {
+            scene.mesh(
+                "boulder",
+                plants::boulder([22, 14], i as u64),
+                solids.rocks[i % 2],
+            )
+        })
+        .collect();
+    scatter(scene, &rocks, 60, 1.5, 13.0, 7.0, [0.18, 0.8]);
+}

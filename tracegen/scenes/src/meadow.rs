@@ -1,0 +1,387 @@
+//! Lavender rows before a farm house, after Provence: 600 K triangles.
+
+use super::jungle_plants::{boughs, buttressed_trunk};
+use super::masonry::{dressed_stone, plaster, roof_tiles};
+use super::meadow_parts as parts;
+use super::mesh_builder::MeshBuilder;
+use super::noise::{Rng, bank, smoothstep};
+use super::organic::{bark, planks, rock, soil, turf, upright};
+use super::scene_builder::{MaterialId, SceneBuilder};
+use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use scene::Scene;
+use std::f32::consts::TAU;
+
+/// Triangles that the scene is filled up to.
+const TRIANGLES: u64 = 600_000;
+/// Where the farm house stands.
+pub(super) const HOUSE: Vec3 = vec3(7.5, 0.0, -27.0);
+/// Distance between rows in metres.
+const ROW: f32 = 1.7;
+
+/// Height of the ground in metres.
+pub(super) fn ground(x: f32, z: f32) -> f32 {
+    let noise = bank();
+    let swell = noise.cloud.smooth(x / 260.0 + 0.37, z / 260.0 + 0.11) - 0.5;
+    let hills = 9.0 * smoothstep(45.0, 130.0, vec2(x, z + 10.0).length());
+    let yard = smoothstep(7.0, 16.0, vec2(x - HOUSE.x, z - HOUSE.z).length());
+    yard * (1.6 * swell + hills * (0.6 + 1.4 * swell.abs())) + 0.012 * -z.min(0.0) * yard
+}
+
+pub(super) struct Kit {
+    pub(super) field: MaterialId,
+    pub(super) grass_ground: MaterialId,
+    pub(super) walls: MaterialId,
+    pub(super) plaster: MaterialId,
+    pub(super) roof: MaterialId,
+    pub(super) wood: MaterialId,
+    pub(super) shutter: MaterialId,
+    pub(super) stone: MaterialId,
+    pub(super) bark: MaterialId,
+    pub(super) stem: MaterialId,
+    pub(super) lavender: [MaterialId; 2],
+    pub(super) grass: MaterialId,
+    pub(super) straw: MaterialId,
+    pub(super) poppy: MaterialId,
+    pub(super) leaf: MaterialId,
+    pub(super) olive: MaterialId,
+    pub(super) cypress: MaterialId,
+    pub(super) pane: MaterialId,
+}
+
+fn kit(scene: &mut SceneBuilder) -> Kit {
+    let recipe = |name, tile_m, surface| Recipe {
+        name,
+        size: 1024,
+        maps: Maps::Color,
+        tile_m,
+        surface,
+    };
+    let mut sets = synthesize_all(&[
+        recipe(
+            "lavender-field",
+            3.4,
+            soil([rgb(0x9a6a44), rgb(0xb98a5c)], None, 0.5),
+        ),
+        recipe(
+            "grassland",
+            8.0,
+            turf([rgb(0x55662a), rgb(0x84883f)], rgb(0xa98a5c)),
+        ),
+        recipe(
+            "farm-stone",
+            2.4,
+            dressed_stone([rgb(0xc9b28c), rgb(0xa89068)], 5, 9, 0.7),
+        ),
+        recipe(
+            "ochre-plaster",
+            3.0,
+            plaster(rgb(0xdcb884), rgb(0xb39a74), 0.6),
+        ),
+        recipe(
+            "clay-tiles",
+            1.5,
+            roof_tiles([rgb(0xc07048), rgb(0x9a5236)]),
+        ),
+        recipe(
+            "door-wood",
+            1.2,
+            upright(planks([rgb(0x7a5230), rgb(0x523420)], 7, 0.7)),
+        ),
+        recipe(
+            "blue-shutters",
+            0.8,
+            planks([rgb(0x6f92b4), rgb(0x4f7498)], 12, 0.6),
+        ),
+        recipe(
+            "field-stone",
+            1.6,
+            rock([rgb(0x9c9484), rgb(0xb8b09c)], 0.25),
+        ),
+        recipe("bark", 1.6, bark([rgb(0x4a3c2e), rgb(0x8c7a62)], 0.2)),
+    ])
+    .into_iter();
+    let mut textured = |scene: &mut SceneBuilder| match sets.next() {
+        Some(set) => scene.textured(set, |m| m.roughness = 0.9),
+        None => scene.plain("missing", rgb(0xff_00ff), 0.8, |_| {}),
+    };
+    let field = textured(scene);
+    let grass_ground = textured(scene);
+    let walls = textured(scene);
+    let plaster = textured(scene);
+    let roof = textured(scene);
+    let wood = textured(scene);
+    let shutter = textured(scene);
+    let stone = textured(scene);
+    let bark = textured(scene);
+    let leafy = |scene: &mut SceneBuilder, name: &str, color: u32| {
+        scene.plain(name, rgb(color), 0.7, |m| m.double_sided = true)
+    };
+    Kit {
+        field,
+        grass_ground,
+        walls,
+        plaster,
+        roof,
+        wood,
+        shutter,
+        stone,
+        bark,
+        stem: leafy(scene, "lavender-stem", 0x7d9070),
+        lavender: [
+            leafy(scene, "lavender-flower", 0x7a58b8),
+            leafy(scene, "lavender-pale", 0x9678cc),
+        ],
+        grass: leafy(scene, "grass", 0x7f9a3e),
+        straw: leafy(scene, "straw", 0xc2aa60),
+        poppy: leafy(scene, "poppy", 0xd8301c),
+        leaf: leafy(scene, "oak-leaf", 0x587f30),
+        olive: leafy(scene, "olive-leaf", 0x8a9a70),
+        cypress: leafy(scene, "cypress", 0x365426),
+        pane: scene.plain("window-pane", rgb(0x20282e), 0.05, |m| m.mirror = 0.35),
+    }
+}
+
+fn upright_at(x: f32, z: f32, turn: f32, scale: f32) -> Affine3A {
+    Affine3A::from_scale_rotation_translation(
+        Vec3::splat(scale),
+        Quat::from_rotation_y(turn),
+        vec3(x, ground(x, z), z),
+    )
+}
+
+/// The scene.
+#[must_use]
+pub fn scene() -> Scene {
+    let mut scene = SceneBuilder::new("meadow");
+    let kit = kit(&mut scene);
+    let mut rng = Rng::new(600);
+    land(&mut scene, &kit);
+    super::meadow_house::farm_house(&mut scene, &kit);
+    garden_wall(&mut scene, &kit, &mut rng);
+    trees(&mut scene, &kit, &mut rng);
+    lavender(&mut scene, &kit, &mut rng);
+    grass_and_poppies(&mut scene, &kit, &mut rng);
+    let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.55, z);
+    scene.camera(
+        "default",
+        eye(0.85, 6.6),
+        vec3(2.6, 0.75, -14.0),
+        0.1,
+        400.0,
+    );
+    scene.camera(
+        "yard",
+        eye(1.5, -17.5),
+        HOUSE + vec3(0.5, 2.2, 0.0),
+        0.1,
+        400.0,
+    );
+    scene.camera(
+        "rows",
+        vec3(-4.2, ground(-4.2, 3.0) + 0.9, 3.0),
+        vec3(-3.0, 0.4, -8.0),
+        0.05,
+        400.0,
+    );
+    scene.sun(vec3(0.55, -0.62, -0.42), vec3(2.3, 2.1, 1.75));
+    scene.finish(vec3(0.36, 0.52, 0.78), 0)
+}
+
+fn land(scene: &mut SceneBuilder, kit: &Kit) {
+    let mut far = MeshBuilder::new();
+    far.surface(96, 96, |s, t| {
+        // Cells widen with distance.
+        let spread = |a: f32| (2.0 * a - 1.0).abs().powf(1.7) * (2.0 * a - 1.0).signum();
+        let (x, z) = (125.0 * spread(s), -10.0 - 125.0 * spread(t));
+        (vec3(x, ground(x, z) - 0.05, z), vec2(x, z + 10.0))
+    });
+    scene.add("grassland", far, kit.grass_ground);
+    let mut field = MeshBuilder::new();
+    field.surface(60, 120, |s, t| {
+        let (x, z) = (-17.0 + 34.0 * s, 5.2 - 26.0 * t);
+        let ridge = 0.10 * (TAU * x / ROW).cos();
+        let rim = smoothstep(0.0, 0.03, s.min(1.0 - s).min(t).min(1.0 - t));
+        (
+            vec3(x, ground(x, z) - 0.12 + (0.14 + ridge) * rim, z),
+            vec2(x, z + 8.0),
+        )
+    });
+    scene.add("field", field, kit.field);
+}
+
+/// A dry-stone wall along the edge of the yard, with a gap for the gate.
+fn garden_wall(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+    let mut m = MeshBuilder::new();
+    for course in 0..4 {
+        let mut x = -9.0;
+        while x < 16.0 {
+            let w = rng.range(0.28, 0.62);
+            let middle = x + 0.5 * w;
+            if !(1.2..3.6).contains(&middle) {
+                let (z, y) = (
+                    -20.8 + rng.jitter(0.03),
+                    0.21 * course as f32 + ground(middle, -20.8) - 0.08,
+                );
+                let mut stone = MeshBuilder::new();
+                let (half, height) = (0.5 * w - 0.008, 0.2 + rng.jitter(0.012));
+                stone.block(vec3(-half, 0.0, -0.2), vec3(half, height, 0.2), 0.035);
+                let turn = Quat::from_rotation_y(rng.jitter(0.06))
+                    * Quat::from_rotation_z(rng.jitter(0.03));
+                m.merge(
+                    &stone,
+                    Affine3A::from_rotation_translation(turn, vec3(middle, y, z)),
+                );
+            }
+            x += w;
+        }
+    }
+    scene.add("garden-wall", m, kit.stone);
+}
+
+fn trees(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+    let oaks: Vec<[usize; 3]> = (0..3)
+        .map(|i| {
+            let (height, radius) = ([5.2, 4.2, 3.4][i], [3.4, 2.7, 2.3][i]);
+            let foliage = if i == 2 { kit.olive } else { kit.leaf };
+            [
+                scene.mesh(
+                    "trunk",
+                    buttressed_trunk(0.26, height, 5.0, [18, 10], 40 + i as u64),
+                    kit.bark,
+                ),
+                scene.mesh(
+                    "boughs",
+                    boughs(height * 0.85, radius, 8, 0.10, rng),
+                    kit.bark,
+                ),
+                scene.mesh(
+                    "crown",
+                    parts::crown(4200, height + 0.2, radius, rng),
+                    foliage,
+                ),
+            ]
+        })
+        .collect();
+    let spots = [
+        (-6.5, -24.0, 0),
+        (-12.5, -27.5, 1),
+        (-18.5, -23.0, 0),
+        (1.2, -33.0, 1),
+        (17.5, -33.5, 0),
+        (19.5, -22.0, 2),
+        (-21.0, -10.0, 2),
+        (21.5, -9.0, 2),
+        (-30.0, -36.0, 1),
+        (28.0, -40.0, 0),
+    ];
+    for (x, z, kind) in spots {
+        let place = upright_at(x, z, rng.range(0.0, TAU), rng.range(0.9, 1.15));
+        for mesh in oaks[kind] {
+            scene.place(mesh, place);
+        }
+    }
+    let spire = scene.mesh("cypress", parts::cypress(2600, 7.5, 0.85, rng), kit.cypress);
+    for (x, z) in [
+        (0.9, -24.6),
+        (14.3, -22.2),
+        (15.8, -24.0),
+        (17.0, -26.4),
+        (-2.4, -28.5),
+        (-26.0, -30.0),
+        (-28.0, -30.8),
+        (33.0, -34.0),
+    ] {
+        scene.place(
+            spire,
+            upright_at(x, z, rng.range(0.0, TAU), rng.range(0.85, 1.2)),
+        );
+    }
+}
+
+fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+    let bushes =
+        |scene: &mut SceneBuilder, stalks: usize, spike: f32, rng: &mut Rng| -> Vec<[usize; 2]> {
+            (0..4)
+                .map(|i| {
+                    let [green, purple] = parts::lavender(stalks, 0.52, spike, rng);
+                    [
+                        scene.mesh("lavender-stems", green, kit.stem),
+                        scene.mesh("lavender-flowers", purple, kit.lavender[i % 2]),
+                    ]
+                })
+                .collect()
+        };
+    let near = bushes(scene, 112, 0.0095, rng);
+    let far = bushes(scene, 36, 0.014, rng);
+    for row in -9i32..=9 {
+        let x = row as f32 * ROW;
+        let mut z = 4.6;
+        while z > -19.6 {
+            let close = vec2(x - 0.85, z - 6.6).length() < 12.0;
+            let kinds = if close { &near } else { &far };
+            let kind = kinds[rng.below(kinds.len())];
+            let place = upright_at(
+                x + rng.jitter(0.06),
+                z,
+                rng.range(0.0, TAU),
+                rng.range(0.9, 1.2),
+            );
+            for mesh in kind {
+                scene.place(mesh, place);
+            }
+            z -= 0.58 + rng.jitter(0.06);
+        }
+    }
+}
+
+fn grass_and_poppies(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+    let poppies: Vec<[usize; 2]> = (0..3)
+        .map(|_| {
+            let [green, red] = parts::poppy(0.42, rng);
+            [
+                scene.mesh("poppy-stem", green, kit.grass),
+                scene.mesh("poppy-petals", red, kit.poppy),
+            ]
+        })
+        .collect();
+    for _ in 0..320 {
+        let (x, z) = (rng.jitter(8.0), rng.range(4.9, 8.6));
+        if vec2(x - 0.85, z - 6.6).length() < 0.9 {
+            continue;
+        }
+        let place = upright_at(x, z, rng.range(0.0, TAU), rng.range(0.8, 1.2));
+        for mesh in poppies[rng.below(3)] {
+            scene.place(mesh, place);
+        }
+    }
+    let blades = 11;
+    let tufts: Vec<usize> = (0..6)
+        .map(|i| {
+            let material = if i % 3 == 2 { kit.straw } else { kit.grass };
+            scene.mesh("tuft", parts::tuft(blades, 0.30, rng), material)
+        })
+        .collect();
+    // Grass takes what is left of the triangles.
+    let left = TRIANGLES.saturating_sub(scene.triangles()) / (3 * blades as u64);
+    for i in 0..left {
+        let (x, z) = match i % 5 {
+            // Before the field, along its sides, in the yard, and between the rows.
+            0 | 4 => (rng.jitter(8.0), rng.range(4.6, 8.2)),
+            1 => (
+                (17.2 + rng.range(0.0, 9.0)) * rng.jitter(1.0).signum(),
+                rng.range(-24.0, 8.0),
+            ),
+            2 => (rng.range(-16.0, 22.0), rng.range(-31.0, -20.2)),
+            _ => (
+                (rng.below(18) as f32 - 8.5) * ROW + rng.jitter(0.25),
+                rng.range(-19.5, 4.8),
+            ),
+        };
+        let size = if i % 5 == 3 { 0.45 } else { 1.0 };
+        scene.place(
+            tufts[rng.below(tufts.len())],
+            upright_at(x, z, rng.range(0.0, TAU), size * rng.range(0.7, 1.3)),
+        );
+    }
+}

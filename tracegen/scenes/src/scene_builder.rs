@@ -1,0 +1,153 @@
+//! Puts materials, meshes, instances, cameras and lights together into a scene.
+
+use super::mesh_builder::MeshBuilder;
+use super::texture_synth::{Rgb, TextureSet, linear};
+use glam::{Affine3A, Vec3};
+use scene::{Camera, Instance, Light, Material, Scene, TextureRef};
+
+/// A material's index, with what a mesh needs to know of it.
+#[derive(Clone, Copy, Debug)]
+pub struct MaterialId {
+    index: usize,
+    tile_m: f32,
+}
+
+/// A scene under construction.
+pub struct SceneBuilder {
+    scene: Scene,
+    tile_m: Vec<f32>,
+}
+
+impl SceneBuilder {
+    /// An empty scene.
+    #[must_use]
+    pub fn new(name: &str) -> Self {
+        Self {
+            scene: Scene {
+                name: name.to_owned(),
+                ..Scene::default()
+            },
+            tile_m: Vec::new(),
+        }
+    }
+
+    /// Adds a material.
+    pub fn material(&mut self, material: Material, tile_m: f32) -> MaterialId {
+        self.scene.materials.push(material);
+        self.tile_m.push(tile_m);
+        MaterialId {
+            index: self.scene.materials.len() - 1,
+            tile_m,
+        }
+    }
+
+    /// Adds an untextured material: sRGB colour, roughness, then what `adjust` changes.
+    pub fn plain(
+        &mut self,
+        name: &str,
+        color: Rgb,
+        roughness: f32,
+        adjust: impl FnOnce(&mut Material),
+    ) -> MaterialId {
+        let mut material = Material {
+            name: name.to_owned(),
+            base_color: linear(color).extend(1.0),
+            roughness,
+            ..Material::default()
+        };
+        adjust(&mut material);
+        self.material(material, 1.0)
+    }
+
+    /// Adds a material with a set of textures, then what `adjust` changes.
+    pub fn textured(&mut self, set: TextureSet, adjust: impl FnOnce(&mut Material)) -> MaterialId {
+        let images = &mut self.scene.images;
+        let mut add = |image| {
+            images.push(image);
+            TextureRef::new(images.len() - 1)
+        };
+        let base_color_texture = Some(add(set.color));
+        let normal_texture = set.normal.map(&mut add);
+        let metallic_roughness_texture = set.metallic_roughness.map(&mut add);
+        let occlusion_texture = set.occlusion.map(&mut add);
+        // The texture multiplies the factors, as in glTF.
+        let factor = |plain| {
+            if metallic_roughness_texture.is_some() {
+                1.0
+            } else {
+                plain
+            }
+        };
+        let mut material = Material {
+            name: set.name.to_owned(),
+            base_color_texture,
+            normal_texture,
+            metallic: factor(0.0),
+            roughness: factor(0.8),
+            metallic_roughness_texture,
+            occlusion_texture,
+            ..Material::default()
+        };
+        adjust(&mut material);
+        self.material(material, set.tile_m)
+    }
+
+    /// Adds a mesh that is not placed yet; returns its index.
+    pub fn mesh(&mut self, name: &str, mesh: MeshBuilder, material: MaterialId) -> usize {
+        self.scene
+            .meshes
+            .push(mesh.finish(name, material.index, material.tile_m));
+        self.scene.meshes.len() - 1
+    }
+
+    /// Places a mesh.
+    pub fn place(&mut self, mesh: usize, transform: Affine3A) {
+        self.scene.instances.push(Instance { mesh, transform });
+    }
+
+    /// Adds a mesh that stands where it was modelled.
+    pub fn add(&mut self, name: &str, mesh: MeshBuilder, material: MaterialId) {
+        let mesh = self.mesh(name, mesh, material);
+        self.place(mesh, Affine3A::IDENTITY);
+    }
+
+    /// Adds a camera; the first is the default one.
+    pub fn camera(&mut self, name: &str, eye: Vec3, target: Vec3, near: f32, far: f32) {
+        self.scene.cameras.push(Camera {
+            name: name.to_owned(),
+            eye,
+            target,
+            up: Vec3::Y,
+            vfov_deg: 60.0,
+            near,
+            far,
+        });
+    }
+
+    /// Adds parallel light that travels along `direction`.
+    pub fn sun(&mut self, direction: Vec3, color: Vec3) {
+        self.scene.lights.push(Light::Directional {
+            direction: direction.normalize(),
+            color,
+        });
+    }
+
+    /// Adds a point light.
+    pub fn lamp(&mut self, position: Vec3, color: Vec3) {
+        self.scene.lights.push(Light::Point { position, color });
+    }
+
+    /// The finished scene under a sky of the given radiance.
+    #[must_use]
+    pub fn finish(mut self, sky: Vec3, shadow_cascades: u32) -> Scene {
+        self.scene.sky = sky;
+        self.scene.shadow_cascades = shadow_cascades;
+        self.scene
+    }
+
+    /// Triangles placed so far.
+    #[must_use]
+    pub fn triangles(&self) -> u64 {
+        self.scene.triangle_count()
+    }
+}

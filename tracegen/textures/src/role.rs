@@ -1,0 +1,66 @@
+//! What each image is used for, which decides how it is filtered and compressed.
+
+use scene::{AlphaMode, Scene};
+
+/// How a texture's alpha is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Alpha {
+    /// Not at all.
+    Ignored,
+    /// Compared with a cutoff (0 to 255).
+    Mask(u8),
+    /// Blended.
+    Smooth,
+}
+
+/// What an image is used for by all materials together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Role {
+    pub alpha: Alpha,
+    pub normal_map: bool,
+}
+
+/// The role of each image, `None` for those that no placed mesh samples.
+///
+/// An image that materials use in several ways gets the alpha that keeps most of it, and the
+/// lowest cutoff.
+pub(super) fn of_images(scene: &Scene) -> Vec<Option<Role>> {
+    let mut used = vec![false; scene.materials.len()];
+    for instance in &scene.instances {
+        if let Some(mesh) = scene.meshes.get(instance.mesh)
+            && let Some(used) = used.get_mut(mesh.material)
+        {
+            *used = true;
+        }
+    }
+    let mut roles = vec![None; scene.images.len()];
+    for (material, _) in scene.materials.iter().zip(&used).filter(|(_, u)| **u) {
+        let slots = material.textures();
+        for (slot, texture) in slots.into_iter().enumerate() {
+            let Some(role) = texture.and_then(|t| roles.get_mut(t.image)) else {
+                continue;
+            };
+            let alpha = match material.alpha {
+                AlphaMode::Mask(cutoff) if slot == 0 => {
+                    let on_texture = cutoff / material.base_color.w.max(1e-6);
+                    // At least 1: a fully transparent texel never passes in BC1.
+                    Alpha::Mask((on_texture * 255.0).ceil().clamp(1.0, 255.0) as u8)
+                }
+                AlphaMode::Blend if slot == 0 => Alpha::Smooth,
+                _ => Alpha::Ignored,
+            };
+            let role = role.get_or_insert(Role {
+                alpha: Alpha::Ignored,
+                normal_map: false,
+            });
+            role.normal_map |= slot == 1;
+            role.alpha = match (role.alpha, alpha) {
+                (Alpha::Smooth, _) | (_, Alpha::Smooth) => Alpha::Smooth,
+                (Alpha::Mask(a), Alpha::Mask(b)) => Alpha::Mask(a.min(b)),
+                (Alpha::Mask(a), _) | (_, Alpha::Mask(a)) => Alpha::Mask(a),
+                (Alpha::Ignored, Alpha::Ignored) => Alpha::Ignored,
+            };
+        }
+    }
+    roles
+}

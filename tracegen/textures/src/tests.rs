@@ -1,0 +1,180 @@
+//! Quality against an independent decoder, determinism, and what each material makes of an image.
+
+use super::*;
+use glam::Affine3A;
+use scene::{AlphaMode, Instance, Material, Mesh, TextureRef};
+
+/// A scene of one triangle whose material samples `image` as base colour.
+fn scene_of(size: [u32; 2], rgba: Vec<u8>, alpha: AlphaMode) -> Scene {
+    Scene {
+        meshes: vec![Mesh::default()],
+        instances: vec![Instance {
+            mesh: 0,
+            transform: Affine3A::IDENTITY,
+        }],
+        materials: vec![Material {
+            base_color_texture: Some(TextureRef::new(0)),
+            alpha,
+            ..Material::default()
+        }],
+        images: vec![Image {
+            name: "test".into(),
+            size,
+            rgba: rgba.into(),
+            color_space: ColorSpace::Srgb,
+        }],
+        ..Scene::default()
+    }
+}
+
+/// Smooth colours with some texture, and an alpha ramp along x.
+fn picture(size: [u32; 2]) -> Vec<u8> {
+    let mut rgba = Vec::new();
+    for y in 0..size[1] {
+        for x in 0..size[0] {
+            let wave = ((x as f32 * 0.31).sin() * (y as f32 * 0.17).cos() * 30.0) as i32;
+            let channel = |base: u32| (base as i32 * 200 / 256 + 28 + wave).clamp(0, 255) as u8;
+            let (u, v) = (x * 255 / size[0], y * 255 / size[1]);
+            rgba.extend([channel(u), channel(v), channel((u + v) / 2), u as u8]);
+        }
+    }
+    rgba
+}
+
+/// Decodes level 0 with an independent decoder.
+fn decode(texture: &CompressedTexture) -> Vec<u8> {
+    let [width, height] = texture.texture.size.map(|e| e as usize);
+    let mut rgba = vec![0; width * height * 4];
+    let block_bytes = if texture.texture.format == TexelFormat::Bc1 {
+        8
+    } else {
+        16
+    };
+    for (i, block) in texture.levels[0].chunks(block_bytes).enumerate() {
+        let (x, y) = (i % (width / 4) * 4, i / (width / 4) * 4);
+        let out = &mut rgba[(y * width + x) * 4..];
+        match texture.texture.format {
+            TexelFormat::Bc1 => bcdec_rs::bc1(block, out, width * 4),
+            _ => bcdec_rs::bc3(block, out, width * 4),
+        }
+    }
+    rgba
+}
+
+fn psnr_db(a: &[u8], b: &[u8], channels: std::ops::Range<usize>) -> f64 {
+    let mut sum = 0.0;
+    let mut count = 0.0;
+    for (a, b) in a.chunks(4).zip(b.chunks(4)) {
+        for c in channels.clone() {
+            sum += (f64::from(a[c]) - f64::from(b[c])).powi(2);
+            count += 1.0;
+        }
+    }
+    10.0 * (255.0 * 255.0 * count / sum).log10()
+}
+
+#[test]
+fn bc1_keeps_a_smooth_picture_above_36_db() {
+    let rgba = picture([128, 128]);
+    let set = TextureSet::compress(&scene_of([128, 128], rgba.clone(), AlphaMode::Opaque)).unwrap();
+    let decoded = decode(&set.textures[0]);
+    let psnr = psnr_db(&rgba, &decoded, 0..3);
+    assert!(psnr > 36.0, "{psnr} dB");
+    assert!(
+        decoded.chunks(4).all(|t| t[3] == 255),
+        "an opaque image has no holes"
+    );
+}
+
+#[test]
+fn levels_are_a_whole_chain_of_whole_blocks() {
+    let set = TextureSet::compress(&scene_of([64, 16], picture([64, 16]), AlphaMode::Opaque));
+    let texture = &set.unwrap().textures[0];
+    let bytes: Vec<usize> = texture.levels.iter().map(Vec::len).collect();
+    // 64x16, 32x8, 16x4, 8x2, 4x1, 2x1, 1x1 in 4x4 blocks of 8 bytes.
+    assert_eq!(bytes, [16 * 4 * 8, 8 * 2 * 8, 4 * 8, 2 * 8, 8, 8, 8]);
+    assert_eq!(texture.texture.levels, 7);
+}
+
+#[test]
+fn a_masked_image_becomes_bc1_with_one_bit_alpha_at_the_cutoff() {
+    let rgba = picture([64, 64]);
+    let scene = scene_of([64, 64], rgba.clone(), AlphaMode::Mask(0.25));
+    let texture = TextureSet::compress(&scene).unwrap().textures.remove(0);
+    assert_eq!(texture.texture.format, TexelFormat::Bc1);
+    let decoded = decode(&texture);
+    for (source, texel) in rgba.chunks(4).zip(decoded.chunks(4)) {
+        let expected = if f32::from(source[3]) / 255.0 >= 0.25 {
+            255
+        } else {
+            0
+        };
+        assert_eq!(texel[3], expected);
+    }
+}
+
+#[test]
+fn a_blended_image_becomes_bc3_only_where_its_alpha_is_smooth() {
+    let mut rgba = picture([64, 64]);
+    let scene = scene_of([64, 64], rgba.clone(), AlphaMode::Blend);
+    let texture = TextureSet::compress(&scene).unwrap().textures.remove(0);
+    assert_eq!(texture.texture.format, TexelFormat::Bc3);
+    let psnr = psnr_db(&rgba, &decode(&texture), 3..4);
+    assert!(psnr > 45.0, "{psnr} dB");
+    mipmap::make_opaque(&mut rgba);
+    let opaque = TextureSet::compress(&scene_of([64, 64], rgba, AlphaMode::Blend)).unwrap();
+    assert_eq!(opaque.textures[0].texture.format, TexelFormat::Bc1);
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_the_number_of_threads() {
+    let scene = scene_of([256, 128], picture([256, 128]), AlphaMode::Mask(0.5));
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| TextureSet::compress(&scene).unwrap())
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn sizes_that_are_not_whole_blocks_are_resampled_with_a_note() {
+    let scene = scene_of([30, 17], picture([30, 17]), AlphaMode::Opaque);
+    let set = TextureSet::compress(&scene).unwrap();
+    assert_eq!(set.textures[0].texture.size, [32, 20]);
+    assert!(set.notes[0].contains("30x17 to 32x20"), "{}", set.notes[0]);
+}
+
+#[test]
+fn sizes_out_of_range_are_errors_that_name_the_image() {
+    for size in [[0, 4], [4, 0], [20000, 4]] {
+        let bytes = (size[0] * size[1] * 4) as usize;
+        let error = TextureSet::compress(&scene_of(size, vec![0; bytes], AlphaMode::Opaque));
+        let error = error.unwrap_err().to_string();
+        let expected = format!("found {}x{}", size[0], size[1]);
+        assert!(
+            error.contains("'test'") && error.contains(&expected),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn images_that_no_placed_mesh_samples_are_left_out() {
+    let mut scene = scene_of([8, 8], picture([8, 8]), AlphaMode::Opaque);
+    scene.images.push(scene.images[0].clone());
+    let set = TextureSet::compress(&scene).unwrap();
+    assert_eq!(set.of_image, [Some(0), None]);
+    scene.instances.clear();
+    assert!(TextureSet::compress(&scene).unwrap().textures.is_empty());
+}
+
+#[test]
+fn freeing_gives_the_same_textures_and_leaves_no_texels() {
+    let mut scene = scene_of([8, 8], picture([8, 8]), AlphaMode::Opaque);
+    let kept = TextureSet::compress(&scene).unwrap();
+    assert_eq!(TextureSet::compress_and_free(&mut scene).unwrap(), kept);
+    assert!(scene.images[0].rgba.is_empty());
+}

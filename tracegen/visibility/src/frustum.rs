@@ -1,0 +1,79 @@
+//! What a frustum cannot hold.
+
+use glam::{Mat4, Vec3, Vec4};
+
+/// Indices of the world-space bounds that are not wholly outside one plane of the frustum.
+///
+/// The test errs on the side of drawing; bounds with NaN are drawn.
+#[must_use]
+pub fn visible(bounds: impl IntoIterator<Item = [Vec3; 2]>, clip_from_world: Mat4) -> Vec<u32> {
+    let planes = frustum_planes(clip_from_world);
+    (0_u32..)
+        .zip(bounds)
+        .filter(|(_, bounds)| !planes.iter().any(|plane| outside(*plane, *bounds)))
+        .map(|(index, _)| index)
+        .collect()
+}
+
+/// Planes whose positive side is inside, from the rows of the matrix (Gribb and Hartmann 2001).
+fn frustum_planes(clip_from_world: Mat4) -> [Vec4; 6] {
+    let row = |i| clip_from_world.row(i);
+    [
+        row(3) + row(0),
+        row(3) - row(0),
+        row(3) + row(1),
+        row(3) - row(1),
+        row(2),
+        row(3) - row(2),
+    ]
+}
+
+fn outside(plane: Vec4, [lo, hi]: [Vec3; 2]) -> bool {
+    let normal = plane.truncate();
+    let nearest = Vec3::select(normal.cmpge(Vec3::ZERO), hi, lo);
+    let terms = normal * nearest;
+    // A margin for the rounding of this sum and of the vertex shader's.
+    let margin = 1e-5 * (terms.abs().element_sum() + plane.w.abs());
+    terms.element_sum() + plane.w < -margin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn only_boxes_wholly_outside_a_plane_are_skipped() {
+        let clip = glam::camera::rh::proj::directx::perspective(1.0, 1.0, 0.1, 100.0);
+        let unit = |center: Vec3| [center - Vec3::ONE, center + Vec3::ONE];
+        let boxes = [
+            unit(Vec3::new(0.0, 0.0, 5.0)),
+            unit(Vec3::new(0.0, 0.0, -5.0)),
+            unit(Vec3::new(50.0, 0.0, -5.0)),
+            unit(Vec3::new(0.0, 0.0, -200.0)),
+            [Vec3::splat(-500.0), Vec3::splat(500.0)],
+            [Vec3::splat(f32::NAN), Vec3::splat(f32::NAN)],
+        ];
+        assert_eq!(visible(boxes, clip), [1, 4, 5]);
+    }
+
+    #[test]
+    fn a_box_with_any_point_inside_is_never_skipped() {
+        let clip = glam::camera::rh::proj::directx::perspective(1.2, 0.9, 0.1, 50.0)
+            * glam::camera::rh::view::look_at_mat4(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y);
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0 * 40.0 - 20.0
+        };
+        let mut inside = 0;
+        for _ in 0..2000 {
+            let p = Vec3::new(random(), random(), random());
+            let q = Vec3::new(random(), random(), random());
+            let c = clip * p.extend(1.0);
+            if c.x.abs() <= c.w && c.y.abs() <= c.w && c.z >= 0.0 && c.z <= c.w {
+                inside += 1;
+                assert_eq!(visible([[p.min(q), p.max(q)]], clip), [0]);
+            }
+        }
+        assert!(inside > 50, "the test must see points inside, saw {inside}");
+    }
+}

@@ -1,0 +1,3 @@
+//! Which draw enters which view or shadow cascade. One technique a file.
+
+pub mod frustum;
