@@ -214,7 +214,7 @@ pub fn ray_tables(samples_per_px: u32, has_visits: bool) -> RaytraceTables {
         fov: fov(),
         size_px: EYE_SIZE_PX,
     };
-    let material = |name: &str, mirror| RayMaterial {
+    let material = |name: &str, mirror: bool| RayMaterial {
         name: name.to_owned(),
         diffuse: !mirror,
         mirror,

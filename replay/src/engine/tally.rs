@@ -3,10 +3,11 @@
 use crate::order::TileRef;
 use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap};
 use formats::textrace::Tables;
+use formats::textrace::tables::MAX_TEXTURE_SIZE;
 use formats::view::{Eye, TILE_SIZE_PX};
 
-/// Levels kept apart; a texture of 32768 texels has 16.
-const LEVELS: usize = 16;
+/// Levels of the largest texture that a trace can have.
+const LEVELS: usize = MAX_TEXTURE_SIZE.ilog2() as usize + 1;
 /// Left, right, and passes that belong to no eye.
 const VIEWS: usize = 3;
 
@@ -115,7 +116,7 @@ impl Tally {
     #[inline(always)]
     #[must_use]
     pub fn cell_index(&self, place: Place, texture: u32, level: u8) -> usize {
-        place.view + texture as usize * LEVELS + usize::from(level).min(LEVELS - 1)
+        place.view + texture as usize * LEVELS + usize::from(level)
     }
 
     /// The cell at an index.
@@ -178,7 +179,7 @@ impl Tally {
             .map(|t| t.levels as usize)
             .max()
             .unwrap_or(0);
-        let by_level = (0..levels.min(LEVELS))
+        let by_level = (0..levels)
             .map(|level| part(format!("level {level}"), &|_, _, l| l == level))
             .collect();
         let rate = |part: u64, whole: u64| {
