@@ -3,8 +3,8 @@
 use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
-use crate::engine::Feed;
 use crate::order;
+use crate::stream::Feed;
 use anyhow::{Context, Result, bail};
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
