@@ -10,7 +10,7 @@ use clap::Args;
 use formats::texture::TexelFormat;
 use serde::de::value::Error as ValueError;
 use serde::de::{DeserializeOwned, IntoDeserializer};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Reads an enum of the formats crate by its serialised name.
 fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
@@ -123,6 +123,11 @@ fn set<T>(target: &mut T, flag: Option<T>) {
 }
 
 impl ConfigArgs {
+    /// `--config`.
+    pub fn file(&self) -> Option<&Path> {
+        self.config.as_deref()
+    }
+
     /// The configuration: the defaults, then `--config`, then the flags.
     ///
     /// # Errors

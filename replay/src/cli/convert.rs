@@ -12,7 +12,8 @@ use formats::interop::{
 };
 use formats::layout::Layout;
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
-use std::io::{self, BufWriter, IsTerminal, Write};
+use shell::Output;
+use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -27,6 +28,12 @@ pub enum Target {
     Jsonl,
     /// A trace, its tiles encoded anew
     Textrace,
+}
+
+impl Target {
+    fn is_text(self) -> bool {
+        matches!(self, Self::Din | Self::Csv | Self::Jsonl)
+    }
 }
 
 /// Tile encodings by name.
@@ -61,7 +68,7 @@ pub struct ConvertArgs {
     /// What to write
     #[arg(long)]
     pub to: Target,
-    /// Output file; - is standard output
+    /// Output file
     #[arg(short, long, value_name = "FILE", default_value = "-")]
     pub output: PathBuf,
     /// What counts as an access
@@ -81,6 +88,13 @@ pub struct ConvertArgs {
 /// The trace cannot be read, the configuration is impossible, or the output cannot be written.
 pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     let config = args.machine.resolve()?;
+    let output = if args.to.is_text() {
+        Output::text("--output", &args.output)
+    } else {
+        Output::binary("--output", &args.output)
+    };
+    let inputs = [Some(args.trace.as_path()), args.machine.file()];
+    shell::check_outputs(&[output], inputs.into_iter().flatten())?;
     let trace = Textrace::open(&args.trace)?;
     if args.to == Target::Textrace {
         return reencode(&trace, args);
@@ -155,20 +169,9 @@ fn reencode(trace: &Textrace, args: &ConvertArgs) -> Result<ExitCode> {
         EncodingName::Raw => Encoding::Raw,
         EncodingName::Delta => Encoding::Delta,
     };
-    if args.output.as_os_str() == "-" {
-        let mut out = io::stdout().lock();
-        if out.is_terminal() {
-            bail!("a trace is binary: name a file with --output, or redirect standard output");
-        }
-        let mut writer = TextraceWriter::in_memory(trace.tables())?;
-        append_tiles(trace, encoding, &mut writer)?;
-        out.write_all(&writer.into_bytes()?)?;
-        out.flush()?;
-    } else {
-        let mut writer = TextraceWriter::create(&args.output, trace.tables())?;
-        append_tiles(trace, encoding, &mut writer)?;
-        writer.finish()?;
-    }
+    let mut writer = TextraceWriter::create(&args.output, trace.tables())?;
+    append_tiles(trace, encoding, &mut writer)?;
+    writer.finish()?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -16,7 +16,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::Eye;
-use shell::Progress;
+use shell::{Output, Progress};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -107,6 +107,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         "--image: expected one FILE, found {}",
         args.files.len()
     );
+    let prints = check_outputs(&args)?;
     let mut entries = Vec::new();
     let progress = Progress::new("reprojecting", args.files.len() as u64, "traces");
     for path in &args.files {
@@ -129,8 +130,25 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     } else {
         report::text(&entries)
     };
-    super::print(&text)?;
+    if prints {
+        super::print(&text)?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Checks the outputs before the work; true if the result is to be printed.
+fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
+    let outputs = [
+        args.image.as_deref().map(|p| Output::binary("--image", p)),
+        args.html.as_deref().map(|p| Output::text("--html", p)),
+        args.json.then(|| Output::result("--json")),
+        args.csv.then(|| Output::result("--csv")),
+    ];
+    let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
+    shell::check_outputs(
+        &outputs,
+        args.files.iter().chain(&args.config).map(PathBuf::as_path),
+    )
 }
 
 fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
