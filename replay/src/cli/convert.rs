@@ -104,9 +104,9 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
         write_accesses(&trace, &config, args, &mut out)?;
         out.flush()?;
     } else {
-        let name = || args.output.display().to_string();
+        let name = || format!("cannot write {}", args.output.display());
         let mut out = AtomicFile::create(&args.output).with_context(name)?;
-        write_accesses(&trace, &config, args, &mut out)?;
+        write_accesses(&trace, &config, args, &mut out).with_context(name)?;
         out.persist().with_context(name)?;
     }
     Ok(ExitCode::SUCCESS)
