@@ -1,28 +1,61 @@
 //! Image decoding, in parallel and bounded.
 
-use super::files::{Origin, read_file};
+use super::files::{Origin, read_file, read_start};
 use super::{Image, LoadOptions, SceneError};
 use formats::texture::ColorSpace;
-use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Largest image edge in texels: what a Vulkan texture may have on the drivers used.
 pub const MAX_SIZE: u32 = 16384;
 
+/// Most bytes of an image's file: more than a PNG of [`MAX_SIZE`] squared takes.
+const MAX_FILE_BYTES: u64 = 1 << 31;
+
+/// Most bytes of texels that a byte of an encoded image stands for: deflate reaches 1,032, a JPEG
+/// of one colour about as much. Larger images cannot be whole, and would cost a small file nothing.
+const MAX_EXPANSION: u64 = 2048;
+
+/// Bytes of texels that any image may have.
+const SMALL_IMAGE_BYTES: u64 = 1 << 20;
+
 /// Encoded bytes of an image, or where they are.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Source {
     /// A file.
     File(PathBuf),
-    /// Bytes inside the scene file, told apart by the number.
-    Bytes(usize, Arc<[u8]>),
+    /// Bytes inside the scene file.
+    Bytes(Embedded),
+}
+
+/// An image inside the scene file. Two are the same where their numbers are.
+#[derive(Clone, Debug)]
+pub(crate) struct Embedded {
+    pub number: usize,
+    pub bytes: Arc<[u8]>,
+}
+
+impl PartialEq for Embedded {
+    fn eq(&self, other: &Self) -> bool {
+        self.number == other.number
+    }
+}
+
+impl Eq for Embedded {}
+
+impl Hash for Embedded {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.number.hash(state);
+    }
 }
 
 /// How a material reads an image, which decides its colour space and channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Usage {
     /// sRGB colour.
     Color,
@@ -36,7 +69,7 @@ pub(crate) enum Usage {
 }
 
 /// One image to decode.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug)]
 pub(crate) struct Request {
     pub source: Source,
     pub usage: Usage,
@@ -49,30 +82,31 @@ pub(crate) struct Request {
 /// The images of a scene, each source and usage once.
 #[derive(Debug, Default)]
 pub(crate) struct Requests {
-    pub list: Vec<Request>,
+    list: Vec<Request>,
+    /// Where each source and usage stands in `list`.
+    known: HashMap<(Source, Usage), usize>,
     /// Opacity maps of `Usage::Masked`.
-    pub masks: Vec<Request>,
+    masks: Vec<Request>,
+    known_masks: HashMap<Source, usize>,
 }
 
 impl Requests {
     /// The index of the image in the scene's table, added where it is new.
     pub fn index(&mut self, request: Request) -> usize {
-        let same = |r: &Request| r.usage == request.usage && r.source == request.source;
-        if let Some(index) = self.list.iter().position(same) {
-            return index;
-        }
-        self.list.push(request);
-        self.list.len() - 1
+        let key = (request.source.clone(), request.usage);
+        *self.known.entry(key).or_insert_with(|| {
+            self.list.push(request);
+            self.list.len() - 1
+        })
     }
 
     /// The index of an opacity map among the masks.
     pub fn mask(&mut self, request: Request) -> usize {
-        let same = |r: &Request| r.source == request.source;
-        if let Some(index) = self.masks.iter().position(same) {
-            return index;
-        }
-        self.masks.push(request);
-        self.masks.len() - 1
+        let key = request.source.clone();
+        *self.known_masks.entry(key).or_insert_with(|| {
+            self.masks.push(request);
+            self.masks.len() - 1
+        })
     }
 
     /// Decodes everything on all cores (or only reads the sizes), in order.
@@ -102,6 +136,13 @@ impl Requests {
     }
 }
 
+/// Whether the file begins as a PNG or a JPEG; `None` where it cannot be read.
+pub(crate) fn is_png_or_jpeg(file: &Path) -> Option<bool> {
+    let (start, _) = read_start(file, "image", 16).ok()?;
+    let format = image::guess_format(&start).ok();
+    Some(matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg)))
+}
+
 /// Size and RGBA8 texels; no texels where the options say so.
 fn read(
     request: &Request,
@@ -109,14 +150,15 @@ fn read(
     options: &LoadOptions,
 ) -> Result<([u32; 2], Vec<u8>), SceneError> {
     let (bytes, file) = match &request.source {
-        Source::File(path) => (read_file(path, &request.place)?.into(), path),
-        Source::Bytes(_, bytes) => (Arc::clone(bytes), &origin.file),
+        Source::File(path) => (
+            read_file(path, &request.place, MAX_FILE_BYTES)?.into(),
+            path,
+        ),
+        Source::Bytes(embedded) => (Arc::clone(&embedded.bytes), &origin.file),
     };
-    let invalid = |expected: &str, found: String| SceneError::Invalid {
-        file: file.clone(),
-        place: format!("{} (image '{}')", request.place, request.name),
-        expected: expected.to_owned(),
-        found,
+    let invalid = |expected: &str, found: String| {
+        let place = format!("{} (image '{}')", request.place, request.name);
+        Origin::new(file).invalid(place, expected, found)
     };
     let corrupt = |e: image::ImageError| invalid("a readable PNG or JPEG image", e.to_string());
     let mut reader = ImageReader::new(Cursor::new(&*bytes))
@@ -138,6 +180,13 @@ fn read(
     }
     if !options.images {
         return Ok(([width, height], Vec::new()));
+    }
+    let most = bytes.len() as u64 * MAX_EXPANSION + SMALL_IMAGE_BYTES;
+    if decoder.total_bytes() > most {
+        return Err(invalid(
+            &format!("at most {most} bytes of texels from {} bytes", bytes.len()),
+            format!("{width}x{height}, {} bytes", decoder.total_bytes()),
+        ));
     }
     let decoded = DynamicImage::from_decoder(decoder).map_err(corrupt)?;
     Ok(([width, height], decoded.into_rgba8().into_raw()))

@@ -14,6 +14,7 @@ mod options;
 #[cfg(test)]
 mod real_scenes;
 mod uri;
+mod warnings;
 
 pub use error::SceneError;
 pub use load::{DEFAULT_SKY, complete, default_sun, load_file};

@@ -44,6 +44,9 @@ pub struct Mesh {
     pub uv0: Vec<Vec2>,
     /// Texture coordinates set 1, empty where no material of the mesh uses it.
     pub uv1: Vec<Vec2>,
+    /// Linear colours with alpha that multiply the base colour, one a position; empty where the
+    /// file has none.
+    pub colors: Vec<Vec4>,
     /// Three indices a triangle.
     pub indices: Vec<u32>,
     /// Index into the scene's materials.

@@ -457,6 +457,7 @@ impl MeshBuilder {
             tangents,
             uv0: self.uvs,
             uv1: Vec::new(),
+            colors: Vec::new(),
             indices: self.indices,
             material,
         }
