@@ -80,7 +80,10 @@ fn terminal_escapes_in_names_are_not_printed_raw() {
         assert!(!output.stderr.contains(&0x1b), "{arguments:?}");
     }
     // An argument that the parser itself refuses.
-    let output = refuse(program("replay").args(["run", "--no\u{7}-such"]), &["-such"]);
+    let output = refuse(
+        program("replay").args(["run", "--no\u{7}-such"]),
+        &["-such"],
+    );
     assert!(!output.stderr.contains(&0x7));
 }
 

@@ -79,7 +79,6 @@ fn only_regular_files_and_new_names_are_written_and_that_is_told_before_the_work
         ("socket", "a socket"),
         ("pipe", "a pipe"),
         ("read-only", "a read-only one"),
-        ("none/file", "found none"),
         ("new/", "the name of a file"),
     ] {
         for mut writer in writers() {
@@ -89,6 +88,19 @@ fn only_regular_files_and_new_names_are_written_and_that_is_told_before_the_work
     }
     assert_eq!(ids(), before, "something was replaced or left behind");
     assert_eq!(fs::read(at("target")).expect("readable"), b"kept");
+}
+
+#[test]
+fn a_folder_that_does_not_exist_is_told_before_the_work() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    // Reports make their folder; traces, pictures and accesses do not.
+    for mut writer in writers().into_iter().take(5) {
+        let path = folder.path().join("none/file");
+        refuse(
+            writer.arg(path),
+            &["cannot write", "none/file", "found none"],
+        );
+    }
 }
 
 #[test]

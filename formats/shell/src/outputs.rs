@@ -46,6 +46,12 @@ impl Output {
         Self { flag, path, kind }
     }
 
+    /// Where it goes.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     fn named(&self) -> String {
         match self.kind {
             Kind::Result => self.flag.to_owned(),

@@ -68,7 +68,7 @@ pub struct ConvertArgs {
     /// What to write
     #[arg(long)]
     pub to: Target,
-    /// Output file
+    /// Output file; - is standard output
     #[arg(short, long, value_name = "FILE", default_value = "-")]
     pub output: PathBuf,
     /// What counts as an access

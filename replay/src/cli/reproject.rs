@@ -1,10 +1,10 @@
 //! `replay reproject`: ray traces through the model of a ray-tracing GPU that reuses the left
 //! image for the right one.
 
+use crate::files::{self, write_atomically};
 use crate::image::{Picture, png};
-use crate::report::files::write_atomically;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
-use crate::result::TraceId;
+use crate::result::{TOOL, TraceId};
 use crate::sgrt::analyse::{Analysed, Analysis, curve_rules};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
@@ -145,7 +145,7 @@ fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
         args.csv.then(|| Output::result("--csv")),
     ];
     let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
-    shell::check_outputs(
+    files::check_outputs(
         &outputs,
         args.files.iter().chain(&args.config).map(PathBuf::as_path),
     )
@@ -176,7 +176,7 @@ fn analyse(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Re
     let meta = &analysis.frame().tables.meta;
     let report = Report {
         schema: SCHEMA.to_owned(),
-        tool: concat!("replay ", env!("CARGO_PKG_VERSION")).to_owned(),
+        tool: TOOL.to_owned(),
         trace: TraceId {
             scene: meta.trace.scene.clone(),
             checksum: format!("{:08x}", file.0.file_checksum()),

@@ -7,7 +7,7 @@ mod source;
 pub mod synthetic;
 mod tally;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 mod timed;

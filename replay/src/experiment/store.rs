@@ -1,8 +1,8 @@
 //! One file a point, so that a sweep that was cut off goes on where it stopped.
 
 use crate::config::RunConfig;
-use crate::report::files::write_atomically;
-use crate::result::{RunResult, TraceId};
+use crate::files::write_atomically;
+use crate::result::{RunResult, TOOL, TraceId};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -47,10 +47,6 @@ pub fn point_key(trace: &TraceId, config: &RunConfig) -> String {
     format!("{hash:032x}")
 }
 
-fn tool() -> String {
-    concat!("replay ", env!("CARGO_PKG_VERSION")).to_owned()
-}
-
 impl Store {
     /// The points of the sweep whose outputs lie in `folder`.
     #[must_use]
@@ -72,7 +68,7 @@ impl Store {
         let bytes = std::fs::read(self.path(trace, config)).ok()?;
         let point: StoredPoint = serde_json::from_slice(&bytes).ok()?;
         let same = point.schema == POINT_SCHEMA
-            && point.tool == tool()
+            && point.tool == TOOL
             && point.trace.checksum == trace.checksum
             && point.config == *config;
         same.then_some(point.result)
@@ -91,7 +87,7 @@ impl Store {
     ) -> anyhow::Result<RunResult> {
         let point = StoredPoint {
             schema: POINT_SCHEMA.to_owned(),
-            tool: tool(),
+            tool: TOOL.to_owned(),
             trace: trace.clone(),
             config: *config,
             result: result.clone(),

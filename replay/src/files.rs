@@ -1,7 +1,7 @@
-//! Output files appear whole or not at all.
+//! Output files appear whole or not at all, in folders that are made for them.
 
 use formats::container::AtomicFile;
-use std::io::Write;
+use shell::Output;
 use std::path::Path;
 
 /// Writes `bytes` to a temporary file beside `path` and renames it.
@@ -9,17 +9,30 @@ use std::path::Path;
 /// # Errors
 /// The folder cannot be made, or the file cannot be written; the message names the path.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let write = || -> std::io::Result<()> {
-        let folder = path
-            .parent()
-            .filter(|p| !p.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder)?;
-        let mut file = AtomicFile::create(path)?;
-        file.write_all(bytes)?;
-        file.persist()
-    };
-    write().map_err(|e| anyhow::anyhow!("{}: cannot write: {e}", path.display()))
+    make_folder(path)
+        .and_then(|()| AtomicFile::write_whole(path, bytes))
+        .map_err(|e| anyhow::anyhow!("{}: cannot write: {e}", path.display()))
+}
+
+fn make_folder(path: &Path) -> std::io::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    folder.map_or(Ok(()), std::fs::create_dir_all)
+}
+
+/// Makes the folders of outputs and checks that each can be written and replaces neither an input
+/// nor another output; tells whether standard output is left for the command's own result.
+///
+/// # Errors
+/// The first output for which that does not hold.
+pub fn check_outputs<'a>(
+    outputs: &[Output],
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> anyhow::Result<bool> {
+    for output in outputs {
+        let path = output.path();
+        make_folder(path).map_err(|e| anyhow::anyhow!("{}: cannot write: {e}", path.display()))?;
+    }
+    shell::check_outputs(outputs, inputs)
 }
 
 #[cfg(test)]
