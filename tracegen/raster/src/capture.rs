@@ -50,7 +50,7 @@ impl CaptureJob<'_> {
     }
 
     /// Fits the frame's shadow cascades.
-    fn light_frame(&self, views: &FrameViews) -> Lighting {
+    pub(crate) fn light_frame(&self, views: &FrameViews) -> Lighting {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
         lighting.cascades = cascades::fit(

@@ -17,3 +17,4 @@ pub mod groups;
 pub mod lavapipe;
 pub mod lighting;
 pub mod regions;
+mod seen;

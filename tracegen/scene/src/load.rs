@@ -1,8 +1,7 @@
 //! From a file to a complete [`Scene`].
 
-use super::{Camera, Light, LoadOptions, Loaded, Scene, SceneError, cameras, gltf, obj};
+use super::{Camera, LoadOptions, Loaded, Scene, SceneError, cameras, gltf, obj};
 use crate::files::{check_regular, shown};
-use glam::Vec3;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -51,28 +50,7 @@ pub fn complete(scene: &mut Scene) {
         scene.cameras.push(cameras::default_camera(scene));
     }
     make_names_unique(&mut scene.cameras);
-    if scene.lights.is_empty() {
-        scene.lights.push(default_sun());
-        if scene.sky == Vec3::ZERO {
-            scene.sky = DEFAULT_SKY;
-        }
-    }
-}
-
-/// Sky radiance of a scene whose file has no lights: a clear day, dimmer than the sun by far.
-pub const DEFAULT_SKY: Vec3 = Vec3::new(0.38, 0.47, 0.62);
-
-/// The sun of a scene whose file has no lights.
-///
-/// It stands at 72 degrees of elevation, so that it reaches the floor of a narrow atrium with an
-/// open roof and still shows relief, and off both horizontal axes, so that no axis-aligned wall is
-/// exactly edge-on.
-#[must_use]
-pub fn default_sun() -> Light {
-    Light::Directional {
-        direction: Vec3::new(0.26, -1.0, 0.19).normalize(),
-        color: Vec3::new(3.2, 3.0, 2.7),
-    }
+    scene.light_if_unlit();
 }
 
 /// `name`, `name-2`, `name-3`, ... so that `--camera` can choose any of them.

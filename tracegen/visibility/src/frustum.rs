@@ -16,7 +16,7 @@ pub fn visible(bounds: impl IntoIterator<Item = [Vec3; 2]>, clip_from_world: Mat
 }
 
 /// Planes whose positive side is inside, from the rows of the matrix (Gribb and Hartmann 2001).
-fn frustum_planes(clip_from_world: Mat4) -> [Vec4; 6] {
+pub(crate) fn frustum_planes(clip_from_world: Mat4) -> [Vec4; 6] {
     let row = |i| clip_from_world.row(i);
     [
         row(3) + row(0),

@@ -3,15 +3,15 @@
 //! For the ray tracer, which follows mirror and glass paths and no glossy ones:
 //! - `transmission` is KHR_materials_transmission's factor; without it, a blended material without
 //!   a base colour texture counts as glass that lets `1 - alpha` through;
-//! - `mirror` is `metallic * (1 - roughness / 0.3)` for metals (metallic above 0.5) smoother than
-//!   0.3, and 0 for everything else. Only factors count: textured metalness is left to the maps.
+//! - `mirror` is 0: glTF has no such factor, and how far a smooth metal mirrors follows from its
+//!   metalness and roughness where it is hit.
 //!
 //! KHR_materials_pbrSpecularGlossiness becomes base colour, specular colour and
 //! roughness = 1 - glossiness; the glossiness channel of its texture is not used.
 
 use super::accessors::Buffers;
 use crate::files::{Origin, shown};
-use crate::images::{Embedded, Request, Requests, Source, Usage};
+use crate::image_files::{Embedded, Request, Requests, Source, Usage};
 use crate::uri::{self, Uri};
 use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef};
@@ -24,9 +24,6 @@ use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Perceptual roughness from which on a metal is no mirror.
-const MIRROR_MAX_ROUGHNESS: f32 = 0.3;
 
 const TRANSFORM: &str = "KHR_texture_transform";
 
@@ -202,10 +199,6 @@ impl<'a> Table<'a> {
             }
             None => 0.0,
         };
-        if material.metallic > 0.5 && material.metallic_roughness_texture.is_none() {
-            let smooth = 1.0 - material.roughness / MIRROR_MAX_ROUGHNESS;
-            material.mirror = material.metallic * smooth.max(0.0);
-        }
         Ok(material)
     }
 

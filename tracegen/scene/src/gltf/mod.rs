@@ -72,7 +72,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
             .extend(primitives.map(|mesh| Instance { mesh, transform }));
     }
     warnings.append(materials.warnings);
-    scene.images = materials.requests.decode(&origin, options)?;
+    scene.images = materials.requests.images(&origin)?;
     scene.materials = materials.materials;
     Ok(Loaded {
         scene,

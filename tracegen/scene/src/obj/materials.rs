@@ -6,7 +6,7 @@
 use super::library::{Entry, Map};
 use super::lookup::Lookup;
 use crate::files::Origin;
-use crate::images::{Request, Requests, Source, Usage, is_png_or_jpeg};
+use crate::image_files::{Request, Requests, Source, Usage, is_png_or_jpeg};
 use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, TextureRef};
 use formats::texture::Wrap;

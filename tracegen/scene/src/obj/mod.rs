@@ -12,7 +12,7 @@ mod tests;
 
 use crate::error::SceneError;
 use crate::files::{Origin, read_file};
-use crate::images::Requests;
+use crate::image_files::Requests;
 use crate::warnings::Warnings;
 use crate::{Instance, LoadOptions, Loaded, Material, Scene};
 use elements::Elements;
@@ -89,7 +89,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
         });
         scene.meshes.push(mesh);
     }
-    scene.images = requests.decode(&origin, options)?;
+    scene.images = requests.images(&origin)?;
     Ok(Loaded {
         scene,
         warnings: warnings.into_sentences(),
