@@ -147,11 +147,6 @@ fn set<T>(target: &mut T, flag: Option<T>) {
 }
 
 impl ConfigArgs {
-    /// `--config`.
-    pub fn file(&self) -> Option<&Path> {
-        self.config.as_deref()
-    }
-
     /// The configuration: the defaults, then `--config`, then the flags.
     ///
     /// # Errors
