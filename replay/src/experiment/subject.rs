@@ -1,8 +1,8 @@
 //! Traces of an experiment and their names.
 
-use crate::engine::TileSource;
 use crate::paper::z2;
 use crate::result::{TraceId, scene_name};
+use crate::stream::TileSource;
 use formats::textrace::{PassKind, Tables};
 use formats::texture::TexelFormat;
 

@@ -1,8 +1,8 @@
 use super::*;
 use crate::config::{Mode, Order, RunConfig};
-use crate::engine::MemoryTrace;
-use crate::engine::testing::tables;
 use crate::result::TraceId;
+use crate::stream::MemoryTrace;
+use crate::stream::testing::tables;
 
 /// A trace without passes: its replay is empty, which is enough to count replays.
 fn empty(scene: &str) -> MemoryTrace {

@@ -2,11 +2,11 @@
 
 use super::model::PaperReport;
 use crate::config::RunConfig;
-use crate::engine::MemoryTrace;
-use crate::engine::testing::tables;
 use crate::experiment::{Outcome, Plan, Subject};
 use crate::paper::z2;
 use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap, TmuResult, TraceId};
+use crate::stream::MemoryTrace;
+use crate::stream::testing::tables;
 
 const TILES: [u32; 2] = [60, 68];
 

@@ -1,6 +1,6 @@
 //! Where tiles come from: a file, or memory (tests, benchmarks, generated traces).
 
-use super::ReplayError;
+use super::StreamError;
 use formats::textrace::{Tables, Textrace, Tile};
 
 /// A trace that can be read tile by tile.
@@ -12,7 +12,7 @@ pub trait TileSource: Sync {
     ///
     /// # Errors
     /// The tile does not exist or is damaged.
-    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), ReplayError>;
+    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError>;
 }
 
 /// A trace in memory.
@@ -29,12 +29,12 @@ impl TileSource for MemoryTrace {
         &self.tables
     }
 
-    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), ReplayError> {
+    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         let stored = self
             .tiles
             .get(pass as usize)
             .and_then(|tiles| tiles.get(index as usize))
-            .ok_or_else(|| ReplayError::Trace {
+            .ok_or_else(|| StreamError::Tile {
                 pass,
                 tile: index,
                 message: "no such tile".to_owned(),
@@ -50,7 +50,7 @@ impl TileSource for Textrace {
         self.tables()
     }
 
-    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), ReplayError> {
+    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         Ok(self.decode_tile(pass as usize, index as usize, tile)?)
     }
 }

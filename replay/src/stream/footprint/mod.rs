@@ -11,7 +11,7 @@ mod bundle;
 
 pub use bundle::Bundle;
 
-use super::ReplayError;
+use super::StreamError;
 use crate::config::{RunConfig, SamplingConfig};
 use axis::Axis;
 use formats::footprint::{LodFormula, fast_log2, quad_lod, select_levels};
@@ -81,7 +81,7 @@ impl Footprints {
     ///
     /// # Errors
     /// Tables that refer to what is not there, or more than 2^32 - 1 lines of addresses.
-    pub fn new(tables: &Tables, config: &RunConfig) -> Result<Self, ReplayError> {
+    pub fn new(tables: &Tables, config: &RunConfig) -> Result<Self, StreamError> {
         build::Builder::new(tables, config)?.finish()
     }
 

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::{Footprints, Group, Kind, Level, SampleRef};
 use crate::config::RunConfig;
-use crate::engine::ReplayError;
+use crate::stream::StreamError;
 use formats::layout::{Layout, LevelLayout};
 use formats::textrace::{SUBTEXELS, Sample, Tables, UvGroup};
 use formats::texture::{Sampler, TexelFormat};
@@ -30,9 +30,9 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(super) fn new(tables: &'a Tables, config: &'a RunConfig) -> Result<Self, ReplayError> {
+    pub(super) fn new(tables: &'a Tables, config: &'a RunConfig) -> Result<Self, StreamError> {
         let layout = Layout::new(&tables.textures, &config.layout)
-            .map_err(|error| ReplayError::Tables(error.to_string()))?;
+            .map_err(|error| StreamError::Tables(error.to_string()))?;
         Ok(Self {
             tables,
             config,
@@ -41,13 +41,13 @@ impl<'a> Builder<'a> {
         })
     }
 
-    pub(super) fn finish(mut self) -> Result<Footprints, ReplayError> {
+    pub(super) fn finish(mut self) -> Result<Footprints, StreamError> {
         let lines = self
             .layout
             .end()
             .div_ceil(u64::from(self.config.line_bytes));
         if lines >= u64::from(u32::MAX) {
-            return Err(ReplayError::Tables(format!(
+            return Err(StreamError::Tables(format!(
                 "textures take {lines} lines: expected fewer than 2^32"
             )));
         }
@@ -59,7 +59,7 @@ impl<'a> Builder<'a> {
             .max()
             .unwrap_or(0);
         if largest > u64::from(u32::MAX / 2) {
-            return Err(ReplayError::Tables(format!(
+            return Err(StreamError::Tables(format!(
                 "a texture layer takes {largest} bytes: expected at most 2 GiB"
             )));
         }
@@ -78,7 +78,7 @@ impl<'a> Builder<'a> {
         })
     }
 
-    fn group(&mut self, group: &UvGroup) -> Result<Group, ReplayError> {
+    fn group(&mut self, group: &UvGroup) -> Result<Group, StreamError> {
         let mut out = Group::default();
         for sample in &group.samples {
             let kind = self.kind(sample, group.extent)?;
@@ -108,10 +108,10 @@ impl<'a> Builder<'a> {
         Some(placed.base + u64::from(sample.layer) * placed.layer_bytes)
     }
 
-    fn kind(&mut self, sample: &Sample, extent: [u32; 2]) -> Result<Arc<Kind>, ReplayError> {
+    fn kind(&mut self, sample: &Sample, extent: [u32; 2]) -> Result<Arc<Kind>, StreamError> {
         let tables = self.tables;
         let unknown = |what: &str, index: usize| {
-            ReplayError::Tables(format!(
+            StreamError::Tables(format!(
                 "a sample names {what} {index}, which does not exist"
             ))
         };

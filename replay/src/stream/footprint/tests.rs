@@ -1,6 +1,6 @@
 use super::*;
 use crate::config::{BlockOrder, FilterOverride, LayoutConfig, LodFormula};
-use crate::engine::testing::tables;
+use crate::stream::testing::tables;
 use formats::footprint::record_footprints;
 use formats::layout::Layout;
 use formats::textrace::{NO_GROUP, Sample, UvGroup};

@@ -1,6 +1,6 @@
 //! What a core works on: the quads of its work item, one after another.
 
-use super::{ReplayError, TileSource};
+use super::{StreamError, TileSource};
 use crate::order::{Interleave, TileRef, WorkItem};
 use formats::textrace::{PrimitiveRun, QuadRecord, Tile};
 
@@ -53,7 +53,7 @@ impl Feed {
         &mut self,
         source: &S,
         item: &WorkItem,
-    ) -> Result<(), ReplayError> {
+    ) -> Result<(), StreamError> {
         self.at = [None; 2];
         self.runs.clear();
         (self.next_run, self.next, self.end) = (0, 0, 0);
@@ -115,13 +115,13 @@ impl Feed {
 }
 
 /// Refuses runs that a damaged or hand-made trace might hold.
-fn check(tile: &Tile, at: TileRef, draws: usize) -> Result<(), ReplayError> {
+fn check(tile: &Tile, at: TileRef, draws: usize) -> Result<(), StreamError> {
     let records = tile.records.len() as u64;
     let bad = tile.runs.iter().find(|run| {
         u64::from(run.first) + u64::from(run.count) > records || run.draw as usize >= draws
     });
     bad.map_or(Ok(()), |run| {
-        Err(ReplayError::Trace {
+        Err(StreamError::Tile {
             pass: at.pass,
             tile: at.tile,
             message: format!(
@@ -136,7 +136,7 @@ fn check(tile: &Tile, at: TileRef, draws: usize) -> Result<(), ReplayError> {
 mod tests {
     use super::super::MemoryTrace;
     use super::*;
-    use crate::engine::testing::{record, tables, tile};
+    use crate::stream::testing::{record, tables, tile};
 
     fn trace() -> MemoryTrace {
         MemoryTrace {
