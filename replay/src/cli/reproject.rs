@@ -1,11 +1,11 @@
 //! `replay reproject`: ray traces through the model of a ray-tracing GPU that reuses the left
 //! image for the right one.
 
-use crate::files::write_atomically;
+use crate::files::{self, write_atomically};
 use crate::image::{Picture, png};
 use crate::paper::sgrt as paper;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
-use crate::result::{TraceId, scene_name};
+use crate::result::{TOOL, TraceId, scene_name};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use crate::sgrt::frame::RaySource;
@@ -18,7 +18,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::Eye;
-use shell::Progress;
+use shell::{Output, Progress};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -111,6 +111,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     );
     // A wrong --as is refused before the work.
     paper::values("", "", &args.paper_scenes)?;
+    let prints = check_outputs(&args)?;
     let mut entries = Vec::new();
     let progress = Progress::new("reprojecting", args.files.len() as u64, "traces");
     for path in &args.files {
@@ -133,8 +134,25 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     } else {
         report::text(&entries)
     };
-    super::print(&text)?;
+    if prints {
+        super::print(&text)?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Checks the outputs before the work; true if the result is to be printed.
+fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
+    let outputs = [
+        args.image.as_deref().map(|p| Output::binary("--image", p)),
+        args.html.as_deref().map(|p| Output::text("--html", p)),
+        args.json.then(|| Output::result("--json")),
+        args.csv.then(|| Output::result("--csv")),
+    ];
+    let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
+    files::check_outputs(
+        &outputs,
+        args.files.iter().chain(&args.config).map(PathBuf::as_path),
+    )
 }
 
 fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
@@ -163,7 +181,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
     let scene = meta.trace.scene.as_str();
     let report = Report {
         schema: SCHEMA.to_owned(),
-        tool: concat!("replay ", env!("CARGO_PKG_VERSION")).to_owned(),
+        tool: TOOL.to_owned(),
         trace: TraceId {
             scene: scene.to_owned(),
             checksum: format!("{:08x}", file.0.file_checksum()),
