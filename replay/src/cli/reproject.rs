@@ -1,10 +1,10 @@
 //! `replay reproject`: ray traces through the model of a ray-tracing GPU that reuses the left
 //! image for the right one.
 
-use crate::files::write_atomically;
+use crate::files::{self, write_atomically};
 use crate::image::{Picture, png};
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
-use crate::result::TraceId;
+use crate::result::{TOOL, TraceId};
 use crate::sgrt::analyse::{Analysed, Analysis, curve_rules};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
@@ -16,7 +16,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::Eye;
-use shell::Progress;
+use shell::{Output, Progress};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -107,6 +107,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         "--image: expected one FILE, found {}",
         args.files.len()
     );
+    let prints = check_outputs(&args)?;
     let mut entries = Vec::new();
     let progress = Progress::new("reprojecting", args.files.len() as u64, "traces");
     for path in &args.files {
@@ -129,8 +130,25 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     } else {
         report::text(&entries)
     };
-    super::print(&text)?;
+    if prints {
+        super::print(&text)?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Checks the outputs before the work; true if the result is to be printed.
+fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
+    let outputs = [
+        args.image.as_deref().map(|p| Output::binary("--image", p)),
+        args.html.as_deref().map(|p| Output::text("--html", p)),
+        args.json.then(|| Output::result("--json")),
+        args.csv.then(|| Output::result("--csv")),
+    ];
+    let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
+    files::check_outputs(
+        &outputs,
+        args.files.iter().chain(&args.config).map(PathBuf::as_path),
+    )
 }
 
 fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
@@ -158,7 +176,7 @@ fn analyse(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Re
     let meta = &analysis.frame().tables.meta;
     let report = Report {
         schema: SCHEMA.to_owned(),
-        tool: concat!("replay ", env!("CARGO_PKG_VERSION")).to_owned(),
+        tool: TOOL.to_owned(),
         trace: TraceId {
             scene: meta.trace.scene.clone(),
             checksum: format!("{:08x}", file.0.file_checksum()),
