@@ -4,6 +4,7 @@ use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+pub use crate::cache::Replacement;
 pub use crate::order::Order;
 pub use formats::footprint::{FilterOverride, LodFormula, SamplingOptions as SamplingConfig};
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
@@ -34,23 +35,6 @@ pub enum Assign {
     Static,
 }
 
-/// Replacement policies.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Replacement {
-    /// Least recently used.
-    #[default]
-    Lru,
-    /// First in, first out.
-    Fifo,
-    /// Tree pseudo-LRU.
-    TreePlru,
-    /// Seeded random.
-    Random,
-}
-
 /// Geometry of one cache level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -77,18 +61,21 @@ impl CacheConfig {
         Self {
             size_bytes,
             ways: Self::default_ways(),
-            replacement: Replacement::Lru,
+            replacement: Replacement::LRU,
         }
     }
 
     /// Number of sets for this line size.
     ///
     /// # Errors
-    /// The sets must be a power of two, the ways 1 to 255.
+    /// The sets must be a power of two, the ways such as the policy can have.
     pub fn sets(&self, level: &'static str, line_bytes: u32) -> Result<u32, ConfigError> {
-        if self.ways == 0 || self.ways > 255 {
+        let (expected, accepts) = self.replacement.ways_rule();
+        if !accepts(self.ways) {
             return Err(ConfigError::Ways {
                 level,
+                policy: self.replacement.name(),
+                expected,
                 found: self.ways,
             });
         }
@@ -210,19 +197,15 @@ pub enum ConfigError {
         /// Size over ways and line size.
         found: f64,
     },
-    /// Ways out of range.
-    #[error("{level} cache: expected 1 to 255 ways, found {found}")]
+    /// Ways that the policy cannot have.
+    #[error("{level} cache with {policy}: expected {expected} ways, found {found}")]
     Ways {
         /// `L1` or `L2`.
         level: &'static str,
-        /// Ways.
-        found: u32,
-    },
-    /// Ways that no binary tree has.
-    #[error("{level} cache with tree-plru: expected 1, 2, 4 ... 64 ways, found {found}")]
-    TreeWays {
-        /// `L1` or `L2`.
-        level: &'static str,
+        /// Replacement policy.
+        policy: &'static str,
+        /// What the policy can have.
+        expected: &'static str,
         /// Ways.
         found: u32,
     },
@@ -338,6 +321,32 @@ mod tests {
             config.validate().unwrap_err().to_string(),
             "L1 cache of 6 KiB, 4 ways, 16-byte lines: expected a power-of-two number of sets, found 96"
         );
+    }
+
+    #[test]
+    fn ways_that_a_policy_cannot_have_are_refused_at_planning() {
+        for (replacement, ways, expected) in [
+            (
+                Replacement::TREE_PLRU,
+                3,
+                "L2 cache with tree-plru: expected 1, 2, 4 ... 64 ways, found 3",
+            ),
+            (
+                Replacement::LRU,
+                0,
+                "L2 cache with lru: expected 1 to 255 ways, found 0",
+            ),
+        ] {
+            let config = RunConfig {
+                l2: CacheConfig {
+                    size_bytes: 3 << 16,
+                    ways,
+                    replacement,
+                },
+                ..RunConfig::default()
+            };
+            assert_eq!(config.validate().unwrap_err().to_string(), expected);
+        }
     }
 
     #[test]

@@ -31,15 +31,16 @@ impl ContainerWriter<AtomicFile> {
         Self::start(name, sink, kind)
     }
 
-    /// Writes directory and header, and renames the file to its name.
+    /// Writes directory and header, and renames the file to its name. Returns its size in bytes.
     ///
     /// # Errors
     /// When writing or renaming fails; no file is left then.
-    pub fn finish(self) -> Result<()> {
-        let name = self.file.clone();
-        let sink = self.seal()?;
-        sink.persist()
-            .map_err(|source| FormatError::io(&name, "rename the finished file to", source))
+    pub fn finish(mut self) -> Result<u64> {
+        self.seal()?;
+        self.sink
+            .persist()
+            .map_err(|source| FormatError::io(&self.file, "finish", source))?;
+        Ok(self.position)
     }
 }
 
@@ -56,8 +57,9 @@ impl ContainerWriter<Cursor<Vec<u8>>> {
     ///
     /// # Errors
     /// As [`Self::in_memory`].
-    pub fn into_bytes(self) -> Result<Vec<u8>> {
-        Ok(self.seal()?.into_inner())
+    pub fn into_bytes(mut self) -> Result<Vec<u8>> {
+        self.seal()?;
+        Ok(self.sink.into_inner())
     }
 }
 
@@ -142,7 +144,7 @@ impl<W: Write + Seek> ContainerWriter<W> {
         self.position
     }
 
-    fn seal(mut self) -> Result<W> {
+    fn seal(&mut self) -> Result<()> {
         self.end_chunk()?;
         self.pad()?;
         let mut directory = Vec::new();
@@ -159,8 +161,7 @@ impl<W: Write + Seek> ContainerWriter<W> {
             .seek(SeekFrom::Start(0))
             .and_then(|_| self.sink.write_all(&header))
             .and_then(|()| self.sink.flush())
-            .map_err(|source| FormatError::io(&self.file, "write the header of", source))?;
-        Ok(self.sink)
+            .map_err(|source| FormatError::io(&self.file, "write the header of", source))
     }
 
     fn pad(&mut self) -> Result<()> {

@@ -81,10 +81,7 @@ impl RaytraceWriter<AtomicFile> {
     /// # Errors
     /// When writing fails, tiles are missing, or a table breaks an invariant; no file is left.
     pub fn finish(self, tables: &RaytraceTables) -> Result<u64> {
-        let container = self.complete(tables)?;
-        let bytes = container.position_bytes();
-        container.finish()?;
-        Ok(bytes)
+        self.complete(tables)?.finish()
     }
 }
 

@@ -91,11 +91,11 @@ impl TextraceWriter<AtomicFile> {
         Self::start(ContainerWriter::create(path, Kind::Textrace)?, tables)
     }
 
-    /// Completes the file.
+    /// Completes the file. Returns its size in bytes.
     ///
     /// # Errors
     /// When writing fails; no file is left then.
-    pub fn finish(self) -> Result<()> {
+    pub fn finish(self) -> Result<u64> {
         self.seal()?.finish()
     }
 }

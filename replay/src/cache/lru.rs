@@ -3,7 +3,7 @@
 //! Moving a hit to the front of four packed tags beat time stamps by four times and SIMD compares
 //! by two; the repeats that dominate texture traffic end at the first compare.
 
-use super::{Cache, EMPTY};
+use super::{AnyCache, Cache, boxed};
 
 /// Associativity, fixed at compile time where speed matters.
 pub trait Ways: Copy {
@@ -33,30 +33,93 @@ impl Ways for AnyWays {
     }
 }
 
+/// Number of a line. The largest one marks a way that holds nothing.
+pub trait Line: Copy + Eq {
+    /// No line has this number.
+    const EMPTY: Self;
+
+    /// The set that holds the line; `mask` is the number of sets less one.
+    fn set(self, mask: u32) -> usize;
+}
+
+impl Line for u32 {
+    const EMPTY: Self = super::EMPTY;
+
+    #[inline(always)]
+    fn set(self, mask: u32) -> usize {
+        (self & mask) as usize
+    }
+}
+
+impl Line for u64 {
+    const EMPTY: Self = Self::MAX;
+
+    #[inline(always)]
+    fn set(self, mask: u32) -> usize {
+        (self & Self::from(mask)) as usize
+    }
+}
+
 /// An LRU cache.
-pub struct Lru<W: Ways> {
-    tags: Vec<u32>,
+#[derive(Clone, Debug)]
+pub struct Lru<W: Ways, L: Line = u32> {
+    tags: Vec<L>,
     set_mask: u32,
     ways: W,
 }
 
-impl<W: Ways> Lru<W> {
+/// The cache that nearly all replays have.
+pub type FourWayLru = Lru<WaysOf<4>>;
+
+/// An LRU cache of any associativity.
+pub(super) fn build(sets: u32, ways: u32) -> AnyCache {
+    match ways {
+        1 => boxed(Lru::new(sets, WaysOf::<1>)),
+        2 => boxed(Lru::new(sets, WaysOf::<2>)),
+        4 => AnyCache::FourWayLru(Lru::new(sets, WaysOf)),
+        8 => boxed(Lru::new(sets, WaysOf::<8>)),
+        _ => boxed(Lru::new(sets, AnyWays(ways as usize))),
+    }
+}
+
+impl<W: Ways, L: Line> Lru<W, L> {
     /// An empty cache; `sets` is a power of two.
     #[must_use]
     pub fn new(sets: u32, ways: W) -> Self {
         debug_assert!(sets.is_power_of_two());
         Self {
-            tags: vec![EMPTY; sets as usize * ways.ways()],
+            tags: vec![L::EMPTY; sets as usize * ways.ways()],
             set_mask: sets - 1,
             ways,
         }
     }
 
     #[inline(always)]
-    fn set(&mut self, line: u32) -> &mut [u32] {
+    fn set(&mut self, line: L) -> &mut [L] {
         let ways = self.ways.ways();
-        let first = (line & self.set_mask) as usize * ways;
+        let first = line.set(self.set_mask) * ways;
         &mut self.tags[first..first + ways]
+    }
+
+    /// Looks up, and on a miss fills at once: shifts the tags back until the line is found or
+    /// falls off the end. True for a hit.
+    #[inline(always)]
+    pub fn access(&mut self, line: L) -> bool {
+        let set = self.set(line);
+        let mut carried = set[0];
+        if carried == line {
+            return true;
+        }
+        set[0] = line;
+        for tag in &mut set[1..] {
+            let found = *tag;
+            *tag = carried;
+            if found == line {
+                return true;
+            }
+            carried = found;
+        }
+        false
     }
 }
 
@@ -88,24 +151,9 @@ impl<W: Ways> Cache for Lru<W> {
         set[0] = line;
     }
 
-    /// One pass: shifts the tags back until the line is found or falls off the end.
     #[inline(always)]
     fn access(&mut self, line: u32) -> bool {
-        let set = self.set(line);
-        let mut carried = set[0];
-        if carried == line {
-            return true;
-        }
-        set[0] = line;
-        for tag in &mut set[1..] {
-            let found = *tag;
-            *tag = carried;
-            if found == line {
-                return true;
-            }
-            carried = found;
-        }
-        false
+        Self::access(self, line)
     }
 
     /// No more lines than ways can crowd each other out, and a repeat leaves the same stack.

@@ -6,17 +6,84 @@
 
 mod fifo;
 mod in_flight;
+mod levels;
 mod lru;
 mod random;
 mod tree_plru;
 
-pub use fifo::Fifo;
 pub use in_flight::InFlight;
-pub use lru::{AnyWays, Lru, Ways, WaysOf};
-pub use random::RandomReplacement;
-pub use tree_plru::TreePlru;
+pub use levels::Levels;
+#[cfg(test)]
+pub(crate) use lru::WaysOf;
+pub use lru::{AnyWays, FourWayLru, Lru};
 
-use crate::config::{CacheConfig, ConfigError, Replacement};
+use crate::config::{CacheConfig, ConfigError};
+use crate::registry::{Named, registry};
+use fifo::Fifo;
+use random::RandomReplacement;
+use tree_plru::TreePlru;
+
+registry! { PolicyRow:
+    // constant   name          help                    ways that it can have                          built by
+    LRU =       row("lru",       "Least recently used", ANY_WAYS,                                      |g| lru::build(g.sets, g.ways));
+    FIFO =      row("fifo",      "First in, first out", ANY_WAYS,                                      |g| boxed(Fifo::new(g.sets, g.ways)));
+    TREE_PLRU = row("tree-plru", "Tree pseudo-LRU",     ("1, 2, 4 ... 64", tree_plru::accepts_ways),   |g| boxed(TreePlru::new(g.sets, g.ways)));
+    RANDOM =    row("random",    "Seeded random",       ANY_WAYS,                                      |g| boxed(RandomReplacement::new(g.sets, g.ways, g.seed)));
+}
+
+/// A replacement policy by name.
+pub type Replacement = Named<PolicyRow>;
+
+impl Default for Replacement {
+    fn default() -> Self {
+        Self::LRU
+    }
+}
+
+/// A row of the table of replacement policies.
+#[derive(Debug)]
+pub struct PolicyRow {
+    name: &'static str,
+    help: &'static str,
+    ways: WaysRule,
+    build: fn(Geometry) -> AnyCache,
+}
+
+/// Which associativities a policy can have: in words, and as a test.
+pub(crate) type WaysRule = (&'static str, fn(u32) -> bool);
+
+/// Ways are counted in a byte.
+const ANY_WAYS: WaysRule = ("1 to 255", |ways| 1 <= ways && ways <= 255);
+
+const fn row(
+    name: &'static str,
+    help: &'static str,
+    ways: WaysRule,
+    build: fn(Geometry) -> AnyCache,
+) -> PolicyRow {
+    PolicyRow {
+        name,
+        help,
+        ways,
+        build,
+    }
+}
+
+impl Replacement {
+    /// The associativities that the policy can have.
+    pub(crate) fn ways_rule(self) -> WaysRule {
+        self.row().ways
+    }
+}
+
+/// What a policy is built from.
+#[derive(Clone, Copy, Debug)]
+struct Geometry {
+    /// A power of two.
+    sets: u32,
+    ways: u32,
+    seed: u64,
+}
 
 /// Tag of a way that holds nothing; no line has this number.
 const EMPTY: u32 = u32::MAX;
@@ -45,7 +112,7 @@ pub trait Cache {
     }
 }
 
-impl<C: Cache + ?Sized> Cache for Box<C> {
+impl Cache for Box<dyn Cache> {
     fn lookup(&mut self, line: u32) -> bool {
         (**self).lookup(line)
     }
@@ -63,35 +130,46 @@ impl<C: Cache + ?Sized> Cache for Box<C> {
     }
 }
 
-/// Builds a cache of any policy.
-///
-/// # Errors
-/// A geometry that cannot be built; `level` names it.
-pub fn build(
-    config: &CacheConfig,
-    level: &'static str,
-    line_bytes: u32,
-    seed: u64,
-) -> Result<Box<dyn Cache + Send>, ConfigError> {
-    let sets = config.sets(level, line_bytes)?;
-    let ways = config.ways;
-    Ok(match config.replacement {
-        Replacement::Lru => match ways {
-            1 => Box::new(Lru::new(sets, WaysOf::<1>)),
-            2 => Box::new(Lru::new(sets, WaysOf::<2>)),
-            8 => Box::new(Lru::new(sets, WaysOf::<8>)),
-            4 => Box::new(Lru::new(sets, WaysOf::<4>)),
-            _ => Box::new(Lru::new(sets, AnyWays(ways as usize))),
-        },
-        Replacement::Fifo => Box::new(Fifo::new(sets, ways)),
-        Replacement::TreePlru => {
-            if !ways.is_power_of_two() || ways > 64 {
-                return Err(ConfigError::TreeWays { level, found: ways });
-            }
-            Box::new(TreePlru::new(sets, ways))
+/// A cache of any policy. The most common kind keeps its type, so that a replay can be compiled
+/// for it.
+pub enum AnyCache {
+    /// Least recently used, four ways.
+    FourWayLru(FourWayLru),
+    /// Any other.
+    Other(Box<dyn Cache>),
+}
+
+fn boxed(cache: impl Cache + 'static) -> AnyCache {
+    AnyCache::Other(Box::new(cache))
+}
+
+impl AnyCache {
+    /// Builds a cache.
+    ///
+    /// # Errors
+    /// A geometry that cannot be built; `level` names it.
+    pub fn build(
+        config: &CacheConfig,
+        level: &'static str,
+        line_bytes: u32,
+        seed: u64,
+    ) -> Result<Self, ConfigError> {
+        let geometry = Geometry {
+            sets: config.sets(level, line_bytes)?,
+            ways: config.ways,
+            seed,
+        };
+        Ok((config.replacement.row().build)(geometry))
+    }
+
+    /// The cache behind a pointer, whatever its kind.
+    #[must_use]
+    pub fn into_box(self) -> Box<dyn Cache> {
+        match self {
+            Self::FourWayLru(cache) => Box::new(cache),
+            Self::Other(cache) => cache,
         }
-        Replacement::Random => Box::new(RandomReplacement::new(sets, ways, seed)),
-    })
+    }
 }
 
 #[cfg(test)]

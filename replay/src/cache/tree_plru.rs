@@ -12,6 +12,11 @@ pub struct TreePlru {
     set_mask: u32,
 }
 
+/// A binary tree of 64 bits has up to 64 leaves.
+pub fn accepts_ways(ways: u32) -> bool {
+    ways.is_power_of_two() && ways <= 64
+}
+
 impl TreePlru {
     /// An empty cache; `sets` and `ways` are powers of two, `ways` at most 64.
     #[must_use]

@@ -9,7 +9,7 @@ use crate::report::z2::experiment::{Plan, Subject, labels, twin_of};
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::{page, tables};
 use anyhow::{Context, Result, bail, ensure};
-use indicatif::{ProgressBar, ProgressStyle};
+use shell::Progress;
 use std::path::{Path, PathBuf};
 
 /// Arguments of the Z2 paper's experiment.
@@ -36,18 +36,17 @@ pub struct ExperimentArgs {
     /// Picture of both eyes for the page, LABEL=FILE (or FILE for a single trace)
     #[arg(long = "image", value_name = "LABEL=FILE")]
     images: Vec<String>,
-    /// Worker threads; results do not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: shell::Threads,
 }
 
 impl ExperimentArgs {
-    /// Replays every point. Progress goes to stderr when it is a terminal.
+    /// Replays every point. Progress goes to stderr.
     ///
     /// # Errors
     /// Wrong arguments, an unreadable trace.
     pub fn run(&self, functional: bool, tile_maps: bool) -> Result<PaperReport> {
-        super::set_threads(self.threads)?;
+        self.threads.start()?;
         let base = self.machine.resolve()?;
         let usual = RunConfig::default();
         ensure!(
@@ -88,10 +87,9 @@ impl ExperimentArgs {
                 })
             })
             .collect::<Result<_>>()?;
-        let bar = progress_bar(plan.replays(subjects.len()) as u64, "replays");
-        let report = plan.run(&subjects, &|| bar.inc(1));
-        bar.finish_and_clear();
-        Ok(report?)
+        let replays = plan.replays(subjects.len()) as u64;
+        let progress = Progress::new("replaying", replays, "replays");
+        Ok(plan.run(&subjects, &|| progress.advance(1))?)
     }
 
     /// The pictures that were asked for, each with its trace's label.
@@ -119,17 +117,6 @@ impl ExperimentArgs {
                 Picture::open(label, Path::new(path))
             })
             .collect()
-    }
-}
-
-/// A bar on stderr with rate and remaining time; nothing where stderr is no terminal.
-#[must_use]
-pub fn progress_bar(length: u64, unit: &str) -> ProgressBar {
-    let template = format!("{{bar:30}} {{pos}}/{{len}} {unit} ({{per_sec}}, {{eta}} left)");
-    let bar = ProgressBar::new(length);
-    match ProgressStyle::with_template(&template) {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
     }
 }
 

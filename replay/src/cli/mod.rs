@@ -19,20 +19,29 @@ pub mod validate;
 pub use config_args::ConfigArgs;
 
 use crate::result::TraceId;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Parser, Subcommand};
 use formats::textrace::Textrace;
-use std::io::{self, Write};
+use shell::{Common, Documents};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Exit code of wrong use or unreadable input; clap's own, too.
-const USAGE: u8 = 2;
+pub use shell::print;
+
+const EXAMPLES: &str = "\
+Examples:
+  replay info atrium.textrace
+  replay run atrium.textrace --order z2-sta --l1 8KiB --l2 128KiB
+  replay report atrium.textrace -o report.html --image atrium=atrium.png
+  replay convert atrium.textrace --to din --order morton -o accesses.din
+  replay reproject chess.raytrace --html chess.html";
 
 /// Replays Parallax traces through cache, texture-unit and ray-tracing-unit models.
 #[derive(Debug, Parser)]
-#[command(version, max_term_width = 100)]
+#[command(name = "replay", version = shell::VERSION.as_str(), after_help = EXAMPLES, max_term_width = 100)]
 struct Cli {
+    #[command(flatten)]
+    common: Common,
     #[command(subcommand)]
     command: Command,
 }
@@ -59,50 +68,29 @@ enum Command {
     Report(Box<report::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
+    #[command(flatten)]
+    Documents(Documents),
 }
 
-/// Parses the command line and runs it. Errors go to stderr.
+/// Parses the arguments, runs the subcommand and turns its outcome into an exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
-        Command::Run(args) => run::run(&args),
-        Command::Info(args) => info::run(&args),
-        Command::Validate(args) => validate::run(&args),
-        Command::Dump(args) => dump::run(&args),
-        Command::Diff(args) => diff::run(&args),
-        Command::Convert(args) => convert::run(&args),
-        Command::Paper(args) => paper::run(&args),
-        Command::Sweep(args) => sweep::run(&args),
-        Command::Report(args) => report::run(&args),
-        Command::Reproject(args) => reproject::run(*args),
-    };
-    match outcome {
-        Ok(code) => code,
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
-        Err(error) => {
-            anstream::eprintln!("error: {error:#}");
-            ExitCode::from(USAGE)
-        }
-    }
-}
-
-/// True where the reader of our output has gone: `replay ... | head` is no failure.
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    let io = error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<io::Error>());
-    io.into_iter()
-        .any(|cause| cause.kind() == io::ErrorKind::BrokenPipe)
-}
-
-/// Writes a result to stdout, with a line feed at its end.
-///
-/// # Errors
-/// Those of writing.
-pub fn print(text: &str) -> Result<()> {
-    let mut out = io::stdout().lock();
-    writeln!(out, "{}", text.trim_end_matches('\n'))?;
-    Ok(out.flush()?)
+    shell::run(
+        |cli: &Cli| cli.common,
+        |cli| match cli.command {
+            Command::Run(args) => run::run(&args),
+            Command::Info(args) => info::run(&args),
+            Command::Validate(args) => validate::run(&args),
+            Command::Dump(args) => dump::run(&args),
+            Command::Diff(args) => diff::run(&args),
+            Command::Convert(args) => convert::run(&args),
+            Command::Paper(args) => paper::run(&args),
+            Command::Sweep(args) => sweep::run(&args),
+            Command::Report(args) => report::run(&args),
+            Command::Reproject(args) => reproject::run(*args),
+            Command::Documents(documents) => documents.run::<Cli>(),
+        },
+    )
 }
 
 /// Opens a texture trace and names it as results do.
@@ -118,16 +106,13 @@ pub fn open_textrace(path: &Path) -> Result<(Textrace, TraceId)> {
     Ok((trace, id))
 }
 
-/// Limits rayon to `threads`, if given. Results never depend on it.
-///
-/// # Errors
-/// The threads cannot be started.
-pub fn set_threads(threads: Option<usize>) -> Result<()> {
-    let Some(threads) = threads else {
-        return Ok(());
-    };
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build_global()
-        .context("--threads")
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        Cli::command().debug_assert();
+    }
 }

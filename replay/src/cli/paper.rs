@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         text(&report)
     })?;
     if let Err(problem) = check_conservation(&report) {
-        anstream::eprintln!("error: {problem}");
+        shell::error(&problem);
         return Ok(ExitCode::FAILURE);
     }
     Ok(ExitCode::SUCCESS)

@@ -28,7 +28,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     write_page(&report, &args.experiment.pictures(&report)?, &args.output)?;
     super::print(&args.output.display().to_string())?;
     if let Err(problem) = check_conservation(&report) {
-        anstream::eprintln!("error: {problem}");
+        shell::error(&problem);
         return Ok(ExitCode::FAILURE);
     }
     Ok(ExitCode::SUCCESS)

@@ -16,8 +16,8 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::Eye;
+use shell::Progress;
 use std::error::Error;
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -65,9 +65,8 @@ pub struct ReprojectArgs {
     /// Writes a report with charts and pictures.
     #[arg(long, value_name = "HTML")]
     html: Option<PathBuf>,
-    /// Worker threads; results do not depend on it.
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: shell::Threads,
 }
 
 /// A ray trace file as the model reads it.
@@ -93,7 +92,7 @@ impl RaySource for TraceFile {
 /// # Errors
 /// A file that cannot be read, parameters that cannot be used, an output that cannot be written.
 pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
-    super::set_threads(args.threads)?;
+    args.threads.start()?;
     let config = read_config(args.config.as_deref())?;
     if args.print_config {
         let text = match args.config {
@@ -109,12 +108,12 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         args.files.len()
     );
     let mut entries = Vec::new();
-    for (i, path) in args.files.iter().enumerate() {
-        if std::io::stderr().is_terminal() {
-            eprintln!("[{}/{}] {}", i + 1, args.files.len(), path.display());
-        }
+    let progress = Progress::new("reprojecting", args.files.len() as u64, "traces");
+    for path in &args.files {
         entries.push(analyse(path, &args, &config)?);
+        progress.advance(1);
     }
+    drop(progress);
     if let Some(path) = &args.html {
         write_atomically(path, report::page(&entries)?.as_bytes())?;
     }

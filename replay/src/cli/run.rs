@@ -45,9 +45,8 @@ pub struct Args {
     /// Print the whole configuration as TOML and stop
     #[arg(long)]
     print_config: bool,
-    /// Worker threads; results do not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: shell::Threads,
 }
 
 /// What `--json` prints.
@@ -76,7 +75,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         super::print(&toml::to_string(&config)?)?;
         return Ok(ExitCode::SUCCESS);
     };
-    super::set_threads(args.threads)?;
+    args.threads.start()?;
     let (trace, id) = super::open_textrace(path)?;
     if args.compare_modes {
         return compare_modes(&trace, &id, &config, args.json);
@@ -105,11 +104,11 @@ fn timed_replay(trace: &Textrace, config: &RunConfig) -> Result<RunResult> {
     let start = Instant::now();
     let result = engine::replay(trace, config)?;
     let seconds = start.elapsed().as_secs_f64();
-    anstream::eprintln!(
+    shell::note(&format!(
         "{:.1} M footprints/s ({} footprints in {seconds:.3} s, decoding included)",
         result.footprints as f64 / seconds / 1e6,
         result.footprints,
-    );
+    ));
     Ok(result)
 }
 

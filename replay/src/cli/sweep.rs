@@ -1,10 +1,10 @@
 //! `replay sweep`: the points of an experiment file.
 
-use super::experiment_args::progress_bar;
 use crate::report::files::write_atomically;
 use crate::report::z2::experiment::{Subject, labels, twin_of};
 use crate::sweep::{self, Experiment, Store, SweepReport};
 use anyhow::{Context, Result, ensure};
+use shell::Progress;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -29,9 +29,8 @@ pub struct Args {
     /// Print the points and stop
     #[arg(long)]
     plan: bool,
-    /// Worker threads; results do not depend on it
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    threads: shell::Threads,
 }
 
 /// Runs the subcommand.
@@ -39,7 +38,7 @@ pub struct Args {
 /// # Errors
 /// A bad experiment file, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    super::set_threads(args.threads)?;
+    args.threads.start()?;
     let file = args.experiment.display();
     let text = std::fs::read_to_string(&args.experiment).with_context(|| file.to_string())?;
     let experiment = Experiment::parse(&text).with_context(|| file.to_string())?;
@@ -84,16 +83,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .out
         .clone()
         .unwrap_or_else(|| Path::new("out").join(&*name));
-    let bar = progress_bar((subjects.len() * points.len()) as u64, "points");
-    let outcome = sweep::run(&subjects, &points, &Store::new(&out), &|| bar.inc(1));
-    bar.finish_and_clear();
-    let outcome = outcome?;
-    anstream::eprintln!(
+    let total = subjects.len() * points.len();
+    let progress = Progress::new("replaying", total as u64, "points");
+    let outcome = sweep::run(&subjects, &points, &Store::new(&out), &|| {
+        progress.advance(1);
+    })?;
+    drop(progress);
+    shell::note(&format!(
         "{} points computed, {} taken from {}",
         outcome.computed,
-        subjects.len() * points.len() - outcome.computed,
+        total - outcome.computed,
         out.display()
-    );
+    ));
 
     let report = SweepReport::new(&experiment, &subjects, &points, &outcome);
     let json = serde_json::to_string(&report)?;

@@ -21,8 +21,8 @@ pub struct ValidateArgs {
     /// Trace, .textrace or .raytrace
     pub trace: PathBuf,
     /// Worker threads
-    #[arg(long, value_name = "N")]
-    pub threads: Option<usize>,
+    #[command(flatten)]
+    pub threads: shell::Threads,
 }
 
 /// Runs the subcommand.
@@ -30,7 +30,7 @@ pub struct ValidateArgs {
 /// # Errors
 /// The file cannot be read at all.
 pub fn run(args: &ValidateArgs) -> Result<ExitCode> {
-    super::set_threads(args.threads)?;
+    args.threads.start()?;
     match validate(&args.trace) {
         Ok(summary) => {
             super::print(&summary)?;
@@ -38,7 +38,7 @@ pub fn run(args: &ValidateArgs) -> Result<ExitCode> {
         }
         Err(error @ FormatError::Io { .. }) => Err(error.into()),
         Err(error) => {
-            anstream::eprintln!("invalid: {error}");
+            shell::error(&format!("invalid: {error}"));
             Ok(ExitCode::FAILURE)
         }
     }

@@ -15,8 +15,8 @@ mod timed;
 pub use feed::{Feed, Quad};
 pub use source::{MemoryTrace, TileSource};
 
-use crate::cache::{self, Cache, Lru, WaysOf};
-use crate::config::{CacheConfig, ConfigError, Mode, Replacement, RunConfig};
+use crate::cache::{Cache, Levels};
+use crate::config::{ConfigError, Mode, RunConfig};
 use crate::order;
 use crate::result::RunResult;
 use footprint::Footprints;
@@ -58,42 +58,17 @@ pub fn replay<S: TileSource + ?Sized>(
     config: &RunConfig,
 ) -> Result<RunResult, ReplayError> {
     config.validate()?;
-    let is_common = |cache: &CacheConfig| cache.ways == 4 && cache.replacement == Replacement::Lru;
-    if is_common(&config.l1) && is_common(&config.l2) {
-        // The paper's geometry, compiled for it.
-        let lru = |cache: &CacheConfig, level| {
-            Ok(Lru::new(cache.sets(level, config.line_bytes)?, WaysOf::<4>))
-        };
-        let l1 = (0..config.cores).map(|_| lru(&config.l1, "L1"));
-        return run(
-            trace,
-            config,
-            l1.collect::<Result<_, ConfigError>>()?,
-            lru(&config.l2, "L2")?,
-        );
+    // The most common caches have a machine that is compiled for them.
+    match Levels::build(config)?.all_four_way() {
+        Ok(levels) => run(trace, config, levels),
+        Err(levels) => run(trace, config, levels),
     }
-    let build = |cache: &CacheConfig, level, seed| {
-        cache::build(
-            cache,
-            level,
-            config.line_bytes,
-            config.seed.wrapping_add(seed),
-        )
-    };
-    let l1 = (0..config.cores).map(|core| build(&config.l1, "L1", u64::from(core) + 1));
-    run(
-        trace,
-        config,
-        l1.collect::<Result<_, _>>()?,
-        build(&config.l2, "L2", 0)?,
-    )
 }
 
-fn run<S: TileSource + ?Sized, A: Cache, B: Cache>(
+fn run<S: TileSource + ?Sized, C: Cache>(
     trace: &S,
     config: &RunConfig,
-    l1: Vec<A>,
-    l2: B,
+    levels: Levels<C>,
 ) -> Result<RunResult, ReplayError> {
     let tables = trace.tables();
     let footprints = Footprints::new(tables, config)?;
@@ -102,12 +77,13 @@ fn run<S: TileSource + ?Sized, A: Cache, B: Cache>(
     let tally = Tally::new(tables, footprints.lines(), config.tile_maps);
     match config.mode {
         Mode::Functional => {
-            let machine = Functional::new(trace, &footprints, l1, l2, tally);
+            let machine = Functional::new(trace, &footprints, levels.l1, levels.l2, tally);
             let tally = machine.run(&phases, config.assign)?;
             Ok(tally.finish(tables, config.line_bytes))
         }
         Mode::Timed => {
-            let outcome = Timed::new(trace, &footprints, config, l1, l2, tally).run(&phases)?;
+            let outcome =
+                Timed::new(trace, &footprints, config, levels.l1, levels.l2, tally).run(&phases)?;
             let mut result = outcome.tally.finish(tables, config.line_bytes);
             result.tmu = Some(outcome.tmu);
             result.cycles = Some(outcome.cycles);

@@ -1,6 +1,7 @@
 use super::synthetic::Synthetic;
 use super::*;
-use crate::config::{Assign, Order};
+use crate::cache::AnyCache;
+use crate::config::{Assign, CacheConfig, Order};
 use crate::order::WorkItem;
 use crate::result::LevelCounters;
 use formats::footprint::record_footprints;
@@ -127,18 +128,12 @@ fn compiled_and_general_caches_agree() {
     let trace = small();
     let config = functional(Order::Z2_STA);
     let common = replay(&trace, &config).unwrap();
-    let general = RunConfig {
-        l1: CacheConfig {
-            ways: 4,
-            ..config.l1
-        },
-        ..config
+    let Levels { l1, l2 } = Levels::build(&config).unwrap();
+    let pointers = Levels {
+        l1: l1.into_iter().map(AnyCache::into_box).collect(),
+        l2: l2.into_box(),
     };
-    let l1 = (0..2)
-        .map(|_| cache::build(&general.l1, "L1", 16, 0).unwrap())
-        .collect();
-    let l2 = cache::build(&general.l2, "L2", 16, 0).unwrap();
-    assert_eq!(run(&trace, &general, l1, l2).unwrap(), common);
+    assert_eq!(run(&trace, &config, pointers).unwrap(), common);
 }
 
 #[test]

@@ -5,6 +5,7 @@
 
 use super::config::{HitRates, SgrtConfig};
 use super::work::{BatchWork, RayClass};
+use crate::cache::{self, AnyWays};
 use formats::raytrace::{BvhSummary, Visit};
 
 /// Misses of a batch.
@@ -65,36 +66,12 @@ pub fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Miss
     misses
 }
 
-/// A set-associative cache with least-recently-used replacement.
-#[derive(Clone, Debug)]
-struct Lru {
-    /// Lines of each set, most recent first; `u64::MAX` is empty.
-    lines: Vec<u64>,
-    ways: usize,
-    sets: u64,
-}
+/// Node and triangle addresses may need more than 32 bits of line number.
+type Lru = cache::Lru<AnyWays, u64>;
 
-impl Lru {
-    fn new(bytes: u64, ways: u32, line_bytes: u64) -> Self {
-        let sets = (bytes / (u64::from(ways) * line_bytes)).max(1);
-        let ways = ways as usize;
-        Self {
-            lines: vec![u64::MAX; sets as usize * ways],
-            ways,
-            sets,
-        }
-    }
-
-    /// True where the line was there; it is afterwards.
-    fn access(&mut self, line: u64) -> bool {
-        let first = (line % self.sets) as usize * self.ways;
-        let set = &mut self.lines[first..first + self.ways];
-        let found = set.iter().position(|&l| l == line);
-        let end = found.map_or(set.len(), |at| at + 1);
-        set[..end].rotate_right(1);
-        set[0] = line;
-        found.is_some()
-    }
+fn lru(bytes: u64, ways: u32, line_bytes: u64) -> Lru {
+    let sets = bytes / (u64::from(ways) * line_bytes);
+    Lru::new(sets as u32, AnyWays(ways as usize))
 }
 
 /// The caches of the whole device, fed with addresses.
@@ -113,9 +90,9 @@ impl Hierarchy {
         let c = &config.cache;
         let units = config.tni.units as usize;
         Self {
-            nodes: vec![Lru::new(c.node_l1_bytes, c.l1_ways, c.line_bytes); units],
-            triangles: vec![Lru::new(c.triangle_l1_bytes, c.l1_ways, c.line_bytes); units],
-            l2: Lru::new(c.l2_bytes, c.l2_ways, c.line_bytes),
+            nodes: vec![lru(c.node_l1_bytes, c.l1_ways, c.line_bytes); units],
+            triangles: vec![lru(c.triangle_l1_bytes, c.l1_ways, c.line_bytes); units],
+            l2: lru(c.l2_bytes, c.l2_ways, c.line_bytes),
             line_bytes: c.line_bytes,
         }
     }
@@ -163,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_loop_larger_than_an_lru_cache_always_misses_it() {
-        let mut cache = Lru::new(64 * 8, 8, 64);
+        let mut cache = lru(64 * 8, 8, 64);
         let hits = (0..90u64).filter(|i| cache.access(i % 9)).count();
         assert_eq!(hits, 0);
         let hits = (0..90u64).filter(|i| cache.access(100 + i % 8)).count();

@@ -253,10 +253,14 @@ impl SgrtConfig {
             ("cache.l2_bytes", c.l2_bytes, c.l2_ways),
         ] {
             let set = c.line_bytes.saturating_mul(u64::from(ways));
-            if !bytes.is_multiple_of(set) || !(bytes / set).is_power_of_two() {
+            let sets = bytes / set;
+            if !bytes.is_multiple_of(set)
+                || !sets.is_power_of_two()
+                || sets * u64::from(ways) > 1 << 24
+            {
                 return Err(ConfigError::Range {
                     key: key.to_owned(),
-                    expected: "a power of two of sets (ways x line_bytes each)",
+                    expected: "a power of two of sets (ways x line_bytes each) and at most 2^24 lines",
                     found: format!("{bytes} bytes over sets of {set} bytes"),
                 });
             }

@@ -6,18 +6,8 @@ pub mod scene_args;
 pub mod scenes;
 
 use clap::{Parser, Subcommand};
-use formats::container::{VERSION_MAJOR, VERSION_MINOR};
-use std::io;
+use shell::{Common, Documents};
 use std::process::ExitCode;
-use std::sync::LazyLock;
-
-/// Version with the format that this build writes.
-static VERSION: LazyLock<String> = LazyLock::new(|| {
-    format!(
-        "{} (writes .textrace and .raytrace format {VERSION_MAJOR}.{VERSION_MINOR})",
-        env!("CARGO_PKG_VERSION")
-    )
-});
 
 const EXAMPLES: &str = "\
 Examples:
@@ -25,14 +15,14 @@ Examples:
   tracegen scenes model.gltf --json
   tracegen raster atrium -o atrium.textrace --image atrium.png
   tracegen raster sponza.gltf --camera gallery --shadows -o sponza.textrace
-  tracegen rays chess -o chess.raytrace --image chess.png
-
-Exit codes: 0 done, 2 wrong use or unreadable input.";
+  tracegen rays chess -o chess.raytrace --image chess.png";
 
 /// Renders a scene for both eyes and captures every texture sample or every ray into a trace.
 #[derive(Debug, Parser)]
-#[command(name = "tracegen", version = VERSION.as_str(), after_help = EXAMPLES, max_term_width = 100)]
+#[command(name = "tracegen", version = shell::VERSION.as_str(), after_help = EXAMPLES, max_term_width = 100)]
 pub struct Cli {
+    #[command(flatten)]
+    common: Common,
     #[command(subcommand)]
     command: Command,
 }
@@ -42,41 +32,33 @@ enum Command {
     /// List the built-in scenes, or the cameras and contents of a file.
     Scenes(scenes::ScenesArgs),
     /// Render a stereo frame and capture its texture samples into a .textrace file.
-    Raster(raster::RasterArgs),
+    Raster(Box<raster::RasterArgs>),
     /// Trace a stereo frame and capture its rays into a .raytrace file.
-    Rays(rays::RaysArgs),
+    Rays(Box<rays::RaysArgs>),
+    #[command(flatten)]
+    Documents(Documents),
 }
 
 /// Parses the arguments, runs the subcommand and turns its outcome into an exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let outcome = match cli.command {
-        Command::Scenes(args) => scenes::run(args),
-        Command::Raster(args) => raster::run(args),
-        Command::Rays(args) => rays::run(args),
-    };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        // Whoever reads our output has seen enough.
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
-        Err(error) => {
-            anstream::eprintln!("\u{1b}[1;31merror\u{1b}[0m: {error:#}");
-            ExitCode::from(2)
-        }
-    }
+    shell::run(
+        |cli: &Cli| cli.common,
+        |cli| {
+            match cli.command {
+                Command::Scenes(args) => scenes::run(args)?,
+                Command::Raster(args) => raster::run(&args)?,
+                Command::Rays(args) => rays::run(&args)?,
+                Command::Documents(documents) => return documents.run::<Cli>(),
+            }
+            Ok(ExitCode::SUCCESS)
+        },
+    )
 }
 
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<io::Error>())
-        .any(|e| e.kind() == io::ErrorKind::BrokenPipe)
-}
-
-/// Prints a warning on stderr.
-pub fn warn(message: &str) {
-    anstream::eprintln!("\u{1b}[1;33mwarning\u{1b}[0m: {message}");
+/// What traces name as their maker.
+pub(crate) fn tool() -> String {
+    format!("tracegen {}", env!("CARGO_PKG_VERSION"))
 }
 
 #[cfg(test)]
@@ -87,12 +69,5 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn a_broken_pipe_is_found_under_its_context() {
-        let pipe = io::Error::from(io::ErrorKind::BrokenPipe);
-        assert!(is_broken_pipe(&anyhow::Error::new(pipe).context("writing")));
-        assert!(!is_broken_pipe(&anyhow::anyhow!("no such file")));
     }
 }

@@ -12,12 +12,15 @@ use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
 use record::CaptureCounts;
 use scene::LoadOptions;
+use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;
+/// Most frames of a camera path.
+const MAX_FRAMES: i64 = 10_000;
 
 /// Arguments of `tracegen raster`.
 #[derive(Args, Debug)]
@@ -30,6 +33,10 @@ pub struct RasterArgs {
     /// Picture of both eyes side by side.
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
+    /// Frames along a slow walk: 0.4 m/s ahead with a sideways sway of 5 cm, at 72 frames a second.
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Camera",
+          value_parser = clap::value_parser!(u32).range(1..=MAX_FRAMES))]
+    frames: u32,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     shadows: bool,
@@ -40,30 +47,32 @@ pub struct RasterArgs {
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
     record_budget: u64,
-    /// Threads of the driver and of the post-processing (the trace is the same) [default: all].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// Runs `tracegen raster`.
 ///
 /// # Errors
 /// Unreadable input, no driver, or a file that cannot be written.
-pub fn run(args: RasterArgs) -> anyhow::Result<()> {
-    prepare_environment(args.threads)?;
-    check_folder(&args.output)?;
-    args.image.as_deref().map_or(Ok(()), check_folder)?;
+pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
+    prepare_environment(args.threads.count);
+    args.threads.start()?;
+    args.scene
+        .check_outputs(&args.output, args.image.as_deref())?;
     let started = Instant::now();
-    let mut setup = args.scene.setup(None, &LoadOptions::ALL)?;
+    let progress = Progress::new("loading the scene", 0, "");
+    let mut setup = args.scene.setup(None, args.frames, &LoadOptions::ALL)?;
     let cascades = if args.shadows {
         CASCADES
     } else {
         setup.scene.shadow_cascades.min(CASCADES)
     };
+    progress.stage("preparing textures and shaders", 0, "");
     let draws = DrawList::new(&setup.scene, cascades)?;
     let uploads = TextureSet::compress_and_free(&mut setup.scene)?;
     for note in &uploads.notes {
-        super::warn(note);
+        shell::warn(note);
     }
     let size_px = setup.hmd.eye_size_px;
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
@@ -79,14 +88,14 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         parts: 1,
     };
     job.warm_up(&mut backend, &setup.frames[0])?;
-    eprintln!(
+    note(&format!(
         "{}: ready in {:.2} s",
         args.scene.scene,
         started.elapsed().as_secs_f64()
-    );
+    ));
+    progress.stage("capturing", setup.frames.len() as u64, "frames");
 
-    let mut writer = TextraceWriter::create(&args.output, &tables)
-        .with_context(|| format!("cannot write {}", args.output.display()))?;
+    let mut writer = TextraceWriter::create(&args.output, &tables)?;
     let mut summary = Summary::default();
     let mut first_pictures: Option<Pictures> = None;
     for (frame, views) in setup.frames.iter().enumerate() {
@@ -107,7 +116,9 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
             summary.identical = Some(summary.identical.unwrap_or(true) && plain == pictures);
         }
         first_pictures.get_or_insert(pictures);
+        progress.advance(1);
     }
+    drop(progress);
     ensure!(
         summary.identical != Some(false),
         "the captured picture differs from the plain one: the capture disturbed the rendering"
@@ -122,30 +133,15 @@ pub fn run(args: RasterArgs) -> anyhow::Result<()> {
         _ => None,
     };
     let start = Instant::now();
-    writer
-        .finish()
-        .with_context(|| cannot_write(&args.output))?;
+    let file_bytes = writer.finish()?;
     summary.captured += start.elapsed();
     if let Some((path, prepared)) = image {
         prepared.persist().with_context(|| cannot_write(path))?;
     }
-    let file_bytes = std::fs::metadata(&args.output)?.len();
+    if summary.counts.fragments == 0 {
+        super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
+    }
     summary.print(setup.frames.len(), size_px, file_bytes);
-    Ok(())
-}
-
-/// Refuses an output in a folder that does not exist before minutes go into the capture.
-fn check_folder(path: &Path) -> anyhow::Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    ensure!(
-        folder.is_dir(),
-        "cannot write {}: expected a folder {}, found none",
-        path.display(),
-        folder.display()
-    );
     Ok(())
 }
 
@@ -170,8 +166,8 @@ fn tables(
     let (samplers, draw_table) = draws.tables(&setup.scene, uploads, &textures);
     Tables {
         meta: TraceMeta {
-            tool: concat!("tracegen ", env!("CARGO_PKG_VERSION")).into(),
-            command_line: lasting_arguments(std::env::args().skip(1)),
+            tool: super::tool(),
+            command_line: lasting_arguments(std::env::args_os().skip(1)),
             scene: spec.into(),
             scene_triangles: setup.scene.triangle_count(),
             camera: setup.camera.name.clone(),
@@ -186,29 +182,6 @@ fn tables(
         draws: draw_table,
         passes: CaptureJob::passes(setup.hmd.eye_size_px, setup.frames.len() as u32),
     }
-}
-
-/// The arguments that decide what a trace holds: output paths and how it was made are left out,
-/// so that the same capture gives the same bytes.
-fn lasting_arguments(arguments: impl Iterator<Item = String>) -> Vec<String> {
-    const WITH_VALUE: [&str; 5] = ["-o", "--output", "--image", "--threads", "--record-budget"];
-    let mut kept = Vec::new();
-    let mut skip_value = false;
-    for argument in arguments {
-        if std::mem::take(&mut skip_value) {
-            continue;
-        }
-        let name = argument.split('=').next().unwrap_or_default();
-        if WITH_VALUE.contains(&argument.as_str()) {
-            skip_value = true;
-        } else if !WITH_VALUE.contains(&name)
-            && !argument.starts_with("-o")
-            && argument != "--no-plain"
-        {
-            kept.push(argument);
-        }
-    }
-    kept
 }
 
 #[derive(Default)]
@@ -232,51 +205,51 @@ impl Summary {
         } = self.counts;
         let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
         let pixels = 2.0 * frames as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
-        eprintln!(
+        note(&format!(
             "{frames} frame(s), 2 x {}x{}: {quads} quads, {fragments} fragments ({:.2} a pixel), {records} records",
             size_px[0],
             size_px[1],
             fragments as f64 / pixels
-        );
+        ));
         if masked_lanes_killed > 0 {
-            eprintln!(
+            note(&format!(
                 "{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw"
-            );
+            ));
         }
         if not_finite > 0 {
-            super::warn(&format!(
+            shell::warn(&format!(
                 "{not_finite} records with texture coordinates that are not finite were left out"
             ));
         }
-        eprintln!(
+        note(&format!(
             "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record (44 raw)",
             per(tile_bytes, quads),
             per(tile_bytes, records)
-        );
+        ));
         let captured = self.captured.as_secs_f64();
         let includes = "shadow maps, both eyes, reading the pictures back";
         if let Some(identical) = self.identical {
             let plain = self.plain.as_secs_f64();
-            eprintln!("plain render   {plain:.3} s ({includes})");
-            eprintln!(
+            note(&format!("plain render   {plain:.3} s ({includes})"));
+            note(&format!(
                 "with capture   {captured:.3} s (the same, and draining and {:.3} s of sorting, encoding and writing the trace): {:.2} x plain",
                 self.sorting.as_secs_f64(),
                 captured / plain
-            );
-            eprintln!(
+            ));
+            note(&format!(
                 "pictures with and without capture: {}",
                 if identical { "identical" } else { "DIFFERENT" }
-            );
+            ));
         } else {
-            eprintln!(
+            note(&format!(
                 "with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace)"
-            );
+            ));
         }
         if let Some(bytes) = peak_rss_bytes() {
-            eprintln!(
+            note(&format!(
                 "peak memory    {:.0} MiB",
                 bytes as f64 / f64::from(1 << 20)
-            );
+            ));
         }
     }
 }
@@ -289,9 +262,9 @@ fn peak_rss_bytes() -> Option<u64> {
     Some(kib * 1024)
 }
 
-/// Sets what Mesa reads from the environment, and limits the threads.
-fn prepare_environment(threads: Option<u16>) -> anyhow::Result<()> {
-    // SAFETY: the command has started no thread yet, so nothing reads the environment meanwhile.
+/// Sets what Mesa reads from the environment.
+fn prepare_environment(threads: Option<u16>) {
+    // SAFETY: the only other thread waits for signals; nothing reads the environment meanwhile.
     unsafe {
         // Mesa's device selection asks a display server, in vain and aloud where there is none.
         std::env::set_var("NODEVICE_SELECT", "1");
@@ -299,13 +272,6 @@ fn prepare_environment(threads: Option<u16>) -> anyhow::Result<()> {
             std::env::set_var("LP_NUM_THREADS", threads.to_string());
         }
     }
-    if let Some(threads) = threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.into())
-            .build_global()
-            .context("cannot limit the threads")?;
-    }
-    Ok(())
 }
 
 /// Bytes with an optional binary suffix: `64MiB`, `512KiB`, `1GiB`, `4096`.
@@ -330,25 +296,6 @@ fn parse_bytes(text: &str) -> Result<u64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn kept(line: &str) -> Vec<String> {
-        lasting_arguments(line.split(' ').map(str::to_owned))
-    }
-
-    #[test]
-    fn output_paths_and_thread_counts_do_not_reach_the_trace() {
-        let expected = ["raster", "s.gltf", "--shadows", "--camera", "x"];
-        assert_eq!(
-            kept("raster s.gltf -o a --shadows --image=b.png --camera x"),
-            expected
-        );
-        assert_eq!(
-            kept(
-                "raster s.gltf --output=a --shadows --threads 2 --no-plain --camera x --record-budget 4MiB -ob"
-            ),
-            expected
-        );
-    }
 
     #[test]
     fn sizes_take_binary_suffixes() {

@@ -8,12 +8,12 @@ use formats::raytrace::{
     EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
 };
 use formats::textrace::TraceMeta;
-use indicatif::{ProgressBar, ProgressStyle};
 use rays::frame::{Frame, trace_frame};
 use rays::picture;
 use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
 use scene::LoadOptions;
+use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -45,9 +45,8 @@ pub struct RaysArgs {
     /// Tree that is walked; the steps of bvh2 are T&I unit 2.0's.
     #[arg(long, value_enum, default_value_t = Tree::Bvh2)]
     bvh: Tree,
-    /// Threads [default: all cores]. The trace is the same for any number.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// `--bvh`.
@@ -63,44 +62,41 @@ enum Tree {
 ///
 /// # Errors
 /// Unreadable input or wrong use.
-pub fn run(args: RaysArgs) -> anyhow::Result<()> {
-    if args.scene.camera.frames > 1 {
-        bail!(
-            "--frames {}: a ray trace holds one frame",
-            args.scene.camera.frames
-        );
-    }
-    if args.image.as_ref() == Some(&args.output) {
-        bail!(
-            "--image and --output name the same file, {}",
-            args.output.display()
-        );
-    }
-    if let Some(threads) = args.threads {
-        // The global pool serves scene loading and texture pyramids, too.
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.into())
-            .build_global()
-            .context("cannot start the threads")?;
-    }
+pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
+    args.threads.start()?;
+    args.scene
+        .check_outputs(&args.output, args.image.as_deref())?;
     let start = Instant::now();
-    let writer = RaytraceWriter::create(&args.output)?;
+    let progress = Progress::new("loading the scene", 0, "");
     let textures = LoadOptions {
         images: true,
         // Base colour, metallic-roughness and emissive: what rays look at.
         slots: [true, false, true, false, false, true],
     };
-    let setup = args.scene.setup(Some(DEFAULT_SIZE_PX), &textures)?;
+    let setup = args.scene.setup(Some(DEFAULT_SIZE_PX), 1, &textures)?;
     let loaded = start.elapsed();
-    let (scene, mut tables) = prepare(&args, setup)?;
+    progress.stage("building the hierarchy", 0, "");
+    let (camera, bounds) = (
+        setup.camera.clone(),
+        setup.scene.bounds().unwrap_or_default(),
+    );
+    let (scene, mut tables) = prepare(args, setup)?;
     let prepared = start.elapsed();
-    let frame = trace(&args, &scene, &mut tables, writer)?;
+    progress.stage("tracing", 2 * u64::from(tables.tile_count()), "tiles");
+    let (frame, writer) = trace(args, &scene, &mut tables, &progress)?;
+    drop(progress);
     let traced = start.elapsed();
-    if let Some(path) = &args.image {
-        write_image(&frame, path)?;
+    // Complete before the trace gets its name: a full disk leaves neither.
+    let image = args.image.as_deref().map(|path| image_file(&frame, path));
+    let image = image.transpose()?;
+    let file_bytes = writer.finish(&tables)?;
+    if let (Some(file), Some(path)) = (image, &args.image) {
+        file.persist().with_context(|| cannot_write(path))?;
     }
-    let bytes = std::fs::metadata(&args.output).map_or(0, |m| m.len());
-    report(&tables, &frame, bytes, [loaded, prepared, traced]);
+    if frame.stats.hits == 0 {
+        super::scene_args::warn_of_nothing_seen(&camera, bounds);
+    }
+    report(&tables, &frame, file_bytes, [loaded, prepared, traced]);
     Ok(())
 }
 
@@ -128,8 +124,8 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
     });
     let meta = RaytraceMeta {
         trace: TraceMeta {
-            tool: format!("tracegen {}", env!("CARGO_PKG_VERSION")),
-            command_line: recorded_arguments(std::env::args().skip(1)),
+            tool: super::tool(),
+            command_line: lasting_arguments(std::env::args_os().skip(1)),
             scene: args.scene.scene.clone(),
             scene_triangles,
             camera: camera.name,
@@ -156,35 +152,36 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
     Ok((scene, tables))
 }
 
+/// Traces the frame and writes its tiles; the writer lacks the tables.
 fn trace(
     args: &RaysArgs,
     scene: &TraceScene,
     tables: &mut RaytraceTables,
-    mut writer: RaytraceWriter,
-) -> anyhow::Result<Frame> {
+    progress: &Progress,
+) -> anyhow::Result<(Frame, RaytraceWriter)> {
     let settings = TraceSettings {
         max_depth: args.depth,
         samples_per_px: args.spp,
         visits: args.visits,
         traversal: tables.bvh.traversal,
     };
-    // Drawn on terminals only.
-    let bar = ProgressBar::new(2 * u64::from(tables.tile_count()));
-    if let Ok(style) = ProgressStyle::with_template("tracing {wide_bar} {pos}/{len} tiles, {eta}") {
-        bar.set_style(style);
-    }
-    let mut frame = trace_frame(scene, settings, tables, &mut writer, |done| bar.inc(done))?;
-    bar.finish_and_clear();
+    let mut writer = RaytraceWriter::create(&args.output)?;
+    let mut frame = trace_frame(scene, settings, tables, &mut writer, |done| {
+        progress.advance(done);
+    })?;
     tables.triangles = std::mem::take(&mut frame.triangles);
-    writer.finish(tables)?;
-    Ok(frame)
+    Ok((frame, writer))
 }
 
-fn write_image(frame: &Frame, path: &Path) -> anyhow::Result<()> {
-    let place = || format!("cannot write {}", path.display());
+fn cannot_write(path: &Path) -> String {
+    format!("cannot write {}", path.display())
+}
+
+fn image_file(frame: &Frame, path: &Path) -> anyhow::Result<AtomicFile> {
+    let place = || cannot_write(path);
     let mut file = AtomicFile::create(path).with_context(place)?;
     picture::write_png(&frame.images, &mut file).with_context(place)?;
-    file.persist().with_context(place)
+    Ok(file)
 }
 
 /// The figures of a trace, on stderr: they vary from run to run.
@@ -193,16 +190,11 @@ fn report(tables: &RaytraceTables, frame: &Frame, bytes: u64, at: [Duration; 3])
     let [loaded, prepared, traced] = at.map(|t| t.as_secs_f64());
     let rays = stats.total_rays();
     let per_ray = |n: u64| n as f64 / rays.max(1) as f64;
-    anstream::eprintln!(
+    note(&format!(
         "hierarchy: {}, {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}",
-        bvh.builder,
-        bvh.triangles,
-        bvh.nodes,
-        bvh.leaves,
-        bvh.depth,
-        bvh.sah_cost
-    );
-    anstream::eprintln!(
+        bvh.builder, bvh.triangles, bvh.nodes, bvh.leaves, bvh.depth, bvh.sah_cost
+    ));
+    note(&format!(
         "rays: {rays} ({} primary, {} shadow, {} reflection, {} refraction), \
          {:.1} steps and {:.1} triangle tests a ray",
         stats.rays_of(RayKind::Primary),
@@ -211,44 +203,13 @@ fn report(tables: &RaytraceTables, frame: &Frame, bytes: u64, at: [Duration; 3])
         stats.rays_of(RayKind::Refraction),
         per_ray(stats.steps),
         per_ray(stats.triangle_tests),
-    );
+    ));
     let tracing = traced - prepared;
-    anstream::eprintln!(
+    note(&format!(
         "time: load {loaded:.2} s, build {:.2} s, trace and write {tracing:.2} s \
          ({:.2} Mray/s); {:.1} MB",
         prepared - loaded,
         rays as f64 / tracing.max(1e-9) / 1e6,
         bytes as f64 / 1e6,
-    );
-}
-
-/// Arguments that decide what the trace holds: without output paths and thread count.
-fn recorded_arguments(arguments: impl Iterator<Item = String>) -> Vec<String> {
-    const LEFT_OUT: [&str; 4] = ["-o", "--output", "--image", "--threads"];
-    let mut kept = Vec::new();
-    let mut skip = false;
-    for argument in arguments {
-        if std::mem::take(&mut skip) {
-            continue;
-        }
-        let name = argument.split('=').next().unwrap_or_default();
-        if LEFT_OUT.contains(&name) {
-            skip = !argument.contains('=');
-        } else if !argument.starts_with("-o") {
-            kept.push(argument);
-        }
-    }
-    kept
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn output_paths_and_threads_are_not_recorded() {
-        let given = "rays teapot -o a.raytrace --image=b.png --threads 2 --size 64x64 --output c";
-        let kept = recorded_arguments(given.split(' ').map(str::to_owned));
-        assert_eq!(kept, ["rays", "teapot", "--size", "64x64"]);
-    }
+    ));
 }

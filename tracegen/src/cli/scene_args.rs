@@ -5,9 +5,8 @@ use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::Vec3;
 use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd};
 use scenes::load_with;
-
-/// Most frames of a camera path.
-const MAX_FRAMES: u32 = 10_000;
+use shell::Output;
+use std::path::Path;
 
 /// Scene, camera and display of a capture.
 #[derive(Args, Clone, Debug)]
@@ -37,15 +36,29 @@ pub struct SceneSetup {
 }
 
 impl SceneArgs {
+    /// Checks trace and picture before the work, see [`shell::check_outputs`].
+    ///
+    /// # Errors
+    /// One that cannot be written, or that would replace the scene or the other.
+    pub fn check_outputs(&self, trace: &Path, image: Option<&Path>) -> anyhow::Result<()> {
+        let mut outputs = vec![Output::binary("--output", trace)];
+        outputs.extend(image.map(|image| Output::binary("--image", image)));
+        // The names of built-in scenes have no extension and name no file.
+        let scene = Path::new(&self.scene);
+        shell::check_outputs(&outputs, scene.extension().map(|_| scene))
+    }
+
     /// Loads the scene (its warnings go to stderr) and works out the views.
     ///
-    /// `default_size_px` is the eye size where neither `--size` nor `--hmd` is given.
+    /// `default_size_px` is the eye size where neither `--size` nor `--hmd` is given; the path has
+    /// `frames` frames.
     ///
     /// # Errors
     /// Wrong flags, checked first, or an unreadable scene.
     pub fn setup(
         &self,
         default_size_px: Option<[u32; 2]>,
+        frames: u32,
         options: &LoadOptions,
     ) -> anyhow::Result<SceneSetup> {
         // Flags that need no scene are checked before minutes go into loading one.
@@ -59,7 +72,7 @@ impl SceneArgs {
             None => None,
         };
         let hmd = self.hmd.resolve(default_size_px, vfov_deg)?;
-        let frames = cameras::frame_views(&camera, &hmd, self.camera.frames)?;
+        let frames = cameras::frame_views(&camera, &hmd, frames)?;
         Ok(SceneSetup {
             scene,
             camera,
@@ -76,9 +89,19 @@ impl SceneArgs {
 pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
     let Loaded { scene, warnings } = load_with(spec, options)?;
     for warning in &warnings {
-        super::warn(&format!("{spec}: {warning}"));
+        shell::warn(&format!("{spec}: {warning}"));
     }
     Ok(scene)
+}
+
+/// Warns of a picture without any part of the scene.
+pub fn warn_of_nothing_seen(camera: &Camera, (low, high): (Vec3, Vec3)) {
+    let Camera { eye, target, .. } = camera;
+    shell::warn(&format!(
+        "nothing of the scene is seen from {eye} towards {target} (camera {}); the scene reaches \
+         from {low} to {high} m: choose another --camera, or --eye and --target",
+        camera.name
+    ));
 }
 
 /// Where the head is.
@@ -104,10 +127,6 @@ pub struct CameraArgs {
     #[arg(long, value_name = "DEG|file", value_parser = parse_vfov,
           conflicts_with_all = ["hfov", "fov_tangents"])]
     pub vfov: Option<VerticalFov>,
-    /// Frames along a slow walk: 0.4 m/s ahead with a sideways sway of 5 cm, at 72 frames a second.
-    #[arg(long, value_name = "N", default_value_t = 1,
-          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
-    pub frames: u32,
 }
 
 /// `--vfov`.
@@ -378,7 +397,6 @@ mod tests {
                 "cannot be used with",
             ),
             ("--fov-tangents 1,2,3", "4 numbers"),
-            ("--frames 0", "frames"),
             ("--vfov 60 --hfov 90", "cannot be used with"),
         ] {
             let error = parse(flags).expect_err(flags);
@@ -399,7 +417,7 @@ mod tests {
         ] {
             let args = parse(flags).unwrap();
             let error = args
-                .setup(None, &LoadOptions::NO_IMAGES)
+                .setup(None, 1, &LoadOptions::NO_IMAGES)
                 .unwrap_err()
                 .to_string();
             assert!(error.contains(part), "{flags}: {error}");

@@ -4,7 +4,6 @@ use super::scene_args::load_scene;
 use clap::Args;
 use scene::{LoadOptions, Scene};
 use serde::Serialize;
-use std::io::{self, Write};
 use std::time::Instant;
 use textures::{CompressedTexture, TextureSet};
 
@@ -91,10 +90,7 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
             }
         }
     };
-    let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()?;
-    Ok(())
+    shell::print(&text)
 }
 
 /// Loads and compresses everything; how long that took goes to stderr.
@@ -104,14 +100,14 @@ fn read_textures(spec: &str) -> anyhow::Result<Description> {
     let loaded = start.elapsed();
     let set = TextureSet::compress_and_free(&mut scene)?;
     for note in &set.notes {
-        super::warn(note);
+        shell::warn(note);
     }
-    anstream::eprintln!(
+    shell::note(&format!(
         "loaded in {:.2} s, {} textures compressed in {:.2} s",
         loaded.as_secs_f64(),
         set.textures.len(),
         (start.elapsed() - loaded).as_secs_f64(),
-    );
+    ));
     let bytes = set.textures.iter().map(CompressedTexture::bytes).sum();
     Ok(Description {
         texture_bytes: Some(bytes),

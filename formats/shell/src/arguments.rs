@@ -1,0 +1,86 @@
+//! Arguments that both programs have, and those that a trace records.
+
+use anyhow::Context;
+use std::ffi::OsString;
+
+/// `--threads`.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct Threads {
+    /// Worker threads; results do not depend on it [default: all cores]
+    #[arg(long = "threads", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub count: Option<u16>,
+}
+
+impl Threads {
+    /// Limits rayon to that many threads; called once, before anything runs in parallel.
+    ///
+    /// # Errors
+    /// The threads cannot be started.
+    pub fn start(self) -> anyhow::Result<()> {
+        let Some(count) = self.count else {
+            return Ok(());
+        };
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(count.into())
+            .build_global()
+            .context("--threads")
+    }
+}
+
+/// Options with a value that say where and how, not what.
+const PASSING_OPTIONS: [&str; 4] = ["--output", "--image", "--threads", "--record-budget"];
+/// Switches that do.
+const PASSING_SWITCHES: [&str; 3] = ["--no-plain", "--no-cache", "--quiet"];
+
+/// The arguments that decide what a trace holds: output paths and how it was made are left out, so
+/// that the same capture gives the same bytes.
+pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<String> {
+    let mut kept = Vec::new();
+    let mut arguments = arguments
+        .into_iter()
+        .map(|argument| argument.to_string_lossy().into_owned());
+    while let Some(argument) = arguments.next() {
+        let (name, value) = match argument.split_once('=') {
+            Some((name, value)) => (name, Some(value)),
+            None => (argument.as_str(), None),
+        };
+        // `-o`, its value attached or not, perhaps behind a `-q`.
+        let output = argument
+            .strip_prefix('-')
+            .map(|letters| letters.trim_start_matches('q'))
+            .and_then(|letters| letters.strip_prefix('o'));
+        if PASSING_OPTIONS.contains(&name) {
+            if value.is_none() {
+                arguments.next();
+            }
+        } else if let Some(attached) = output {
+            if attached.is_empty() {
+                arguments.next();
+            }
+        } else if !PASSING_SWITCHES.contains(&name) && argument != "-q" {
+            kept.push(argument);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn output_paths_and_how_a_trace_was_made_are_not_recorded() {
+        for line in [
+            "raster s.gltf -o a --shadows --image=b.png --camera -x",
+            "raster s.gltf --output=a --shadows --threads 2 --no-plain --camera -x --record-budget 4MiB -ob",
+            "-q raster s.gltf -qo a --shadows --quiet --no-cache --image b -o=c --camera -x",
+        ] {
+            let kept = lasting_arguments(line.split(' ').map(OsString::from));
+            assert_eq!(
+                kept,
+                ["raster", "s.gltf", "--shadows", "--camera", "-x"],
+                "{line}"
+            );
+        }
+    }
+}

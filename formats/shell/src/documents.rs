@@ -1,0 +1,63 @@
+//! Shell completions and manual pages, made from the command line's own definition.
+
+use super::program;
+use clap::{Command, CommandFactory, Subcommand};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Subcommands that document the program.
+#[derive(Clone, Debug, Subcommand)]
+pub enum Documents {
+    /// Print a completion script for a shell.
+    ///
+    /// For bash: put it into ~/.local/share/bash-completion/completions/PROGRAM.
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages, one a subcommand, into a folder.
+    ///
+    /// For `man`: a folder such as ~/.local/share/man/man1.
+    Man {
+        /// Folder, made where it does not exist
+        folder: PathBuf,
+    },
+}
+
+impl Documents {
+    /// Runs the subcommand for the program `C`.
+    ///
+    /// # Errors
+    /// An output that cannot be written.
+    pub fn run<C: CommandFactory>(self) -> anyhow::Result<ExitCode> {
+        let mut command = program::command::<C>();
+        command.build();
+        match self {
+            Self::Completions { shell } => {
+                let name = command.get_name().to_owned();
+                let mut script = Vec::new();
+                clap_complete::generate(shell, &mut command, name, &mut script);
+                let mut out = std::io::stdout().lock();
+                out.write_all(&script)?;
+                out.flush()?;
+            }
+            Self::Man { folder } => {
+                std::fs::create_dir_all(&folder)?;
+                write_pages(&command, &folder)?;
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn write_pages(command: &Command, folder: &Path) -> anyhow::Result<()> {
+    let page = clap_mangen::Man::new(command.clone());
+    let mut roff = Vec::new();
+    page.render(&mut roff)?;
+    formats::container::AtomicFile::write_whole(&folder.join(page.get_filename()), &roff)?;
+    for subcommand in command.get_subcommands().filter(|s| s.get_name() != "help") {
+        write_pages(subcommand, folder)?;
+    }
+    Ok(())
+}

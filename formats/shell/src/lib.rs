@@ -1,0 +1,18 @@
+//! What the programs do alike at the command line: exit codes, messages, progress, checks of
+//! outputs, signals, threads, completions and manual pages.
+
+mod arguments;
+mod documents;
+mod message;
+mod outputs;
+mod program;
+mod progress;
+mod signals;
+
+pub use arguments::{Threads, lasting_arguments};
+pub use documents::Documents;
+pub use formats::container::is_stdout;
+pub use message::{error, note, print, warn};
+pub use outputs::{Output, check_outputs};
+pub use program::{Common, VERSION, run};
+pub use progress::Progress;

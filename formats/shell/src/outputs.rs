@@ -1,0 +1,172 @@
+//! Checks of a command's outputs before its work, which may take minutes.
+
+use anyhow::{Context, bail, ensure};
+use formats::container::{check_target, is_stdout};
+use std::fs;
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+
+/// A file that a command will write.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Output {
+    flag: &'static str,
+    path: PathBuf,
+    is_binary: bool,
+}
+
+impl Output {
+    /// Text that the flag asks for.
+    #[must_use]
+    pub fn text(flag: &'static str, path: &Path) -> Self {
+        let path = path.to_owned();
+        Self {
+            flag,
+            path,
+            is_binary: false,
+        }
+    }
+
+    /// A trace or a picture that the flag asks for.
+    #[must_use]
+    pub fn binary(flag: &'static str, path: &Path) -> Self {
+        Self {
+            is_binary: true,
+            ..Self::text(flag, path)
+        }
+    }
+
+    fn named(&self) -> String {
+        format!("{} {}", self.flag, self.path.display())
+    }
+}
+
+/// Checks that every output can be written and that none would replace an input or another output.
+///
+/// # Errors
+/// The first output for which that does not hold.
+pub fn check_outputs<'a>(
+    outputs: &[Output],
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> anyhow::Result<()> {
+    let inputs: Vec<&Path> = inputs.into_iter().collect();
+    for (number, output) in outputs.iter().enumerate() {
+        if is_stdout(&output.path) {
+            let on_terminal = output.is_binary && io::stdout().is_terminal();
+            ensure!(
+                !on_terminal,
+                "{}: binary: name a file, or redirect standard output",
+                output.named()
+            );
+        } else {
+            check_target(&output.path)
+                .with_context(|| format!("cannot write {}", output.path.display()))?;
+        }
+        let earlier = &outputs[..number];
+        if let Some(other) = earlier.iter().find(|o| is_same(&o.path, &output.path)) {
+            bail!(
+                "{} and {}: the same output twice",
+                other.named(),
+                output.named()
+            );
+        }
+        // What is no file, such as the name of a built-in scene, cannot be overwritten.
+        let mut files = inputs.iter().filter(|input| input.exists());
+        if let Some(input) = files.find(|input| is_same(input, &output.path)) {
+            bail!(
+                "{}: would replace the input {}",
+                output.named(),
+                input.display()
+            );
+        }
+    }
+    Ok(())
+}
+
+/// True if two paths are one file: by spelling, through links of either kind, or as names that do
+/// not exist yet.
+fn is_same(a: &Path, b: &Path) -> bool {
+    match (is_stdout(a), is_stdout(b)) {
+        (true, true) => true,
+        (false, false) => {
+            let (ids, paths) = ([a, b].map(file_id), [a, b].map(full_path));
+            (ids[0].is_some() && ids[0] == ids[1]) || (paths[0].is_some() && paths[0] == paths[1])
+        }
+        _ => false,
+    }
+}
+
+/// Device and inode.
+fn file_id(path: &Path) -> Option<(u64, u64)> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let found = fs::metadata(path).ok()?;
+        Some((found.dev(), found.ino()))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = path;
+        None
+    }
+}
+
+fn full_path(path: &Path) -> Option<PathBuf> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let name = path.file_name()?;
+    fs::canonicalize(path)
+        .ok()
+        .or_else(|| Some(fs::canonicalize(folder).ok()?.join(name)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(outputs: &[Output], inputs: &[&Path]) -> String {
+        let error = check_outputs(outputs, inputs.iter().copied()).unwrap_err();
+        format!("{error:#}")
+    }
+
+    #[test]
+    fn an_output_over_an_input_is_refused_by_any_of_its_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join("a");
+        fs::write(&input, "").unwrap();
+        let other = folder.path().join("b");
+        fs::hard_link(&input, &other).unwrap();
+        let dotted = folder.path().join("./a");
+        for name in [&input, &other, &dotted] {
+            let text = refused(&[Output::text("--csv", name)], &[&input]);
+            assert!(text.contains("would replace the input"), "{text}");
+        }
+        let new = folder.path().join("new");
+        check_outputs(&[Output::text("--csv", &new)], [input.as_path()]).unwrap();
+        // The same word as a built-in scene's name is no input.
+        check_outputs(&[Output::text("--csv", &new)], [new.as_path()]).unwrap();
+    }
+
+    #[test]
+    fn two_outputs_of_one_name_are_refused_before_either_exists() {
+        let folder = tempfile::tempdir().unwrap();
+        let plain = folder.path().join("x.png");
+        let dotted = folder.path().join("./x.png");
+        let pair = [
+            Output::binary("--output", &plain),
+            Output::binary("--image", &dotted),
+        ];
+        assert!(refused(&pair, &[]).contains("the same output twice"));
+        let stdout = Path::new("-");
+        let pair = [
+            Output::text("--csv", stdout),
+            Output::text("--html", stdout),
+        ];
+        assert_eq!(
+            refused(&pair, &[]),
+            "--csv - and --html -: the same output twice"
+        );
+        assert!(!plain.exists());
+    }
+}
