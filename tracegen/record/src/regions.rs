@@ -81,7 +81,9 @@ pub(crate) fn capture_view<C: Capturer>(
             }
             Captured::Overflow { needed } => {
                 // Records are spread unevenly: a quarter more parts than an even spread needs.
-                let parts = (needed.saturating_mul(5) / 4).div_ceil(capacity.max(1)).max(2);
+                let parts = (needed.saturating_mul(5) / 4)
+                    .div_ceil(capacity.max(1))
+                    .max(2);
                 open.extend(split(&rect, parts.min(u64::from(u32::MAX)) as u32));
             }
         }

@@ -172,9 +172,10 @@ impl TileRules {
             expected,
             found: found.to_string(),
         };
-        let groups = self.scales.get(record.draw as usize).ok_or_else(|| {
-            invalid(format!("a draw below {}", self.scales.len()), record.draw)
-        })?;
+        let groups = self
+            .scales
+            .get(record.draw as usize)
+            .ok_or_else(|| invalid(format!("a draw below {}", self.scales.len()), record.draw))?;
         groups.get(usize::from(record.group())).ok_or_else(|| {
             let expected = format!("a group below {} of draw {}", groups.len(), record.draw);
             invalid(expected, record.group().into())

@@ -243,7 +243,10 @@ fn neither_the_order_of_the_records_nor_the_size_of_the_buffer_reaches_the_trace
     let whole = trace(&mut Analytic::new(100_000, false)).unwrap();
     for capacity in [190, 200, 300, 100_000] {
         let mut capturer = Analytic::new(capacity, true);
-        assert!(trace(&mut capturer).unwrap() == whole, "capacity {capacity}");
+        assert!(
+            trace(&mut capturer).unwrap() == whole,
+            "capacity {capacity}"
+        );
     }
 }
 
@@ -255,7 +258,9 @@ fn regions_after_an_overflow_cover_the_view_once() {
     let mut pixels = vec![0; (SIZE_PX[0] * SIZE_PX[1]) as usize];
     for region in &capturer.asked[capturer.asked.len() - complete..] {
         let [left, top] = region.origin_px;
-        for (dx, dy) in (0..region.size_px[1]).flat_map(|y| (0..region.size_px[0]).map(move |x| (x, y))) {
+        for (dx, dy) in
+            (0..region.size_px[1]).flat_map(|y| (0..region.size_px[0]).map(move |x| (x, y)))
+        {
             pixels[((top + dy) * SIZE_PX[0] + left + dx) as usize] += 1;
         }
     }
@@ -264,7 +269,9 @@ fn regions_after_an_overflow_cover_the_view_once() {
 
 #[test]
 fn a_buffer_below_one_tile_is_refused_by_name() {
-    let message = trace(&mut Analytic::new(100, false)).unwrap_err().to_string();
+    let message = trace(&mut Analytic::new(100, false))
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("tile (1, 0) alone needs 18"), "{message}");
 }
 
