@@ -36,6 +36,8 @@ pub(crate) fn clip_from_world(eye: &EyeView) -> Mat4 {
 /// What a backend has done so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
+    /// Regions of views rendered, those that overflowed counted too.
+    pub regions: u64,
     /// Draws of all passes.
     pub draws: u64,
     /// Draw calls that they took.

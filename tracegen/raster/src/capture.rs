@@ -74,6 +74,20 @@ impl CaptureJob<'_> {
         Frame::new(self.draws, lighting, &eyes)
     }
 
+    /// Renders the frame's shadow maps: once for all its pictures.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn light(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<Duration, RasterError> {
+        let start = Instant::now();
+        backend.render_shadows(self.draws, frame)?;
+        Ok(start.elapsed())
+    }
+
     /// Makes the driver compile every shader that the frame's plain and captured pictures use, by
     /// rendering one tile of each, so that neither's time includes it.
     ///

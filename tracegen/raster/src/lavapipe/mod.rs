@@ -225,6 +225,7 @@ impl CaptureBackend for Lavapipe {
             Purpose::Plain
         };
         let plan = self.plan(draws, view.visible, purpose)?;
+        self.work.regions += 1;
         let gpu = &self.gpu;
         let targets = &self.targets;
         let data = ViewData::of_eye(view, targets.capacity);
