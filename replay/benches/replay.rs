@@ -1,8 +1,22 @@
-//! Replay speed on a generated stereo frame: footprints per second by mode and order.
+//! Replay speed on a generated stereo frame, in footprints per second: the stream of lines alone,
+//! and the whole replay by mode and order.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use replay::config::{Mode, Order, RunConfig};
-use replay::engine::synthetic::Synthetic;
+use replay::engine::replay;
+use replay::order::plan;
+use replay::stream::synthetic::Synthetic;
+use replay::stream::{LineSet, MemoryTrace, Stream, interleave};
+
+/// Distinct lines of the trace, without caches.
+fn lines(trace: &MemoryTrace, config: &RunConfig) -> u64 {
+    let mut stream = Stream::new(trace, config).expect("a generated trace streams");
+    let phases = plan(&*config.order.build(config.seed), &trace.tables.passes);
+    let mut touched = LineSet::new(stream.lines());
+    interleave(&mut stream, &phases, config.assign, &mut touched)
+        .expect("a generated trace streams");
+    touched.count()
+}
 
 fn replay_modes(criterion: &mut Criterion) {
     let trace = Synthetic {
@@ -12,19 +26,21 @@ fn replay_modes(criterion: &mut Criterion) {
     .generate();
     let mut group = criterion.benchmark_group("replay");
     group.sample_size(10);
-    for mode in [Mode::Functional, Mode::Timed] {
-        for order in [Order::MORTON, Order::Z2_STA] {
-            let config = RunConfig {
-                mode,
-                order,
-                ..RunConfig::default()
-            };
-            let run =
-                || replay::engine::replay(&trace, &config).expect("a generated trace replays");
-            group.throughput(Throughput::Elements(run().footprints));
-            group.bench_function(format!("{mode:?} {}", order.name()), |bencher| {
-                bencher.iter(run)
-            });
+    for order in [Order::MORTON, Order::Z2_STA] {
+        let config = |mode| RunConfig {
+            mode,
+            order,
+            ..RunConfig::default()
+        };
+        let [functional, timed] = [Mode::Functional, Mode::Timed].map(config);
+        let run = |config| replay(&trace, config).expect("a generated trace replays");
+        group.throughput(Throughput::Elements(run(&functional).footprints));
+        group.bench_function(format!("lines {}", order.name()), |bencher| {
+            bencher.iter(|| lines(&trace, &functional));
+        });
+        for config in [&functional, &timed] {
+            let name = format!("{:?} {}", config.mode, order.name());
+            group.bench_function(name, |bencher| bencher.iter(|| run(config)));
         }
     }
     group.finish();

@@ -1,18 +1,20 @@
 //! Trace to answer: replays texture traces through caches and a texture unit in any tile order,
 //! and ray traces through a model of a mobile ray-tracing GPU.
 
-pub mod cache;
+mod cache;
 pub mod cli;
 pub mod config;
 pub mod engine;
+pub mod experiment;
+pub mod files;
 pub mod image;
 pub mod order;
-pub mod palette;
+mod palette;
 pub mod paper;
-pub mod registry;
+mod registry;
 pub mod report;
 pub mod result;
 pub mod sgrt;
 pub mod size;
-pub mod sweep;
-pub mod tmu;
+pub mod stream;
+mod tmu;

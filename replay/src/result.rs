@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Program and version, recorded with every result.
+pub const TOOL: &str = concat!("replay ", env!("CARGO_PKG_VERSION"));
+
 /// Schema of the object that `replay run --json` prints.
 pub const RUN_SCHEMA: &str = "replay.run/1";
 
@@ -125,4 +128,40 @@ pub struct TraceId {
     pub scene: String,
     /// CRC-32 of the whole file, 8 hex digits.
     pub checksum: String,
+}
+
+/// The short name of a scene that a trace records by name or by path.
+///
+/// A file goes by its name without folder and extension, or by its folder's where that says more:
+/// `crytek-sponza` for `scenes/crytek-sponza/sponza.gltf`.
+#[must_use]
+pub fn scene_name(scene: &str) -> &str {
+    let mut parts = scene.trim_end_matches(['/', '\\']).rsplit(['/', '\\']);
+    let file = parts.next().unwrap_or(scene);
+    let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
+    let says_more = |folder: &&str| folder.contains(stem) || stem == "scene";
+    let folder = parts.next().filter(|f| !matches!(*f, "" | "." | ".."));
+    folder.filter(says_more).unwrap_or(stem)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_named_by_its_stem_unless_its_folder_says_more() {
+        for (scene, name) in [
+            ("atrium-plain", "atrium-plain"),
+            ("../scenes/crytek-sponza/sponza.gltf", "crytek-sponza"),
+            ("scenes\\dabrovic-sponza\\sponza.obj", "dabrovic-sponza"),
+            ("downloads/red-car/scene.gltf", "red-car"),
+            ("scenes/teapot.obj", "teapot"),
+            ("scenes/bmw27/bmw_55k.gltf", "bmw_55k"),
+            ("../sponza.gltf", "sponza"),
+            ("scene.gltf", "scene"),
+            ("a.b.glb", "a.b"),
+        ] {
+            assert_eq!(scene_name(scene), name, "{scene}");
+        }
+    }
 }

@@ -28,7 +28,10 @@ pub fn program(name: &str) -> Command {
         "{} is not built: run `make test`, or `cargo build --release` first",
         path.display()
     );
-    Command::new(path)
+    let mut command = Command::new(path);
+    // What a test sees does not hang on what earlier runs have kept.
+    command.env("PARALLAX_CACHE_SIZE", "0");
+    command
 }
 
 /// Runs a command and returns its output; panics with its standard error unless it exits 0.

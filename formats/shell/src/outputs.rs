@@ -35,6 +35,12 @@ impl Output {
         }
     }
 
+    /// Where it goes.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     fn named(&self) -> String {
         format!("{} {}", self.flag, self.path.display())
     }

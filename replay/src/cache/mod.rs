@@ -53,7 +53,7 @@ pub struct PolicyRow {
 pub(crate) type WaysRule = (&'static str, fn(u32) -> bool);
 
 /// Ways are counted in a byte.
-const ANY_WAYS: WaysRule = ("1 to 255", |ways| 1 <= ways && ways <= 255);
+const ANY_WAYS: WaysRule = ("1 to 255", |ways| (1..=255).contains(&ways));
 
 const fn row(
     name: &'static str,

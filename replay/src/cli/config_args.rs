@@ -4,17 +4,41 @@ use crate::config::{
     Assign, BlockOrder, FilterOverride, LodFormula, Mode, Order, Replacement, RunConfig,
     TextureOrder,
 };
-use crate::size::parse_bytes;
-use anyhow::{Context, Result, anyhow};
+use crate::size::{format_bytes, parse_bytes};
+use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 use formats::texture::TexelFormat;
 use serde::de::value::Error as ValueError;
 use serde::de::{DeserializeOwned, IntoDeserializer};
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 /// Reads an enum of the formats crate by its serialised name.
 fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     T::deserialize(text.into_deserializer()).map_err(|e: ValueError| e.to_string())
+}
+
+/// More than this is no file of settings.
+const LONGEST_TOML_BYTES: u64 = 4 << 20;
+
+/// Reads a file of settings.
+///
+/// # Errors
+/// The file cannot be read, is too long or is no text; the message names it.
+pub fn read_toml(path: &Path) -> Result<String> {
+    let mut text = String::new();
+    let file = File::open(path).with_context(|| path.display().to_string())?;
+    file.take(LONGEST_TOML_BYTES + 1)
+        .read_to_string(&mut text)
+        .with_context(|| path.display().to_string())?;
+    ensure!(
+        text.len() as u64 <= LONGEST_TOML_BYTES,
+        "{}: expected at most {} of TOML, found more",
+        path.display(),
+        format_bytes(LONGEST_TOML_BYTES)
+    );
+    Ok(text)
 }
 
 /// Flags of the replay configuration.
@@ -130,16 +154,18 @@ impl ConfigArgs {
     pub fn resolve(&self) -> Result<RunConfig> {
         let mut config = match &self.config {
             None => RunConfig::default(),
-            Some(path) => {
-                let text =
-                    std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-                toml::from_str(&text)
-                    .map_err(|e| anyhow!("{}: {}", path.display(), e.to_string().trim()))?
-            }
+            Some(path) => toml::from_str(&read_toml(path)?)
+                .map_err(|e| anyhow!("{}: {}", path.display(), e.to_string().trim()))?,
         };
         self.apply(&mut config)?;
         config.validate()?;
         Ok(config)
+    }
+
+    /// The file of `--config`.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        self.config.as_deref()
     }
 
     /// Puts the flags over a configuration.

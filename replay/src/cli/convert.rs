@@ -3,8 +3,8 @@
 use super::ConfigArgs;
 use super::trace_file::tiles;
 use crate::config::RunConfig;
-use crate::engine::Feed;
 use crate::order;
+use crate::stream::Feed;
 use anyhow::{Context, Result, bail};
 use formats::container::AtomicFile;
 use formats::interop::{

@@ -137,9 +137,9 @@ fn located(pass: u32, index: u32, tile: &Tile) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::cli::testing::file_of;
-    use crate::engine::synthetic::Synthetic;
+    use crate::stream::synthetic::Synthetic;
 
-    fn compare(change: impl FnOnce(&mut crate::engine::MemoryTrace)) -> Option<String> {
+    fn compare(change: impl FnOnce(&mut crate::stream::MemoryTrace)) -> Option<String> {
         let mut memory = Synthetic::default().generate();
         let left = file_of(&memory);
         change(&mut memory);

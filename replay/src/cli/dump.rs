@@ -83,7 +83,7 @@ fn dump(trace: &Textrace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
 mod tests {
     use super::*;
     use crate::cli::testing::{file_of, lines};
-    use crate::engine::synthetic::Synthetic;
+    use crate::stream::synthetic::Synthetic;
 
     #[test]
     fn a_dump_holds_every_record_of_the_chosen_tiles() {

@@ -1,16 +1,18 @@
 //! Arguments that `replay paper` and `replay report` share: what to vary, and what to write.
 
 use super::ConfigArgs;
+use super::subjects::Traces;
 use crate::config::{Order, RunConfig};
-use crate::paper::{Z2_CACHES_KIB, Z2_ORDERS, Z2_SCENES};
-use crate::report::files::write_atomically;
+use crate::experiment::{self, Plan, Subject};
+use crate::files::{self, write_atomically};
+use crate::paper::{self, z2};
 use crate::report::picture::Picture;
-use crate::report::z2::experiment::{Plan, Subject, labels, twin_of};
 use crate::report::z2::model::PaperReport;
-use crate::report::z2::{page, tables};
+use crate::report::z2::page;
 use anyhow::{Context, Result, bail, ensure};
-use shell::Progress;
+use shell::{Output, Progress, is_stdout};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 /// Arguments of the Z2 paper's experiment.
 #[derive(Debug, clap::Args)]
@@ -32,7 +34,7 @@ pub struct ExperimentArgs {
     caches: String,
     /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
     #[arg(long = "as", value_name = "SCENE")]
-    twins: Vec<String>,
+    stand_ins: Vec<String>,
     /// Picture of both eyes for the page, LABEL=FILE (or FILE for a single trace)
     #[arg(long = "image", value_name = "LABEL=FILE")]
     images: Vec<String>,
@@ -41,11 +43,18 @@ pub struct ExperimentArgs {
 }
 
 impl ExperimentArgs {
-    /// Replays every point. Progress goes to stderr.
+    /// Replays every point and hands the report to `print`; exit code 1 when the orders replayed
+    /// different accesses. The `outputs` that will be written are checked first.
     ///
     /// # Errors
-    /// Wrong arguments, an unreadable trace.
-    pub fn run(&self, functional: bool, tile_maps: bool) -> Result<PaperReport> {
+    /// Wrong arguments, an unreadable trace, an output that cannot be written, what `print` says.
+    pub fn run(
+        &self,
+        outputs: &[Output],
+        functional: bool,
+        tile_maps: bool,
+        print: impl FnOnce(&PaperReport) -> Result<()>,
+    ) -> Result<ExitCode> {
         self.threads.start()?;
         let base = self.machine.resolve()?;
         let usual = RunConfig::default();
@@ -57,39 +66,51 @@ impl ExperimentArgs {
             (base.l1.size_bytes, base.l2.size_bytes) == (usual.l1.size_bytes, usual.l2.size_bytes),
             "--l1 and --l2 are varied here; use --caches"
         );
-        let plan = Plan {
-            base,
-            caches_bytes: parse_caches(&self.caches)?,
-            orders: parse_orders(&self.orders)?,
-            functional,
-            tile_maps,
-        };
-        let opened = self
-            .traces
-            .iter()
-            .map(|path| super::open_textrace(path))
-            .collect::<Result<Vec<_>>>()?;
-        let names = labels(
-            &opened
-                .iter()
-                .map(|(t, id)| (t.tables(), id))
-                .collect::<Vec<_>>(),
-        );
-        let subjects: Vec<Subject> = opened
-            .iter()
-            .zip(names)
-            .map(|((trace, id), label)| {
-                Ok(Subject {
-                    source: trace,
-                    id: id.clone(),
-                    twin: twin(&self.twins, &label)?.unwrap_or_else(|| twin_of(trace.tables())),
-                    label,
-                })
-            })
-            .collect::<Result<_>>()?;
-        let replays = plan.replays(subjects.len()) as u64;
-        let progress = Progress::new("replaying", replays, "replays");
-        Ok(plan.run(&subjects, &|| progress.advance(1))?)
+        let images = self.images.iter().map(|image| {
+            let file = image
+                .split_once('=')
+                .map_or(image.as_str(), |(_, file)| file);
+            Path::new(file)
+        });
+        let traces = self.traces.iter().map(PathBuf::as_path);
+        files::check_outputs(outputs, traces.chain(images).chain(self.machine.file()))?;
+        let caches = parse_caches(&self.caches)?;
+        let mut plan = Plan::paper(base, &caches, &parse_orders(&self.orders)?, functional)?;
+        if tile_maps {
+            plan = plan.with_tile_maps();
+        }
+        let traces = Traces::open(&self.traces)?;
+        let mut subjects = traces.subjects();
+        self.choose_stand_ins(&mut subjects)?;
+        let replays = subjects.len() * plan.points.len();
+        let progress = Progress::new("replaying", replays as u64, "replays");
+        let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
+        drop(progress);
+        let report = PaperReport::new(&outcome);
+        print(&report)?;
+        if let Some(problem) = report.not_conserved() {
+            shell::error(&problem);
+            return Ok(ExitCode::FAILURE);
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Sets what `--as` says over what follows from the scenes' names.
+    fn choose_stand_ins(&self, subjects: &mut [Subject]) -> Result<()> {
+        let labels: Vec<String> = subjects.iter().map(|s| s.label.clone()).collect();
+        for (label, _) in self.stand_ins.iter().filter_map(|s| s.rsplit_once('=')) {
+            ensure!(
+                labels.iter().any(|known| known == label),
+                "--as: expected one of {}, found `{label}`",
+                labels.join(", ")
+            );
+        }
+        for subject in subjects {
+            if let Some(scene) = paper::asked(&self.stand_ins, &subject.label, &z2::SCENES)? {
+                subject.stand_in_for = scene;
+            }
+        }
+        Ok(())
     }
 
     /// The pictures that were asked for, each with its trace's label.
@@ -120,43 +141,35 @@ impl ExperimentArgs {
     }
 }
 
+/// The page at `path`, and JSON and CSV with the same numbers beside it; a page that goes to
+/// standard output goes alone.
+#[must_use]
+pub fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
+    let mut outputs = vec![Output::text(flag, path)];
+    if !is_stdout(path) {
+        outputs.extend(["json", "csv"].map(|e| Output::text(flag, &path.with_extension(e))));
+    }
+    outputs
+}
+
 /// Writes the page, and the same numbers beside it as JSON and CSV.
 ///
 /// # Errors
 /// A plot that cannot be drawn, a file that cannot be written.
 pub fn write_page(report: &PaperReport, pictures: &[Picture], path: &Path) -> Result<()> {
     let html = page::page(report, pictures)?;
-    let mut json = serde_json::to_vec(report).context("report as JSON")?;
-    json.push(b'\n');
-    write_atomically(&path.with_extension("json"), &json)?;
-    write_atomically(&path.with_extension("csv"), tables::csv(report).as_bytes())?;
-    write_atomically(path, html.as_bytes())
-}
-
-/// Names the traces whose orders replayed different accesses; `Ok` when there are none.
-///
-/// # Errors
-/// The differing runs.
-pub fn check_conservation(report: &PaperReport) -> std::result::Result<(), String> {
-    let wrong: Vec<String> = report
-        .conservation
-        .iter()
-        .filter(|c| !c.differing.is_empty())
-        .map(|c| format!("{}: {}", c.scene, c.differing.join(", ")))
-        .collect();
-    if wrong.is_empty() {
-        return Ok(());
+    if !is_stdout(path) {
+        let json = report.json()? + "\n";
+        write_atomically(&path.with_extension("json"), json.as_bytes())?;
+        write_atomically(&path.with_extension("csv"), report.csv().as_bytes())?;
     }
-    Err(format!(
-        "orders replayed different accesses: {}",
-        wrong.join("; ")
-    ))
+    write_atomically(path, html.as_bytes())
 }
 
 fn parse_orders(text: &str) -> Result<Vec<Order>> {
     if text == "all" {
-        let others = Order::all().filter(|o| !Z2_ORDERS.contains(o));
-        return Ok(Z2_ORDERS.into_iter().chain(others).collect());
+        let others = Order::all().filter(|o| !z2::ORDERS.contains(o));
+        return Ok(z2::ORDERS.into_iter().chain(others).collect());
     }
     let mut orders = Vec::new();
     for name in text.split(',').map(str::trim) {
@@ -188,30 +201,13 @@ fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
                 .split_once('/')
                 .and_then(|(l1, l2)| Some((kib(l1)? << 10, kib(l2)? << 10)));
             sizes.with_context(|| {
-                let usual = Z2_CACHES_KIB.map(|(l1, l2)| format!("{l1}/{l2}")).join(",");
+                let usual = z2::CACHES_KIB
+                    .map(|(l1, l2)| format!("{l1}/{l2}"))
+                    .join(",");
                 format!("--caches: expected L1/L2 in KiB as in {usual}, found `{pair}`")
             })
         })
         .collect()
-}
-
-/// The twin that the arguments give to a label: `None` leaves it to the scene's name.
-fn twin(twins: &[String], label: &str) -> Result<Option<Option<String>>> {
-    let mut found = None;
-    for entry in twins {
-        let (name, scene) = entry
-            .rsplit_once('=')
-            .map_or((None, entry.as_str()), |(n, s)| (Some(n), s));
-        ensure!(
-            scene == "none" || Z2_SCENES.contains(&scene),
-            "--as: expected none or one of {}, found `{scene}`",
-            Z2_SCENES.join(", ")
-        );
-        if name.is_none_or(|n| n == label) {
-            found = Some((scene != "none").then(|| scene.to_owned()));
-        }
-    }
-    Ok(found)
 }
 
 #[cfg(test)]
@@ -221,7 +217,7 @@ mod tests {
     #[test]
     fn all_orders_begin_with_the_papers() {
         let orders = parse_orders("all").unwrap();
-        assert_eq!(orders[..3], Z2_ORDERS);
+        assert_eq!(orders[..3], z2::ORDERS);
         assert_eq!(orders.len(), Order::all().len());
     }
 
@@ -246,23 +242,6 @@ mod tests {
         assert_eq!(
             parse_caches("8-128").unwrap_err().to_string(),
             "--caches: expected L1/L2 in KiB as in 8/128,16/128,8/256,16/256, found `8-128`"
-        );
-    }
-
-    #[test]
-    fn a_twin_can_be_given_for_one_label_or_for_all() {
-        let twins = ["crytek-sponza".to_owned(), "b=none".to_owned()];
-        assert_eq!(
-            twin(&twins, "a").unwrap(),
-            Some(Some("crytek-sponza".to_owned()))
-        );
-        assert_eq!(twin(&twins, "b").unwrap(), Some(None));
-        assert_eq!(twin(&[], "a").unwrap(), None);
-        assert!(
-            twin(&["x".to_owned()], "a")
-                .unwrap_err()
-                .to_string()
-                .starts_with("--as: expected none or one of")
         );
     }
 }

@@ -249,7 +249,7 @@ fn ray_text(trace: &Raytrace) -> String {
 mod tests {
     use super::*;
     use crate::cli::testing::file_of;
-    use crate::engine::synthetic::Synthetic;
+    use crate::stream::synthetic::Synthetic;
 
     #[test]
     fn totals_are_the_sums_over_the_trace() {

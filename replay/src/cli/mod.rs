@@ -10,6 +10,7 @@ mod paper;
 mod report;
 mod reproject;
 mod run;
+mod subjects;
 mod sweep;
 #[cfg(test)]
 mod testing;

@@ -1,10 +1,11 @@
 //! `replay paper`: the Z2 paper's experiment as a table.
 
-use super::experiment_args::{ExperimentArgs, check_conservation, write_page};
-use crate::report::files::write_atomically;
+use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
+use crate::files::write_atomically;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::tables;
 use anyhow::Result;
+use shell::Output;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -38,25 +39,28 @@ pub struct Args {
 /// # Errors
 /// Wrong arguments, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let report = args
-        .experiment
-        .run(args.functional || args.html.is_some(), args.html.is_some())?;
-    if let Some(path) = &args.csv {
-        write_atomically(path, tables::csv(&report).as_bytes())?;
-    }
-    if let Some(path) = &args.html {
-        write_page(&report, &args.experiment.pictures(&report)?, path)?;
-    }
-    super::print(&if args.json {
-        serde_json::to_string(&report)?
-    } else {
-        text(&report)
-    })?;
-    if let Err(problem) = check_conservation(&report) {
-        shell::error(&problem);
-        return Ok(ExitCode::FAILURE);
-    }
-    Ok(ExitCode::SUCCESS)
+    let page = args.html.is_some();
+    let mut outputs: Vec<Output> = Vec::new();
+    outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
+    outputs.extend(
+        args.html
+            .iter()
+            .flat_map(|path| page_outputs("--html", path)),
+    );
+    let functional = args.functional || page;
+    args.experiment.run(&outputs, functional, page, |report| {
+        if let Some(path) = &args.csv {
+            write_atomically(path, report.csv().as_bytes())?;
+        }
+        if let Some(path) = &args.html {
+            write_page(report, &args.experiment.pictures(report)?, path)?;
+        }
+        super::print(&if args.json {
+            report.json()?
+        } else {
+            text(report)
+        })
+    })
 }
 
 /// The tables for a terminal.
@@ -64,8 +68,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 pub fn text(report: &PaperReport) -> String {
     let mut text = tables::table_2(report).text();
     let _ = write!(text, "\n{}", tables::averages(&report.averages).text());
-    if report.rows.iter().any(|r| r.functional.is_some()) {
-        let _ = write!(text, "\n{}", tables::modes(&report.rows).text());
+    if let Some(modes) = tables::modes(report) {
+        let _ = write!(text, "\n{}", modes.text());
     }
     let fit = &report.closed_form;
     if fit.rows > 0 {

@@ -1,7 +1,8 @@
 //! `replay report`: the Z2 paper's experiment as a page.
 
-use super::experiment_args::{ExperimentArgs, check_conservation, write_page};
+use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
 use anyhow::Result;
+use shell::is_stdout;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -24,12 +25,12 @@ pub struct Args {
 /// # Errors
 /// Wrong arguments, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let report = args.experiment.run(true, true)?;
-    write_page(&report, &args.experiment.pictures(&report)?, &args.output)?;
-    super::print(&args.output.display().to_string())?;
-    if let Err(problem) = check_conservation(&report) {
-        shell::error(&problem);
-        return Ok(ExitCode::FAILURE);
-    }
-    Ok(ExitCode::SUCCESS)
+    let outputs = page_outputs("--output", &args.output);
+    args.experiment.run(&outputs, true, true, |report| {
+        write_page(report, &args.experiment.pictures(report)?, &args.output)?;
+        if !is_stdout(&args.output) {
+            super::print(&args.output.display().to_string())?;
+        }
+        Ok(())
+    })
 }

@@ -1,8 +1,8 @@
 //! `replay reproject`: ray traces through the model of a ray-tracing GPU that reuses the left
 //! image for the right one.
 
+use crate::files::write_atomically;
 use crate::image::{Picture, png};
-use crate::report::files::write_atomically;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
 use crate::result::TraceId;
 use crate::sgrt::analyse::{Analysed, Analysis, curve_rules};

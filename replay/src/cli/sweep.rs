@@ -1,10 +1,12 @@
 //! `replay sweep`: the points of an experiment file.
 
-use crate::report::files::write_atomically;
-use crate::report::z2::experiment::{Subject, labels, twin_of};
-use crate::sweep::{self, Experiment, Store, SweepReport};
+use super::config_args::read_toml;
+use super::subjects::Traces;
+use crate::experiment::{self, ExperimentFile, Point, Store};
+use crate::files::{self, write_atomically};
+use crate::report::sweep::SweepReport;
 use anyhow::{Context, Result, ensure};
-use shell::Progress;
+use shell::{Output, Progress};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -39,82 +41,64 @@ pub struct Args {
 /// A bad experiment file, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.threads.start()?;
-    let file = args.experiment.display();
-    let text = std::fs::read_to_string(&args.experiment).with_context(|| file.to_string())?;
-    let experiment = Experiment::parse(&text).with_context(|| file.to_string())?;
-    let points = experiment.points().with_context(|| file.to_string())?;
+    let name = args.experiment.display();
+    let file = ExperimentFile::parse(&read_toml(&args.experiment)?);
+    let file = file.with_context(|| name.to_string())?;
+    let plan = file.plan().with_context(|| name.to_string())?;
     if args.plan {
-        let titles: Vec<String> = points.iter().map(sweep::Point::title).collect();
+        let titles: Vec<String> = plan.points.iter().map(Point::title).collect();
         super::print(&titles.join("\n"))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let paths = trace_paths(args, &experiment);
+    let paths = trace_paths(args, &file);
     ensure!(
         !paths.is_empty(),
-        "{file}: no traces: name them in `traces` or on the command line"
+        "{name}: no traces: name them in `traces` or on the command line"
     );
-    let opened = paths
-        .iter()
-        .map(|p| super::open_textrace(p))
-        .collect::<Result<Vec<_>>>()?;
-    let names = labels(
-        &opened
-            .iter()
-            .map(|(t, id)| (t.tables(), id))
-            .collect::<Vec<_>>(),
-    );
-    let subjects: Vec<Subject> = opened
-        .iter()
-        .zip(names)
-        .map(|((trace, id), label)| Subject {
-            source: trace,
-            id: id.clone(),
-            twin: twin_of(trace.tables()),
-            label,
-        })
-        .collect();
-
-    let name = args
-        .experiment
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy();
+    let stem = args.experiment.file_stem().unwrap_or_default();
     let out = args
         .out
         .clone()
-        .unwrap_or_else(|| Path::new("out").join(&*name));
-    let total = subjects.len() * points.len();
-    let progress = Progress::new("replaying", total as u64, "points");
-    let outcome = sweep::run(&subjects, &points, &Store::new(&out), &|| {
-        progress.advance(1);
-    })?;
+        .unwrap_or_else(|| Path::new("out").join(stem));
+    let outputs = ["results.json", "results.csv", "report.html"].map(|name| out.join(name));
+    let inputs = paths.iter().chain([&args.experiment]).map(PathBuf::as_path);
+    let checked = outputs.each_ref().map(|path| Output::text("--out", path));
+    files::check_outputs(&checked, inputs)?;
+    let traces = Traces::open(&paths)?;
+    let subjects = traces.subjects();
+
+    let points = subjects.len() * plan.points.len();
+    let progress = Progress::new("replaying", points as u64, "points");
+    let store = Store::new(&out);
+    let done = |done| progress.advance(done);
+    let outcome = experiment::run(&plan, &subjects, Some(&store), &done)?;
     drop(progress);
     shell::note(&format!(
-        "{} points computed, {} taken from {}",
-        outcome.computed,
-        total - outcome.computed,
+        "{points} points: {} replayed, the others taken from {} or equal to one of these",
+        outcome.replays,
         out.display()
     ));
 
-    let report = SweepReport::new(&experiment, &subjects, &points, &outcome);
-    let json = serde_json::to_string(&report)?;
-    write_atomically(&out.join("results.json"), format!("{json}\n").as_bytes())?;
-    write_atomically(&out.join("results.csv"), sweep::csv(&report).as_bytes())?;
-    let page = sweep::page(&format!("Parallax sweep: {name}"), &report)?;
-    write_atomically(&out.join("report.html"), page.as_bytes())?;
+    let report = SweepReport::new(&file, &outcome);
+    let json = report.json()?;
+    let page = report.page(&format!("Parallax sweep: {}", stem.to_string_lossy()))?;
+    let contents = [format!("{json}\n"), report.csv(), page];
+    for (path, text) in outputs.iter().zip(contents) {
+        write_atomically(path, text.as_bytes())?;
+    }
     super::print(&if args.json {
         json
     } else {
-        sweep::table(&report).text()
+        report.table().text()
     })?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// The command line's traces, or the file's, which are relative to it.
-fn trace_paths(args: &Args, experiment: &Experiment) -> Vec<PathBuf> {
+fn trace_paths(args: &Args, file: &ExperimentFile) -> Vec<PathBuf> {
     if !args.traces.is_empty() {
         return args.traces.clone();
     }
     let folder = args.experiment.parent().unwrap_or(Path::new(""));
-    experiment.traces.iter().map(|t| folder.join(t)).collect()
+    file.traces.iter().map(|t| folder.join(t)).collect()
 }

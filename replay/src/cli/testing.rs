@@ -1,6 +1,6 @@
 //! What the subcommands' tests share.
 
-use crate::engine::MemoryTrace;
+use crate::stream::MemoryTrace;
 use formats::textrace::TextraceWriter;
 use std::io::Write;
 use tempfile::NamedTempFile;

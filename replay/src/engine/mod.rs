@@ -1,27 +1,20 @@
-//! Replays a trace: order, footprints, caches, texture unit, counters.
+//! Wires order, stream, caches and texture unit: replays a trace under a configuration.
 
-mod feed;
-mod footprint;
+mod counts;
 mod functional;
-mod source;
-pub mod synthetic;
-mod tally;
-#[cfg(test)]
-mod testing;
+mod summary;
 #[cfg(test)]
 mod tests;
 mod timed;
-
-pub use feed::{Feed, Quad};
-pub use source::{MemoryTrace, TileSource};
 
 use crate::cache::{Cache, Levels};
 use crate::config::{ConfigError, Mode, RunConfig};
 use crate::order;
 use crate::result::RunResult;
-use footprint::Footprints;
+use crate::stream::{Stream, StreamError, TileSource, interleave};
+use counts::CacheCounts;
 use functional::Functional;
-use tally::Tally;
+use summary::summary;
 use thiserror::Error;
 use timed::Timed;
 
@@ -31,22 +24,9 @@ pub enum ReplayError {
     /// The configuration is impossible.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The trace file is damaged.
+    /// The trace cannot be read.
     #[error(transparent)]
-    Format(#[from] formats::FormatError),
-    /// A tile cannot be replayed.
-    #[error("pass {pass} tile {tile}: {message}")]
-    Trace {
-        /// Pass index.
-        pass: u32,
-        /// Tile index.
-        tile: u32,
-        /// What is wrong there.
-        message: String,
-    },
-    /// The trace's tables contradict each other.
-    #[error("trace tables: {0}")]
-    Tables(String),
+    Trace(#[from] StreamError),
 }
 
 /// Replays `trace` under `config`.
@@ -71,23 +51,25 @@ fn run<S: TileSource + ?Sized, C: Cache>(
     levels: Levels<C>,
 ) -> Result<RunResult, ReplayError> {
     let tables = trace.tables();
-    let footprints = Footprints::new(tables, config)?;
-    let order = config.order.build(config.seed);
-    let phases = order::plan(&*order, &tables.passes);
-    let tally = Tally::new(tables, footprints.lines(), config.tile_maps);
-    match config.mode {
+    let mut stream = Stream::new(trace, config)?;
+    let phases = order::plan(&*config.order.build(config.seed), &tables.passes);
+    let counts = CacheCounts::new(&stream.bins, stream.lines());
+    let (misses, tmu, cycles) = match config.mode {
         Mode::Functional => {
-            let machine = Functional::new(trace, &footprints, levels.l1, levels.l2, tally);
-            let tally = machine.run(&phases, config.assign)?;
-            Ok(tally.finish(tables, config.line_bytes))
+            let mut caches = Functional::new(levels, counts);
+            interleave(&mut stream, &phases, config.assign, &mut caches)?;
+            (caches.counts, None, None)
         }
         Mode::Timed => {
-            let outcome =
-                Timed::new(trace, &footprints, config, levels.l1, levels.l2, tally).run(&phases)?;
-            let mut result = outcome.tally.finish(tables, config.line_bytes);
-            result.tmu = Some(outcome.tmu);
-            result.cycles = Some(outcome.cycles);
-            Ok(result)
+            let machine = Timed::new(levels, config.tmu, counts);
+            let outcome = machine.run(&mut stream, &phases, config.assign)?;
+            (outcome.counts, Some(outcome.tmu), Some(outcome.cycles))
         }
-    }
+    };
+    let (bins, accesses) = (&stream.bins, &stream.counts);
+    Ok(RunResult {
+        tmu,
+        cycles,
+        ..summary(tables, bins, accesses, &misses, config.line_bytes)
+    })
 }

@@ -1,9 +1,10 @@
-use super::synthetic::Synthetic;
 use super::*;
 use crate::cache::AnyCache;
 use crate::config::{Assign, CacheConfig, Order};
 use crate::order::WorkItem;
 use crate::result::LevelCounters;
+use crate::stream::synthetic::Synthetic;
+use crate::stream::{Bins, Consumer, LineSet, Lines, MemoryTrace, testing};
 use formats::footprint::record_footprints;
 use formats::layout::Layout;
 use std::collections::{HashMap, HashSet};
@@ -334,4 +335,102 @@ fn a_trace_without_textures_has_no_footprints() {
         assert_eq!((result.footprints, result.l1.miss_rate), (0, 0.0));
         assert!(result.quads > 0);
     }
+}
+
+/// A footprint as it was sent: core, cell and lines.
+type Sent = (usize, usize, Vec<u32>);
+
+/// Keeps the stream as it comes.
+#[derive(Default)]
+struct Recorder {
+    core: usize,
+    sent: Vec<Sent>,
+}
+
+impl Consumer for Recorder {
+    fn quad(&mut self, core: usize, _tile: usize) {
+        self.core = core;
+    }
+
+    fn footprint(&mut self, cell: usize, lines: Lines<'_>) -> bool {
+        self.sent.push((self.core, cell, lines.iter().collect()));
+        false
+    }
+}
+
+fn sent_to<C: Consumer>(trace: &MemoryTrace, config: &RunConfig, consumer: &mut C) {
+    let mut stream = Stream::new(trace, config).unwrap();
+    let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
+    interleave(&mut stream, &phases, config.assign, consumer).unwrap();
+}
+
+#[test]
+fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
+    let trace = small();
+    for assign in [Assign::FirstIdle, Assign::Static] {
+        for order in Order::all() {
+            let config = RunConfig {
+                assign,
+                cores: 3,
+                ..functional(order)
+            };
+            let mut recorder = Recorder::default();
+            sent_to(&trace, &config, &mut recorder);
+            let mut l1: Vec<TwinCache> = (0..3).map(|_| TwinCache::new(&config.l1)).collect();
+            let mut l2 = TwinCache::new(&config.l2);
+            let (mut l1_lines, mut l2_lines) = (0, 0);
+            for (core, _, lines) in &recorder.sent {
+                for &line in lines {
+                    if !l1[*core].access(line.into()) {
+                        l1_lines += 1;
+                        l2_lines += u64::from(!l2.access(line.into()));
+                    }
+                }
+            }
+            let result = replay(&trace, &config).unwrap();
+            assert_eq!(recorder.sent.len() as u64, result.footprints);
+            assert_eq!((result.l1.misses, result.l2.misses), (l1_lines, l2_lines));
+        }
+    }
+}
+
+#[test]
+fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
+    let trace = small();
+    let mut touched = LineSet::new(1 << 24);
+    sent_to(&trace, &functional(Order::SCANLINE), &mut touched);
+    assert!(touched.count() > 0);
+    for mode in [Mode::Functional, Mode::Timed] {
+        for l1 in [64, 1 << 10, 1 << 20] {
+            let config = RunConfig {
+                mode,
+                l1: CacheConfig::lru(l1),
+                ..functional(Order::Z2_STA)
+            };
+            let result = replay(&trace, &config).unwrap();
+            assert_eq!(result.unique_lines, touched.count());
+        }
+    }
+}
+
+#[test]
+fn caches_take_lines_that_no_trace_sent() {
+    let config = functional(Order::MORTON);
+    let bins = Bins::new(&testing::tables(&[[64, 64]]), false);
+    let levels = Levels::build(&config).unwrap().all_four_way().ok().unwrap();
+    let mut caches = Functional::new(levels, CacheCounts::new(&bins, 1 << 16));
+    let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
+    let (mut l1_lines, mut l2_lines) = (0, 0);
+    caches.quad(0, 0);
+    for step in 0..10_000_u64 {
+        let line = step * step % 1009 + step % 7;
+        caches.footprint(0, Lines::new(0, &[line as u32]));
+        if !l1.access(line) {
+            l1_lines += 1;
+            l2_lines += u64::from(!l2.access(line));
+        }
+    }
+    let counted = &caches.counts.cells[0];
+    assert_eq!((counted.l1.lines, counted.l2.lines), (l1_lines, l2_lines));
+    assert!(l1_lines > l2_lines && l2_lines > 1009);
 }

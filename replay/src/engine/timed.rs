@@ -1,87 +1,96 @@
 //! Timed replay: each core's texture unit runs on its own cycle clock, and the clocks decide in
 //! which order the cores' misses reach the shared L2.
 
-use super::feed::Feed;
-use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
-use super::tally::{Place, Tally, access_hash};
-use super::{ReplayError, TileSource};
-use crate::cache::{Cache, InFlight};
-use crate::config::{Assign, RunConfig};
+use super::counts::{CacheCounts, FootprintMisses};
+use crate::cache::{Cache, InFlight, Levels};
+use crate::config::{Assign, TmuConfig};
 use crate::order::{Phase, WorkItem};
 use crate::result::TmuResult;
+use crate::stream::{Consumer, Lines, Stream, StreamError, TileSource};
 use crate::tmu::{Pipeline, PipelineStats, Turn};
 
-/// A core: its texture unit, its L1 and what it works on.
-struct Core<A> {
-    pipeline: Pipeline,
-    l1: A,
+/// A cache and what is on its way into it.
+struct Level<C> {
+    cache: C,
     in_flight: InFlight,
-    /// The current thread's missing footprints, see `Pipeline::start`.
+}
+
+impl<C: Cache> Level<C> {
+    fn new(cache: C) -> Self {
+        Self {
+            cache,
+            in_flight: InFlight::default(),
+        }
+    }
+
+    #[inline]
+    fn arrive(&mut self, now: u64) {
+        self.in_flight.arrive(now, &mut self.cache);
+    }
+
+    /// Fills a line at once, or when it arrives.
+    #[inline]
+    fn enter(&mut self, line: u32, now: u64, arrival: u64) {
+        if arrival <= now {
+            self.cache.fill(line);
+        } else {
+            self.in_flight.request(line, arrival);
+        }
+    }
+}
+
+/// The caches as a texture unit sees them: a thread's first trip looks up every footprint's tags,
+/// and what is missing is fetched.
+struct Memory<C> {
+    l1: Vec<Level<C>>,
+    l2: Level<C>,
+    tmu: TmuConfig,
+    counts: CacheCounts,
+    /// The current thread's core, tile and cycle.
+    core: usize,
+    tile: usize,
+    now: u64,
+    /// For each of its footprints that misses, when the last of its lines arrives.
     pending: Vec<u64>,
-    feed: Feed,
-    busy: bool,
+    /// Lines that it had to ask for.
+    fetches: u64,
 }
 
-/// The shared level.
-struct Shared<B> {
-    l2: B,
-    in_flight: InFlight,
+/// Texture units, and the caches that they share.
+pub struct Timed<C> {
+    memory: Memory<C>,
+    units: Vec<Pipeline>,
+    busy: Vec<bool>,
 }
 
-/// The machine in timed mode.
-pub struct Timed<'a, S: ?Sized, A, B> {
-    source: &'a S,
-    footprints: &'a Footprints,
-    config: &'a RunConfig,
-    cores: Vec<Core<A>>,
-    shared: Shared<B>,
-    scratch: Scratch,
-    tally: Tally,
-}
-
-/// Counters and the cycle model's figures.
+/// What a timed replay yields.
 pub struct TimedOutcome {
-    /// Cache counters.
-    pub tally: Tally,
+    /// What missed.
+    pub counts: CacheCounts,
     /// Texture units together.
     pub tmu: TmuResult,
     /// Cycles until the last core was done.
     pub cycles: u64,
 }
 
-impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
-    /// A machine with one L1 a core.
-    pub fn new(
-        source: &'a S,
-        footprints: &'a Footprints,
-        config: &'a RunConfig,
-        l1: Vec<A>,
-        l2: B,
-        tally: Tally,
-    ) -> Self {
-        let cores = l1
-            .into_iter()
-            .map(|l1| Core {
-                pipeline: Pipeline::new(config.tmu),
-                l1,
-                in_flight: InFlight::default(),
-                pending: Vec::new(),
-                feed: Feed::default(),
-                busy: false,
-            })
-            .collect();
-        let shared = Shared {
-            l2,
-            in_flight: InFlight::default(),
-        };
+impl<C: Cache> Timed<C> {
+    /// Empty caches, a texture unit for each L1.
+    pub fn new(levels: Levels<C>, tmu: TmuConfig, counts: CacheCounts) -> Self {
+        let cores = levels.l1.len();
         Self {
-            source,
-            footprints,
-            config,
-            cores,
-            shared,
-            scratch: footprints.scratch(),
-            tally,
+            memory: Memory {
+                l1: levels.l1.into_iter().map(Level::new).collect(),
+                l2: Level::new(levels.l2),
+                tmu,
+                counts,
+                core: 0,
+                tile: 0,
+                now: 0,
+                pending: Vec::new(),
+                fetches: 0,
+            },
+            units: vec![Pipeline::new(tmu); cores],
+            busy: vec![false; cores],
         }
     }
 
@@ -89,52 +98,51 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
     ///
     /// # Errors
     /// A tile cannot be read.
-    pub fn run(mut self, phases: &[Phase]) -> Result<TimedOutcome, ReplayError> {
+    pub fn run<S: TileSource + ?Sized>(
+        mut self,
+        stream: &mut Stream<'_, S>,
+        phases: &[Phase],
+        assign: Assign,
+    ) -> Result<TimedOutcome, StreamError> {
         let mut cycles = 0;
         for phase in phases {
-            for core in &mut self.cores {
-                core.pipeline.resume(cycles);
-                core.busy = true;
-            }
-            self.run_phase(phase)?;
-            cycles = self
-                .cores
-                .iter()
-                .map(|core| core.pipeline.clock())
-                .max()
-                .unwrap_or(0);
+            self.units.iter_mut().for_each(|unit| unit.resume(cycles));
+            self.busy.fill(true);
+            self.run_phase(stream, phase, assign)?;
+            cycles = self.units.iter().map(Pipeline::clock).max().unwrap_or(0);
         }
         let mut sum = PipelineStats::default();
-        self.cores
-            .iter()
-            .for_each(|core| sum.add(&core.pipeline.stats()));
-        let tmu = TmuResult {
-            utilization: sum.utilization(),
-            wasted_issues: sum.wasted,
-            threads: sum.threads,
-            loops: sum.loops,
-        };
+        self.units.iter().for_each(|unit| sum.add(&unit.stats()));
         Ok(TimedOutcome {
-            tally: self.tally,
-            tmu,
+            counts: self.memory.counts,
+            tmu: TmuResult {
+                utilization: sum.utilization(),
+                wasted_issues: sum.wasted,
+                threads: sum.threads,
+                loops: sum.loops,
+            },
             cycles,
         })
     }
 
     /// Always advances the core whose clock is furthest behind, so that what the cores share sees
     /// their accesses in the order of time.
-    fn run_phase(&mut self, phase: &[WorkItem]) -> Result<(), ReplayError> {
-        let mut work = Work::new(phase, self.config.assign, self.cores.len());
-        while let Some(index) = self.behind() {
-            match self.cores[index].pipeline.turn() {
+    fn run_phase<S: TileSource + ?Sized>(
+        &mut self,
+        stream: &mut Stream<'_, S>,
+        phase: &[WorkItem],
+        assign: Assign,
+    ) -> Result<(), StreamError> {
+        let mut items = Items::new(phase, assign, self.units.len());
+        while let Some(core) = self.furthest_behind() {
+            match self.units[core].turn() {
                 Turn::Looped => {}
-                Turn::Done => self.cores[index].busy = false,
+                Turn::Done => self.busy[core] = false,
                 Turn::Free => {
-                    if !self.start_thread(index) {
-                        let core = &mut self.cores[index];
-                        match work.next(index) {
-                            Some(item) => core.feed.load(self.source, item)?,
-                            None => core.pipeline.drain(),
+                    if !self.start_thread(core, stream) {
+                        match items.next(core) {
+                            Some(item) => stream.load(core, item)?,
+                            None => self.units[core].drain(),
                         }
                     }
                 }
@@ -144,53 +152,31 @@ impl<'a, S: TileSource + ?Sized, A: Cache, B: Cache> Timed<'a, S, A, B> {
     }
 
     #[inline]
-    fn behind(&self) -> Option<usize> {
-        let busy = self.cores.iter().enumerate().filter(|(_, core)| core.busy);
-        busy.min_by_key(|(_, core)| core.pipeline.clock())
-            .map(|(index, _)| index)
+    fn furthest_behind(&self) -> Option<usize> {
+        let busy = (0..self.units.len()).filter(|&core| self.busy[core]);
+        busy.min_by_key(|&core| self.units[core].clock())
     }
 
     /// Starts the core's next quad; false if its item has none left.
     #[inline]
-    fn start_thread(&mut self, index: usize) -> bool {
-        let core = &mut self.cores[index];
-        let Some(quad) = core.feed.next_quad() else {
-            return false;
-        };
-        let now = core.pipeline.clock();
-        core.in_flight.arrive(now, &mut core.l1);
-        self.shared.in_flight.arrive(now, &mut self.shared.l2);
-        core.pending.clear();
-        let mut probe = Probe {
-            place: self.tally.quad(quad.at, quad.lanes()),
-            tally: &mut self.tally,
-            config: self.config,
-            l1: &mut core.l1,
-            l1_in_flight: &mut core.in_flight,
-            shared: &mut self.shared,
-            now,
-            pending: &mut core.pending,
-            fetches: 0,
-            footprints: 0,
-        };
-        self.footprints.for_quad(
-            quad.draw,
-            quad.records,
-            &mut self.scratch,
-            |sample, bundle| {
-                probe.bundle(sample, bundle);
-            },
-        );
-        let footprints = probe.footprints;
-        if footprints > 0 {
-            core.pipeline.start(footprints, &core.pending);
+    fn start_thread<S: TileSource + ?Sized>(
+        &mut self,
+        core: usize,
+        stream: &mut Stream<'_, S>,
+    ) -> bool {
+        let unit = &mut self.units[core];
+        self.memory.now = unit.clock();
+        match stream.next_quad(core, &mut self.memory) {
+            None => return false,
+            Some(0) => {}
+            Some(footprints) => unit.start(footprints, &self.memory.pending),
         }
         true
     }
 }
 
 /// The items of a phase by assignment.
-struct Work<'a> {
+struct Items<'a> {
     items: &'a [WorkItem],
     assign: Assign,
     /// First idle: the next item of all. Static: the next item by core.
@@ -198,7 +184,7 @@ struct Work<'a> {
     cores: usize,
 }
 
-impl<'a> Work<'a> {
+impl<'a> Items<'a> {
     fn new(items: &'a [WorkItem], assign: Assign, cores: usize) -> Self {
         let next = match assign {
             Assign::FirstIdle => vec![0],
@@ -223,88 +209,49 @@ impl<'a> Work<'a> {
     }
 }
 
-/// A thread's first trip: every footprint's tags are looked up, and what is missing is fetched.
-struct Probe<'a, A, B> {
-    tally: &'a mut Tally,
-    config: &'a RunConfig,
-    place: Place,
-    l1: &'a mut A,
-    l1_in_flight: &'a mut InFlight,
-    shared: &'a mut Shared<B>,
-    now: u64,
-    /// Arrival of the last line of each footprint that missed.
-    pending: &'a mut Vec<u64>,
-    /// Lines that this thread had to ask for.
-    fetches: u64,
-    footprints: u32,
-}
-
-/// What became of a footprint's lines.
-#[derive(Default)]
-struct Misses {
-    l1: u64,
-    l1_secondary: u64,
-    l2: u64,
-    l2_secondary: u64,
-    /// When the last of the footprint's lines arrives.
-    ready: u64,
-}
-
-impl<A: Cache, B: Cache> Probe<'_, A, B> {
+impl<C: Cache> Consumer for Memory<C> {
     #[inline(always)]
-    fn bundle(&mut self, sample: SampleRef, bundle: &Bundle) {
-        let cell_index = self
-            .tally
-            .cell_index(self.place, sample.texture, bundle.level);
-        let safe_lines = self.l1.repeat_safe_lines();
-        let count = usize::from(bundle.count);
-        let (mut lookups, mut hash, mut lane_hash) = (0, 0_u64, 0_u64);
-        let mut all_hit = false;
-        for lane in 0..count {
-            let lines = bundle.lines_of(lane);
-            lookups += lines.len() as u64;
-            if bundle.repeats(lane) && all_hit && lines.len() as u32 <= safe_lines {
-                hash = hash.wrapping_add(lane_hash);
-                continue;
-            }
-            lane_hash = 0;
-            let mut misses = Misses::default();
-            for &relative in lines {
-                let line = sample.base_line + relative;
-                lane_hash = lane_hash.wrapping_add(access_hash(line));
-                if !self.l1.lookup(line) {
-                    self.request(line, &mut misses);
-                }
-            }
-            hash = hash.wrapping_add(lane_hash);
-            all_hit = misses.l1 + misses.l1_secondary == 0;
-            if !all_hit {
-                if misses.ready > self.now {
-                    self.pending.push(misses.ready);
-                }
-                self.count(cell_index, &misses);
-            }
-        }
-        self.tally.hash = self.tally.hash.wrapping_add(hash);
-        self.footprints += count as u32;
-        let l1 = &mut self.tally.cell(cell_index).l1;
-        l1.footprints += count as u64;
-        l1.line_lookups += lookups;
-        let tile = self.tally.tile(self.place);
-        tile.footprints = tile.footprints.wrapping_add(count as u32);
+    fn quad(&mut self, core: usize, tile: usize) {
+        (self.core, self.tile) = (core, tile);
+        self.l1[core].arrive(self.now);
+        self.l2.arrive(self.now);
+        self.pending.clear();
+        self.fetches = 0;
     }
 
-    /// Asks for a line that is not in the L1, unless it is on its way already.
-    #[inline(never)]
-    fn request(&mut self, line: u32, misses: &mut Misses) {
-        if let Some(arrival) = self.l1_in_flight.arrival(line) {
-            misses.l1_secondary += 1;
-            misses.ready = misses.ready.max(arrival);
-            return;
+    #[inline(always)]
+    fn footprint(&mut self, cell: usize, lines: Lines<'_>) -> bool {
+        let mut misses = FootprintMisses::default();
+        let mut ready = 0;
+        for line in lines.iter() {
+            if !self.l1[self.core].cache.lookup(line) {
+                ready = self.request(line, &mut misses).max(ready);
+            }
         }
-        self.tally.touch(line);
-        misses.l1 += 1;
-        let tmu = &self.config.tmu;
+        if misses.l1_lines + misses.l1_secondary == 0 {
+            return lines.count() <= self.l1[self.core].cache.repeat_safe_lines();
+        }
+        if ready > self.now {
+            self.pending.push(ready);
+        }
+        self.counts.footprint(cell, self.tile, &misses);
+        false
+    }
+}
+
+impl<C: Cache> Memory<C> {
+    /// Asks for a line that is not in the L1, unless it is on its way already; says when it
+    /// arrives.
+    #[inline(never)]
+    fn request(&mut self, line: u32, misses: &mut FootprintMisses) -> u64 {
+        let l1 = &mut self.l1[self.core];
+        if let Some(arrival) = l1.in_flight.arrival(line) {
+            misses.l1_secondary += 1;
+            return arrival;
+        }
+        self.counts.touched.insert(line);
+        misses.l1_lines += 1;
+        let tmu = &self.tmu;
         let trip = self.fetches / u64::from(tmu.fetches_per_trip);
         self.fetches += 1;
         // Without penalties nothing loops, so there is no later trip to wait for.
@@ -314,52 +261,19 @@ impl<A: Cache, B: Cache> Probe<'_, A, B> {
         } else {
             trip * u64::from(tmu.loop_cycles)
         };
-        let shared = &mut *self.shared;
-        let in_l2 = if shared.l2.lookup(line) {
+        let in_l2 = if self.l2.cache.lookup(line) {
             self.now
-        } else if let Some(arrival) = shared.in_flight.arrival(line) {
+        } else if let Some(arrival) = self.l2.in_flight.arrival(line) {
             misses.l2_secondary += 1;
             arrival
         } else {
-            misses.l2 += 1;
+            misses.l2_lines += 1;
             let arrival = self.now + u64::from(tmu.l2_penalty_cycles);
-            enter(
-                &mut shared.l2,
-                &mut shared.in_flight,
-                line,
-                self.now,
-                arrival,
-            );
+            self.l2.enter(line, self.now, arrival);
             arrival
         };
         let in_l1 = in_l2 + u64::from(tmu.l1_penalty_cycles) + wait;
-        enter(self.l1, self.l1_in_flight, line, self.now, in_l1);
-        misses.ready = misses.ready.max(in_l1);
-    }
-
-    /// Counts a footprint that found lines missing.
-    fn count(&mut self, cell_index: usize, misses: &Misses) {
-        let cell = self.tally.cell(cell_index);
-        cell.l1.footprint_misses += u64::from(misses.l1 > 0);
-        cell.l1.line_misses += misses.l1;
-        cell.l1.secondary_misses += misses.l1_secondary;
-        cell.l2.footprints += u64::from(misses.l1 > 0);
-        cell.l2.line_lookups += misses.l1;
-        cell.l2.footprint_misses += u64::from(misses.l2 > 0);
-        cell.l2.line_misses += misses.l2;
-        cell.l2.secondary_misses += misses.l2_secondary;
-        let tile = self.tally.tile(self.place);
-        tile.l1_misses = tile.l1_misses.wrapping_add(u32::from(misses.l1 > 0));
-        tile.l2_misses = tile.l2_misses.wrapping_add(misses.l2 as u32);
-    }
-}
-
-/// Fills a line at once, or when it arrives.
-#[inline]
-fn enter(cache: &mut impl Cache, in_flight: &mut InFlight, line: u32, now: u64, arrival: u64) {
-    if arrival <= now {
-        cache.fill(line);
-    } else {
-        in_flight.request(line, arrival);
+        l1.enter(line, self.now, in_l1);
+        in_l1
     }
 }

@@ -14,6 +14,8 @@ pub enum Value {
     None,
     /// Text.
     Text(String),
+    /// A name, and how tables write it.
+    Named(&'static str, &'static str),
     /// A count.
     Whole(u64),
     /// A measure.
@@ -57,7 +59,7 @@ impl Value {
         match self {
             Self::Whole(n) => Some(*n as f64),
             Self::Real(x) => Some(*x),
-            Self::None | Self::Text(_) => None,
+            Self::None | Self::Text(_) | Self::Named(..) => None,
         }
     }
 
@@ -67,6 +69,7 @@ impl Value {
         match self {
             Self::None => String::new(),
             Self::Text(text) => text.clone(),
+            Self::Named(name, _) => (*name).to_owned(),
             Self::Whole(n) => n.to_string(),
             Self::Real(x) => x.to_string(),
         }
@@ -78,6 +81,7 @@ impl Serialize for Value {
         match self {
             Self::None => serializer.serialize_none(),
             Self::Text(text) => serializer.serialize_str(text),
+            Self::Named(name, _) => serializer.serialize_str(name),
             Self::Whole(n) => serializer.serialize_u64(*n),
             Self::Real(x) => serializer.serialize_f64(*x),
         }
@@ -113,7 +117,10 @@ impl Show {
             (Self::Whole, Some(_)) => super::theme::group_thousands(&value.exact()),
             (Self::Decimals(decimals), Some(x)) => fixed(x, decimals),
             (Self::Millions(decimals), Some(x)) => fixed(x * 1e-6, decimals),
-            _ => value.exact(),
+            _ => match value {
+                Value::Named(_, title) => (*title).to_owned(),
+                _ => value.exact(),
+            },
         }
     }
 }
@@ -133,6 +140,14 @@ pub struct Heading {
     pub about: &'static str,
     /// Holds published figures, set in a lighter ink.
     pub published: bool,
+}
+
+impl Heading {
+    /// What the figure is, with its unit, for the axis of a chart.
+    #[must_use]
+    pub fn axis_label(&self) -> String {
+        format!("{}, {}", self.about, self.unit)
+    }
 }
 
 /// A column of rows of type `R`.
@@ -260,6 +275,21 @@ impl<R: ?Sized> Serialize for Record<'_, '_, R> {
             }
         }
         map.end()
+    }
+}
+
+/// Rows as a JSON array of such objects.
+pub struct Records<'a, 'c, R> {
+    /// Columns, those with the same prefix side by side.
+    pub columns: &'a [Column<'c, R>],
+    /// The rows.
+    pub rows: &'a [R],
+}
+
+impl<R> Serialize for Records<'_, '_, R> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let columns = self.columns;
+        serializer.collect_seq(self.rows.iter().map(|row| Record { columns, row }))
     }
 }
 

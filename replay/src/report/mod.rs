@@ -1,12 +1,14 @@
-//! Tables, plots, JSON, CSV and the HTML report.
+//! Prints results: tables, plots, JSON, CSV and pages. What is printed is computed elsewhere.
 
 pub mod columns;
 pub mod csv;
-pub mod files;
+pub mod figures;
 pub mod html;
 pub mod picture;
 pub mod plots;
+pub mod run;
 pub mod sgrt;
+pub mod sweep;
 pub mod table;
 pub mod theme;
 pub mod z2;

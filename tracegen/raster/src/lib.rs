@@ -19,6 +19,7 @@ mod groups;
 pub mod lavapipe;
 pub mod lighting;
 mod roles;
+mod seen;
 mod shader;
 mod uniforms;
 mod vertices;

@@ -2,6 +2,7 @@
 
 use super::cascades::Cascade;
 use glam::Vec3;
+use scene::light::Sky;
 use scene::{Light, Scene};
 
 /// Point lights that the shader evaluates; the brightest are kept.
@@ -14,10 +15,8 @@ pub struct Lighting {
     pub to_sun: Vec3,
     /// Irradiance of the sun, linear RGB.
     pub sun: Vec3,
-    /// Radiance of the upper hemisphere, linear RGB.
-    pub sky: Vec3,
-    /// Radiance of the lower hemisphere, linear RGB.
-    pub ground: Vec3,
+    /// Sky and ground.
+    pub sky: Sky,
     /// Positions and radiant intensities.
     pub points: Vec<(Vec3, Vec3)>,
     /// Shadow cascades, nearest first.
@@ -25,14 +24,10 @@ pub struct Lighting {
 }
 
 impl Lighting {
-    /// The scene's lights; a scene without any gets a late-morning sun under a blue sky.
+    /// The scene's brightest sun and point lights, and its sky.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
-        let suns = scene.lights.iter().filter_map(|light| match light {
-            Light::Directional { direction, color } => Some((*direction, *color)),
-            Light::Point { .. } => None,
-        });
-        let brightest = suns.max_by(|a, b| a.1.element_sum().total_cmp(&b.1.element_sum()));
+        let (direction, sun) = scene.sun().unwrap_or((Vec3::NEG_Y, Vec3::ZERO));
         let mut points: Vec<(Vec3, Vec3)> = scene
             .lights
             .iter()
@@ -43,23 +38,10 @@ impl Lighting {
             .collect();
         points.sort_by(|a, b| b.1.element_sum().total_cmp(&a.1.element_sum()));
         points.truncate(MAX_POINT_LIGHTS);
-        let unlit = brightest.is_none() && points.is_empty();
-        let (direction, sun) = match brightest {
-            Some(light) => light,
-            None if unlit => (Vec3::new(-0.25, -1.0, -0.18), Vec3::new(5.0, 4.6, 4.0)),
-            None => (Vec3::NEG_Y, Vec3::ZERO),
-        };
-        let sky = if unlit && scene.sky == Vec3::ZERO {
-            Vec3::new(0.45, 0.55, 0.75)
-        } else {
-            scene.sky
-        };
         Self {
             to_sun: (-direction).normalize_or(Vec3::Y),
             sun,
-            sky,
-            // Light thrown back by sunlit ground of albedo 0.3.
-            ground: 0.3 * (0.5 * sky + sun * 0.15),
+            sky: Sky::new(scene),
             points,
             cascades: Vec::new(),
         }

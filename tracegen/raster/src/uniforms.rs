@@ -51,8 +51,8 @@ impl ViewData {
         data.eye = color(eye);
         data.to_sun = color(lighting.to_sun);
         data.sun = color(lighting.sun);
-        data.sky = color(lighting.sky);
-        data.ground = color(lighting.ground);
+        data.sky = color(lighting.sky.sky);
+        data.ground = color(lighting.sky.ground);
         for (k, cascade) in lighting.cascades.iter().take(MAX_CASCADES).enumerate() {
             data.shadow_texel_m[k] = cascade.texel_m;
             data.cascades[k] = (clip_to_uv() * cascade.clip_from_world).to_cols_array_2d();

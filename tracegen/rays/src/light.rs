@@ -1,56 +1,7 @@
-//! Sky, lights and the laws of reflection and refraction.
+//! Lights and the laws of reflection and refraction.
 
 use formats::raytrace::RayLight;
 use glam::Vec3;
-use scene::{Light, Scene};
-
-/// Background and ambient light: a sky over a ground that throws sunlight back.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sky {
-    /// Radiance of the upper hemisphere.
-    pub sky: Vec3,
-    /// Radiance of the lower hemisphere.
-    pub ground: Vec3,
-}
-
-impl Sky {
-    /// The sky of a scene; the ground has an albedo of 0.3 under its brightest sun.
-    #[must_use]
-    pub fn new(scene: &Scene) -> Self {
-        let sun = scene
-            .lights
-            .iter()
-            .filter_map(|light| match light {
-                Light::Directional { color, .. } => Some(*color),
-                Light::Point { .. } => None,
-            })
-            .max_by(|a, b| a.element_sum().total_cmp(&b.element_sum()))
-            .unwrap_or_default();
-        Self {
-            sky: scene.sky,
-            ground: 0.3 * (0.5 * scene.sky + 0.15 * sun),
-        }
-    }
-
-    /// What a ray that leaves the scene sees.
-    #[must_use]
-    pub fn background(&self, direction: Vec3) -> Vec3 {
-        let zenith = self.sky * Vec3::new(0.75, 0.85, 1.0);
-        let sky = self.sky.lerp(zenith, direction.y.clamp(0.0, 1.0));
-        self.ground.lerp(sky, smoothstep(-0.1, 0.02, direction.y))
-    }
-
-    /// Ambient radiance that reaches a surface of this normal, averaged over its hemisphere.
-    #[must_use]
-    pub fn ambient(&self, normal: Vec3) -> Vec3 {
-        self.ground.lerp(self.sky, 0.5 + 0.5 * normal.y)
-    }
-}
-
-fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
-    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
 
 /// What a light sends to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,11 @@
 //! What a scene's materials mean to a ray.
 
 use super::soup::{Attributes, Soup};
-use super::texture::{Pyramid, SrgbTable, fast_log2};
+use super::texture::{Pyramid, fast_log2};
 use formats::raytrace::RayMaterial;
 use glam::{Vec2, Vec3, Vec4};
-use scene::{AlphaMode, Material, Scene, TextureRef};
+use rayon::prelude::*;
+use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
 
 /// Smoother dielectrics get a highlight.
 const GLOSSY_ROUGHNESS: f32 = 0.7;
@@ -45,31 +46,31 @@ pub struct Surface {
 pub struct Materials {
     materials: Vec<Material>,
     pyramids: Vec<Option<Pyramid>>,
-    srgb: SrgbTable,
+    srgb: &'static [f32; 256],
 }
 
 impl Materials {
     /// Makes the pyramids of the images that rays sample.
-    #[must_use]
-    pub fn new(scene: &Scene) -> Self {
-        use rayon::prelude::*;
-        let used: Vec<bool> = (0..scene.images.len())
-            .map(|i| {
-                let mut refs = scene.materials.iter().flat_map(ray_textures);
-                refs.any(|t| t.image == i)
-            })
+    ///
+    /// # Errors
+    /// Images that cannot be read or decoded.
+    pub fn new(scene: &Scene) -> Result<Self, SceneError> {
+        let mut used = vec![false; scene.images.len()];
+        for texture in scene.materials.iter().flat_map(ray_textures) {
+            if let Some(used) = used.get_mut(texture.image) {
+                *used = true;
+            }
+        }
+        let texels = scene::image::texels(&scene.images, |i| used[i])?;
+        let pyramids = (scene.images.par_iter())
+            .zip(texels)
+            .map(|(image, rgba)| Pyramid::new(image, rgba?))
             .collect();
-        let pyramids = scene
-            .images
-            .par_iter()
-            .zip(used)
-            .map(|(image, used)| used.then(|| Pyramid::new(image)).flatten())
-            .collect();
-        Self {
+        Ok(Self {
             materials: scene.materials.clone(),
             pyramids,
-            srgb: SrgbTable::default(),
-        }
+            srgb: &scene::srgb::LINEAR,
+        })
     }
 
     /// The table of a trace.
@@ -119,7 +120,7 @@ impl Materials {
     fn alpha(&self, material: &Material, uv: impl Fn(u32) -> Vec2) -> f32 {
         let texel = material.base_color_texture.as_ref().and_then(|t| {
             let pyramid = self.pyramids.get(t.image)?.as_ref()?;
-            Some(pyramid.sample(t, uv(t.uv_set), 0.0, &self.srgb).w)
+            Some(pyramid.sample(t, uv(t.uv_set), 0.0, self.srgb).w)
         });
         material.base_color.w * texel.unwrap_or(1.0)
     }
@@ -164,7 +165,7 @@ impl Materials {
         // Texels across the footprint, squared.
         let texels = at.uv_density[set] * scale * footprint_m * footprint_m;
         let lod = 0.5 * fast_log2(texels);
-        Some(pyramid.sample(texture, at.uv[set], lod, &self.srgb))
+        Some(pyramid.sample(texture, at.uv[set], lod, self.srgb))
     }
 }
 
@@ -201,9 +202,14 @@ fn describe(m: &Material) -> RayMaterial {
     let metal = m.metallic > 0.0 && may_be_smooth;
     let polished = m.metallic_roughness_texture.is_some() || m.roughness < POLISHED_ROUGHNESS;
     let glossy = m.metallic_roughness_texture.is_some() || m.roughness < GLOSSY_ROUGHNESS;
+    let flawless =
+        m.metallic_roughness_texture.is_none() && m.metallic * (1.0 - m.roughness) >= 1.0;
     RayMaterial {
         name: m.name.clone(),
-        diffuse: m.transmission < 1.0 && m.mirror < 1.0 && (m.metallic < 1.0 || may_be_smooth),
+        diffuse: m.transmission < 1.0
+            && m.mirror < 1.0
+            && !flawless
+            && (m.metallic < 1.0 || may_be_smooth),
         mirror: m.mirror > 0.0 || metal || polished,
         glass,
         glossy,

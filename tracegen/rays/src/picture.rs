@@ -28,12 +28,7 @@ pub fn displayed(radiance: Vec3) -> [u8; 3] {
     let c = radiance.max(Vec3::ZERO);
     let mapped = (c * (2.51 * c + 0.03)) / (c * (2.43 * c + 0.59) + 0.14);
     mapped.to_array().map(|v| {
-        let v = v.clamp(0.0, 1.0);
-        let encoded = if v <= 0.003_130_8 {
-            12.92 * v
-        } else {
-            1.055 * v.powf(1.0 / 2.4) - 0.055
-        };
+        let encoded = scene::srgb::encode(v.clamp(0.0, 1.0).into());
         (encoded * 255.0).round() as u8
     })
 }

@@ -1,11 +1,11 @@
 //! Everything that rays need of a scene, prepared once and shared by all threads.
 
 use super::bvh::{AlphaTest, Bvh, BvhError};
-use super::light::Sky;
 use super::material::Materials;
 use super::soup::Soup;
 use formats::raytrace::RayLight;
-use scene::{Light, Scene};
+use scene::light::Sky;
+use scene::{Light, Scene, SceneError};
 
 /// A scene ready to be traced.
 pub struct TraceScene {
@@ -23,12 +23,23 @@ pub struct TraceScene {
     pub sky: Sky,
 }
 
+/// Why a scene cannot be traced.
+#[derive(Debug, thiserror::Error)]
+pub enum PrepareError {
+    /// No hierarchy.
+    #[error(transparent)]
+    Bvh(#[from] BvhError),
+    /// No textures.
+    #[error(transparent)]
+    Images(#[from] SceneError),
+}
+
 impl TraceScene {
     /// Prepares a scene.
     ///
     /// # Errors
-    /// The scene has too many triangles.
-    pub fn new(mut scene: Scene) -> Result<Self, BvhError> {
+    /// The scene has too many triangles, or images that cannot be read.
+    pub fn new(mut scene: Scene) -> Result<Self, PrepareError> {
         let soup = Soup::new(&scene);
         let (bvh, materials) = rayon::join(
             || {
@@ -46,7 +57,7 @@ impl TraceScene {
             },
             || Materials::new(&scene),
         );
-        let bvh = bvh?;
+        let (bvh, materials) = (bvh?, materials?);
         scene.images = Vec::new();
         let lights = scene
             .lights

@@ -3,7 +3,6 @@
 use formats::texture::{ColorSpace, Filter, Wrap};
 use glam::{Vec2, Vec4};
 use scene::{Image, TextureRef};
-use std::sync::Arc;
 
 /// An image with its smaller levels, RGBA8 in its own colour space.
 pub struct Pyramid {
@@ -13,38 +12,21 @@ pub struct Pyramid {
 
 struct Level {
     size: [u32; 2],
-    rgba: Arc<[u8]>,
-}
-
-/// Linear value of each sRGB byte.
-pub struct SrgbTable([f32; 256]);
-
-impl Default for SrgbTable {
-    fn default() -> Self {
-        Self(std::array::from_fn(|i| {
-            let c = i as f64 / 255.0;
-            let linear = if c <= 0.04045 {
-                c / 12.92
-            } else {
-                ((c + 0.055) / 1.055).powf(2.4)
-            };
-            linear as f32
-        }))
-    }
+    rgba: Vec<u8>,
 }
 
 impl Pyramid {
-    /// The levels of an image, or `None` where it has no texels.
+    /// The levels of an image above its texels, or `None` where those are too few.
     #[must_use]
-    pub fn new(image: &Image) -> Option<Self> {
+    pub fn new(image: &Image, rgba: Vec<u8>) -> Option<Self> {
         let [width, height] = image.size;
         let bytes = width as usize * height as usize * 4;
-        if bytes == 0 || image.rgba.len() < bytes {
+        if bytes == 0 || rgba.len() < bytes {
             return None;
         }
         let mut levels = vec![Level {
             size: image.size,
-            rgba: image.rgba.clone(),
+            rgba,
         }];
         while let Some(next) = levels.last().and_then(Level::halved) {
             levels.push(next);
@@ -63,7 +45,7 @@ impl Pyramid {
 
     /// The value at texture coordinates for a footprint of `2^lod` texels, linear.
     #[must_use]
-    pub fn sample(&self, texture: &TextureRef, uv: Vec2, lod: f32, srgb: &SrgbTable) -> Vec4 {
+    pub fn sample(&self, texture: &TextureRef, uv: Vec2, lod: f32, srgb: &[f32; 256]) -> Vec4 {
         let [[a, b, c], [d, e, f]] = texture.uv_transform;
         let uv = Vec2::new(a * uv.x + b * uv.y + c, d * uv.x + e * uv.y + f);
         if !uv.is_finite() {
@@ -88,7 +70,7 @@ impl Pyramid {
         wrap: [Wrap; 2],
         uv: Vec2,
         nearest: bool,
-        srgb: &SrgbTable,
+        srgb: &[f32; 256],
     ) -> Vec4 {
         let level = &self.levels[level];
         let [width, height] = level.size;
@@ -98,7 +80,7 @@ impl Pyramid {
             let at = (y as usize * width as usize + x as usize) * 4;
             let t = &level.rgba[at..at + 4];
             let value = |v: u8| match self.color_space {
-                ColorSpace::Srgb => srgb.0[v as usize],
+                ColorSpace::Srgb => srgb[v as usize],
                 ColorSpace::Linear => f32::from(v) / 255.0,
             };
             Vec4::new(
@@ -142,10 +124,7 @@ impl Level {
                 }
             }
         }
-        Some(Self {
-            size,
-            rgba: rgba.into(),
-        })
+        Some(Self { size, rgba })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Why a scene could not be loaded.
 
-use std::path::PathBuf;
+use formats::text::printable;
+use std::path::{Path, PathBuf};
 
 /// Why a scene could not be loaded.
 #[derive(Debug, thiserror::Error)]
@@ -14,7 +15,7 @@ pub enum SceneError {
         or_built_in: String,
     },
     /// A file that cannot be read.
-    #[error("{}: {place}: cannot read: {reason}", file.display())]
+    #[error("{}: {place}: cannot read: {reason}", path(file))]
     Io {
         /// The file.
         file: PathBuf,
@@ -24,7 +25,7 @@ pub enum SceneError {
         reason: std::io::Error,
     },
     /// A file that is not what it claims to be.
-    #[error("{}: {place}: expected {expected}, found {found}", file.display())]
+    #[error("{}: {place}: expected {expected}, found {found}", path(file))]
     Invalid {
         /// The file.
         file: PathBuf,
@@ -35,4 +36,9 @@ pub enum SceneError {
         /// What is there.
         found: String,
     },
+}
+
+/// A path as a message shows it: a scene file may name paths with anything in them.
+fn path(file: &Path) -> String {
+    printable(&file.to_string_lossy()).into_owned()
 }

@@ -1,6 +1,9 @@
 //! The files of a scene: reading them, and naming them in errors.
 
 use crate::error::SceneError;
+use formats::text::printable;
+use std::fs::{File, Metadata};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Names the file in every error of one loader.
@@ -16,33 +19,119 @@ impl Origin {
         }
     }
 
+    /// An error whose parts may hold text from the file.
     pub fn invalid(
         &self,
-        place: impl Into<String>,
-        expected: impl Into<String>,
-        found: impl Into<String>,
+        place: impl AsRef<str>,
+        expected: impl AsRef<str>,
+        found: impl AsRef<str>,
     ) -> SceneError {
         SceneError::Invalid {
             file: self.file.clone(),
-            place: place.into(),
-            expected: expected.into(),
-            found: found.into(),
+            place: shown(place.as_ref()),
+            expected: shown(expected.as_ref()),
+            found: shown(found.as_ref()),
         }
+    }
+
+    /// The folder that references are relative to.
+    pub fn folder(&self) -> &Path {
+        self.file.parent().unwrap_or(Path::new(""))
     }
 
     /// Resolves a reference relative to the file's folder.
     pub fn sibling(&self, relative: &Path) -> PathBuf {
-        self.file
-            .parent()
-            .map_or_else(|| relative.to_owned(), |folder| folder.join(relative))
+        self.folder().join(relative)
     }
 }
 
-/// Reads a whole file, saying what refers to it.
-pub(crate) fn read_file(file: &Path, place: &str) -> Result<Vec<u8>, SceneError> {
-    std::fs::read(file).map_err(|reason| SceneError::Io {
+/// Most characters of a file's text that a message quotes.
+const QUOTED: usize = 300;
+
+/// Text from a file as a message shows it: fit for a terminal and not endless.
+pub(crate) fn shown(text: &str) -> String {
+    match text.char_indices().nth(QUOTED) {
+        Some((end, _)) => format!("{}...", printable(&text[..end])),
+        None => printable(text).into_owned(),
+    }
+}
+
+/// Reads a whole regular file of at most `max_bytes`, saying what refers to it.
+pub(crate) fn read_file(file: &Path, place: &str, max_bytes: u64) -> Result<Vec<u8>, SceneError> {
+    let length = check_regular(file, place)?.len();
+    if length > max_bytes {
+        return Err(Origin::new(file).invalid(
+            place,
+            format!("a file of at most {max_bytes} bytes"),
+            format!("{length} bytes"),
+        ));
+    }
+    read(file, place, length)
+}
+
+/// Reads the first `wanted` bytes of a regular file, or all where it is shorter; tells its length.
+pub(crate) fn read_start(
+    file: &Path,
+    place: &str,
+    wanted: u64,
+) -> Result<(Vec<u8>, u64), SceneError> {
+    let length = check_regular(file, place)?.len();
+    Ok((read(file, place, length.min(wanted))?, length))
+}
+
+/// The file's metadata, looked up before it is opened: opening a FIFO would wait for a writer.
+pub(crate) fn check_regular(file: &Path, place: &str) -> Result<Metadata, SceneError> {
+    let metadata = std::fs::metadata(file).map_err(|e| cannot_read(file, place, e))?;
+    if metadata.is_file() {
+        return Ok(metadata);
+    }
+    Err(Origin::new(file).invalid(
+        place,
+        "a regular file (the files of a scene name each other by folder, so none can be a pipe)",
+        kind(&metadata),
+    ))
+}
+
+fn kind(metadata: &Metadata) -> &'static str {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = metadata.file_type();
+        if kind.is_fifo() {
+            return "a pipe";
+        }
+        if kind.is_char_device() || kind.is_block_device() {
+            return "a device";
+        }
+        if kind.is_socket() {
+            return "a socket";
+        }
+    }
+    if metadata.is_dir() {
+        "a folder"
+    } else {
+        "something else"
+    }
+}
+
+fn read(file: &Path, place: &str, length: u64) -> Result<Vec<u8>, SceneError> {
+    let failed = |e| cannot_read(file, place, e);
+    let mut bytes = Vec::new();
+    bytes
+        .try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))
+        .map_err(|e| failed(std::io::Error::other(e)))?;
+    let opened = File::open(file).map_err(failed)?;
+    opened
+        .take(length)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
+    Ok(bytes)
+}
+
+fn cannot_read(file: &Path, place: &str, reason: std::io::Error) -> SceneError {
+    SceneError::Io {
         file: file.to_owned(),
-        place: place.to_owned(),
+        place: shown(place),
         reason,
-    })
+    }
 }

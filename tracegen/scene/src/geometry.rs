@@ -17,9 +17,18 @@ pub fn vertex_normals(positions: &[Vec3], indices: &[u32]) -> Vec<Vec3> {
         }
     }
     for n in &mut normals {
-        *n = n.normalize_or(Vec3::Y);
+        *n = unit_or(*n, Vec3::Y);
     }
     normals
+}
+
+/// The direction of `v`, also where its length squared is beyond `f32`; `fallback` where it has none.
+#[must_use]
+pub fn unit_or(v: Vec3, fallback: Vec3) -> Vec3 {
+    if v.length_squared().is_normal() {
+        return v.normalize_or(fallback);
+    }
+    (v / v.abs().max_element()).normalize_or(fallback)
 }
 
 /// Per-vertex tangents by accumulating each triangle's dP/du (Lengyel), made perpendicular to the
@@ -108,6 +117,21 @@ mod tests {
         ];
         let n = vertex_normals(&positions, &[0, 1, 2, 0, 3, 4])[0];
         assert!(n.y > 0.99, "{n}");
+    }
+
+    #[test]
+    fn directions_of_tiny_and_huge_vectors_are_unit_vectors() {
+        for scale in [1e-44, 1e-30, 1e-19, 1.0, 1e20, 1e38] {
+            assert!(unit_or(Vec3::new(1.0, 2.0, 2.0) * scale, Vec3::Y).is_normalized());
+        }
+        for none in [
+            Vec3::ZERO,
+            Vec3::NAN,
+            Vec3::INFINITY,
+            Vec3::new(f32::INFINITY, 1.0, 0.0),
+        ] {
+            assert_eq!(unit_or(none, Vec3::Y), Vec3::Y);
+        }
     }
 
     #[test]

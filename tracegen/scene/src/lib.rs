@@ -6,16 +6,22 @@ mod files;
 pub mod geometry;
 mod gltf;
 pub mod hmd;
-pub mod images;
+pub mod image;
+mod image_files;
+pub mod light;
 mod load;
 mod model;
 mod obj;
 mod options;
 #[cfg(test)]
 mod real_scenes;
+pub mod srgb;
 mod uri;
+mod warnings;
 
 pub use error::SceneError;
-pub use load::{DEFAULT_SKY, complete, default_sun, load_file};
-pub use model::{AlphaMode, Camera, Image, Instance, Light, Material, Mesh, Scene, TextureRef};
+pub use image::Image;
+pub use image_files::MAX_SIZE as MAX_IMAGE_SIZE;
+pub use load::{complete, load_file};
+pub use model::{AlphaMode, Camera, Instance, Light, Material, Mesh, Scene, TextureRef};
 pub use options::{LoadOptions, Loaded};

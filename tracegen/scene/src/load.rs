@@ -1,7 +1,8 @@
 //! From a file to a complete [`Scene`].
 
-use super::{Camera, Light, LoadOptions, Loaded, Scene, SceneError, cameras, gltf, obj};
-use glam::Vec3;
+use super::{Camera, LoadOptions, Loaded, Scene, SceneError, cameras, gltf, obj};
+use crate::files::{check_regular, shown};
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// Loads a glTF or OBJ file and completes it as [`complete`] does.
@@ -16,8 +17,12 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
         Some("gltf" | "glb") => gltf::load(path, options)?,
         Some("obj") => obj::load(path, options)?,
         _ => {
+            // A pipe has no name that tells its format.
+            if path.exists() {
+                check_regular(path, "scene")?;
+            }
             return Err(SceneError::Unknown {
-                spec: path.display().to_string(),
+                spec: shown(&path.to_string_lossy()),
                 or_built_in: String::new(),
             });
         }
@@ -34,6 +39,7 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
             found: "none".into(),
         });
     }
+    make_names_printable(&mut loaded.scene);
     complete(&mut loaded.scene);
     Ok(loaded)
 }
@@ -44,40 +50,49 @@ pub fn complete(scene: &mut Scene) {
         scene.cameras.push(cameras::default_camera(scene));
     }
     make_names_unique(&mut scene.cameras);
-    if scene.lights.is_empty() {
-        scene.lights.push(default_sun());
-        if scene.sky == Vec3::ZERO {
-            scene.sky = DEFAULT_SKY;
-        }
-    }
-}
-
-/// Sky radiance of a scene whose file has no lights: a clear day, dimmer than the sun by far.
-pub const DEFAULT_SKY: Vec3 = Vec3::new(0.38, 0.47, 0.62);
-
-/// The sun of a scene whose file has no lights.
-///
-/// It stands at 72 degrees of elevation, so that it reaches the floor of a narrow atrium with an
-/// open roof and still shows relief, and off both horizontal axes, so that no axis-aligned wall is
-/// exactly edge-on.
-#[must_use]
-pub fn default_sun() -> Light {
-    Light::Directional {
-        direction: Vec3::new(0.26, -1.0, 0.19).normalize(),
-        color: Vec3::new(3.2, 3.0, 2.7),
-    }
+    scene.light_if_unlit();
 }
 
 /// `name`, `name-2`, `name-3`, ... so that `--camera` can choose any of them.
 fn make_names_unique(cameras: &mut [Camera]) {
-    for i in 1..cameras.len() {
-        let (before, rest) = cameras.split_at_mut(i);
-        let taken = |name: &str| before.iter().any(|c| c.name == name);
-        let base = rest[0].name.clone();
-        let mut n = 2;
-        while taken(&rest[0].name) {
-            rest[0].name = format!("{base}-{n}");
-            n += 1;
+    let mut taken = HashSet::new();
+    // The number to try next, by name: a file may use one name a million times.
+    let mut next: HashMap<String, u64> = HashMap::new();
+    for camera in cameras {
+        let base = camera.name.clone();
+        while !taken.insert(camera.name.clone()) {
+            let n = next.entry(base.clone()).or_insert(2);
+            camera.name = format!("{base}-{n}");
+            *n += 1;
         }
+    }
+}
+
+/// Makes every name that comes from the file fit for a terminal, and none endless.
+fn make_names_printable(scene: &mut Scene) {
+    let names = std::iter::once(&mut scene.name)
+        .chain(scene.meshes.iter_mut().map(|mesh| &mut mesh.name))
+        .chain((scene.materials.iter_mut()).map(|material| &mut material.name))
+        .chain(scene.images.iter_mut().map(|image| &mut image.name))
+        .chain(scene.cameras.iter_mut().map(|camera| &mut camera.name));
+    for name in names {
+        *name = shown(name);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cameras_of_one_name_are_numbered() {
+        let names = ["a", "a", "a-2", "b", "a", "a-2"];
+        let mut cameras = names.map(|name| Camera {
+            name: name.into(),
+            ..cameras::default_camera(&Scene::default())
+        });
+        make_names_unique(&mut cameras);
+        let names = cameras.map(|camera| camera.name);
+        assert_eq!(names, ["a", "a-2", "a-2-2", "b", "a-3", "a-2-3"]);
     }
 }

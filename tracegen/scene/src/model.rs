@@ -2,9 +2,9 @@
 //!
 //! World space is right-handed, y up, metres. Front faces wind counter-clockwise.
 
-use formats::texture::{ColorSpace, Sampler};
+use crate::Image;
+use formats::texture::Sampler;
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
-use std::sync::Arc;
 
 /// A whole scene.
 #[derive(Clone, Debug, Default)]
@@ -44,6 +44,9 @@ pub struct Mesh {
     pub uv0: Vec<Vec2>,
     /// Texture coordinates set 1, empty where no material of the mesh uses it.
     pub uv1: Vec<Vec2>,
+    /// Linear colours with alpha that multiply the base colour, one a position; empty where the
+    /// file has none.
+    pub colors: Vec<Vec4>,
     /// Three indices a triangle.
     pub indices: Vec<u32>,
     /// Index into the scene's materials.
@@ -160,7 +163,7 @@ pub struct Material {
     /// Index of refraction. Ray tracing only.
     pub ior: f32,
     /// Fraction mirrored at normal incidence beyond Fresnel's (chrome, polished floors), 0 to 1.
-    /// Ray tracing only; a loader sets it for smooth metals.
+    /// Ray tracing only, which has smooth metals mirror without it.
     pub mirror: f32,
 }
 
@@ -203,19 +206,18 @@ impl Material {
             self.emissive_texture,
         ]
     }
-}
 
-/// Uncompressed texels of level 0.
-#[derive(Clone, Debug)]
-pub struct Image {
-    /// File name, or the procedural texture's name.
-    pub name: String,
-    /// Width and height in texels.
-    pub size: [u32; 2],
-    /// RGBA8, row by row from the top (v = 0).
-    pub rgba: Arc<[u8]>,
-    /// Colour space of RGB.
-    pub color_space: ColorSpace,
+    /// The slots of [`Self::textures`].
+    fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 6] {
+        [
+            &mut self.base_color_texture,
+            &mut self.normal_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.specular_texture,
+            &mut self.occlusion_texture,
+            &mut self.emissive_texture,
+        ]
+    }
 }
 
 /// A named camera: the head's pose. The HMD decides field of view and eyes.
@@ -257,6 +259,27 @@ pub enum Light {
 }
 
 impl Scene {
+    /// Leaves out the textures of the slots (in the order of [`Material::textures`]) that are not
+    /// to be kept, and the images that only they sample.
+    pub fn keep_texture_slots(&mut self, keep: [bool; 6]) {
+        let mut new_index = vec![None; self.images.len()];
+        let mut kept = Vec::new();
+        for material in &mut self.materials {
+            for (slot, keep) in material.textures_mut().into_iter().zip(keep) {
+                let Some(texture) = slot.filter(|_| keep) else {
+                    *slot = None;
+                    continue;
+                };
+                let image = *new_index[texture.image].get_or_insert_with(|| {
+                    kept.push(self.images[texture.image].clone());
+                    kept.len() - 1
+                });
+                *slot = Some(TextureRef { image, ..texture });
+            }
+        }
+        self.images = kept;
+    }
+
     /// Triangles with instances counted.
     #[must_use]
     pub fn triangle_count(&self) -> u64 {

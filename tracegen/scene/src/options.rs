@@ -5,8 +5,6 @@ use crate::Scene;
 /// What a loader reads besides geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadOptions {
-    /// Decode the images. Without it an image has its size (from the file's header) and no texels.
-    pub images: bool,
     /// Which of [`super::Material::textures`] to keep, in that order; the others become `None` and
     /// their images are not read.
     pub slots: [bool; 6],
@@ -14,20 +12,7 @@ pub struct LoadOptions {
 
 impl LoadOptions {
     /// Everything.
-    pub const ALL: Self = Self {
-        images: true,
-        slots: [true; 6],
-    };
-    /// Geometry, materials and image sizes, no texels.
-    pub const NO_IMAGES: Self = Self {
-        images: false,
-        slots: [true; 6],
-    };
-    /// Base colour images only.
-    pub const BASE_COLOR: Self = Self {
-        images: true,
-        slots: [true, false, false, false, false, false],
-    };
+    pub const ALL: Self = Self { slots: [true; 6] };
 }
 
 impl Default for LoadOptions {

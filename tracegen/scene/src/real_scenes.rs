@@ -64,7 +64,7 @@ fn real_scenes_have_the_counts_and_cameras_of_their_readme() {
             eprintln!("SKIPPED: {} is absent; set PARALLAX_SCENES", path.display());
             continue;
         }
-        let scene = load_file(&path, &LoadOptions::NO_IMAGES).unwrap().scene;
+        let scene = load_file(&path, &LoadOptions::ALL).unwrap().scene;
         assert_eq!(scene.triangle_count(), triangles, "{file}");
         assert_eq!(scene.materials.len(), materials, "{file}");
         assert_eq!(scene.images.len(), images, "{file}");

@@ -5,7 +5,7 @@ use super::masonry::{
 };
 use super::organic::{LeafShape, damask, leaf, metal, planks, soil, upright};
 use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, Surface, TextureSet, rgb, synthesize_all};
+use super::texture_synth::{Maps, Recipe, Surface, rgb};
 use scene::AlphaMode;
 
 /// The materials that the architecture asks for.
@@ -73,12 +73,12 @@ fn recipe(name: &'static str, maps: Maps, tile_m: f32, surface: Surface) -> Reci
 
 /// Texture sets of the rich palette, in the order that [`rich`] consumes them.
 #[must_use]
-pub fn rich_textures() -> Vec<TextureSet> {
+pub fn rich_textures() -> Vec<Recipe> {
     use Maps::{Full, FullOcclusion};
     let sand = [rgb(0xcdb894), rgb(0xb39b74)];
     let cream = [rgb(0xd9cbb0), rgb(0xc2ae8c)];
     let grey = [rgb(0xaaa499), rgb(0x8d867b)];
-    synthesize_all(&[
+    vec![
         recipe(
             "court-slabs",
             FullOcclusion,
@@ -215,11 +215,11 @@ pub fn rich_textures() -> Vec<TextureSet> {
             0.7,
             metal(rgb(0xd6ac55), rgb(0x6d5a35), 0.3, 0.28),
         ),
-    ])
+    ]
 }
 
 /// Every surface its own material.
-pub fn rich(scene: &mut SceneBuilder, sets: Vec<TextureSet>) -> Palette {
+pub fn rich(scene: &mut SceneBuilder, sets: Vec<Recipe>) -> Palette {
     let mut sets = sets.into_iter();
     let mut next = |leafy: bool| {
         let Some(set) = sets.next() else {
@@ -271,7 +271,7 @@ pub fn plain(scene: &mut SceneBuilder) -> Palette {
         surface,
     };
     let sand = [rgb(0xcdb894), rgb(0xb39b74)];
-    let mut sets = synthesize_all(&[
+    let mut sets = [
         simple(
             "floor",
             1024,
@@ -328,7 +328,7 @@ pub fn plain(scene: &mut SceneBuilder) -> Palette {
             2.0,
             planks([rgb(0x6b4a2e), rgb(0x3f2a1a)], 5, 0.75),
         ),
-    ])
+    ]
     .into_iter()
     .map(|set| scene.textured(set, |_| {}))
     .collect::<Vec<_>>();

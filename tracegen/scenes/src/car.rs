@@ -5,7 +5,7 @@ use super::masonry::carved_stone;
 use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
 use super::organic::damask;
 use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use super::texture_synth::{Maps, Recipe, rgb};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -32,7 +32,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         tile_m,
         surface,
     };
-    let mut sets = synthesize_all(&[
+    let mut sets = [
         recipe(
             "studio-floor",
             1024,
@@ -47,7 +47,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             0.4,
             damask(rgb(0x7a4a2c), rgb(0x6a3f25), 8.0),
         ),
-    ])
+    ]
     .into_iter();
     let floor = match sets.next() {
         Some(set) => scene.textured(set, |m| {

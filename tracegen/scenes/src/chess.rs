@@ -5,7 +5,7 @@ use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
 use super::noise::smoothstep;
 use super::organic::polished_wood;
 use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use super::texture_synth::{Maps, Recipe, rgb};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -317,7 +317,7 @@ pub fn scene() -> Scene {
         tile_m,
         surface,
     };
-    let mut sets = synthesize_all(&[
+    let mut sets = [
         recipe(
             "light-marble",
             0.25,
@@ -338,7 +338,7 @@ pub fn scene() -> Scene {
             0.8,
             polished_wood([rgb(0xa9794a), rgb(0x7d5430)], 0.45),
         ),
-    ])
+    ]
     .into_iter();
     let mut textured = |scene: &mut SceneBuilder, mirror: f32, roughness: f32| match sets.next() {
         Some(set) => scene.textured(set, |m| {

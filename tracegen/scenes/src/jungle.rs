@@ -4,13 +4,13 @@
 
 use super::creature::{self, Creature};
 use super::jungle_plants as plants;
+use super::jungle_temple;
 use super::masonry::{carved_band, carved_stone, dressed_stone};
 use super::mesh_builder::MeshBuilder;
 use super::noise::{Rng, bank, smoothstep};
 use super::organic::{LeafShape, bark, leaf, rock, skin, soil};
 use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, Surface, rgb, synthesize_all};
-use super::{jungle_temple, texture_synth::TextureSet};
+use super::texture_synth::{Maps, Recipe, Surface, rgb};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::{AlphaMode, Scene};
 use std::f32::consts::TAU;
@@ -66,7 +66,7 @@ struct Solids {
     eye: MaterialId,
 }
 
-fn textures() -> Vec<TextureSet> {
+fn textures() -> Vec<Recipe> {
     use LeafShape::{Blade, Frond, Grass, Ivy, Palm, Spray};
     let color = |name, size, surface: Surface| Recipe {
         name,
@@ -90,7 +90,7 @@ fn textures() -> Vec<TextureSet> {
         surface,
     };
     let moss_stone = [rgb(0x8d8a72), rgb(0x6b6d55)];
-    synthesize_all(&[
+    vec![
         color(
             "fern-bright",
             1024,
@@ -182,7 +182,7 @@ fn textures() -> Vec<TextureSet> {
             carved_stone([rgb(0x7f8468), rgb(0x5b634a)], 0.2, 0.8, 0.7),
         ),
         full("hide", 1.4, skin([rgb(0x857650), rgb(0x474c36)])),
-    ])
+    ]
 }
 
 fn materials(scene: &mut SceneBuilder) -> (Leaves, Solids) {

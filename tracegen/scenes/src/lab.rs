@@ -8,7 +8,7 @@ use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
 use super::noise::smoothstep;
 use super::organic::{paper_label, polished_wood};
 use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use super::texture_synth::{Maps, Recipe, rgb};
 use glam::{Affine3A, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -35,7 +35,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         tile_m,
         surface,
     };
-    let mut sets = synthesize_all(&[
+    let mut sets = [
         recipe(
             "rack-beech",
             512,
@@ -55,7 +55,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             octagon_tiles([rgb(0xe9e8e0), rgb(0xdcdcd4)], rgb(0x2f6a72), 8),
         ),
         recipe("label", 256, 1.0, paper_label(rgb(0xeee4c8), rgb(0x33291f))),
-    ])
+    ]
     .into_iter();
     let mut textured = |scene: &mut SceneBuilder, roughness: f32, mirror: f32| match sets.next() {
         Some(set) => scene.textured(set, |m| {

@@ -7,7 +7,7 @@ use super::mesh_builder::MeshBuilder;
 use super::noise::{Rng, bank, smoothstep};
 use super::organic::{bark, planks, rock, soil, turf, upright};
 use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use super::texture_synth::{Maps, Recipe, rgb};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::TAU;
@@ -57,7 +57,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         tile_m,
         surface,
     };
-    let mut sets = synthesize_all(&[
+    let mut sets = [
         recipe(
             "lavender-field",
             3.4,
@@ -99,7 +99,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             rock([rgb(0x9c9484), rgb(0xb8b09c)], 0.25),
         ),
         recipe("bark", 1.6, bark([rgb(0x4a3c2e), rgb(0x8c7a62)], 0.2)),
-    ])
+    ]
     .into_iter();
     let mut textured = |scene: &mut SceneBuilder| match sets.next() {
         Some(set) => scene.textured(set, |m| m.roughness = 0.9),

@@ -3,8 +3,9 @@
 //! Texture coordinates are written in metres (u to the right, v downwards as seen from outside)
 //! and scaled by the material's tile when the mesh is finished.
 
-use glam::{Affine3A, Vec2, Vec3, Vec4, vec2, vec3};
+use glam::{Affine3A, Vec2, Vec3, vec2, vec3};
 use scene::Mesh;
+use scene::geometry::vertex_tangents;
 use std::f32::consts::TAU;
 
 /// A mesh under construction.
@@ -449,7 +450,7 @@ impl MeshBuilder {
             }
         }
         self.indices = indices;
-        let tangents = self.tangents();
+        let tangents = vertex_tangents(&self.positions, &self.normals, &self.uvs, &self.indices);
         Mesh {
             name: name.to_owned(),
             positions: self.positions,
@@ -457,46 +458,10 @@ impl MeshBuilder {
             tangents,
             uv0: self.uvs,
             uv1: Vec::new(),
+            colors: Vec::new(),
             indices: self.indices,
             material,
         }
-    }
-
-    /// Tangents along +u; w so that `cross(n, t) * w` points towards -v, a normal map's up.
-    fn tangents(&self) -> Vec<Vec4> {
-        let mut tangent = vec![Vec3::ZERO; self.positions.len()];
-        let mut bitangent = vec![Vec3::ZERO; self.positions.len()];
-        for t in self.indices.chunks_exact(3) {
-            let i = [t[0], t[1], t[2]].map(|i| i as usize);
-            let (e1, e2) = (
-                self.positions[i[1]] - self.positions[i[0]],
-                self.positions[i[2]] - self.positions[i[0]],
-            );
-            let (d1, d2) = (
-                self.uvs[i[1]] - self.uvs[i[0]],
-                self.uvs[i[2]] - self.uvs[i[0]],
-            );
-            let det = d1.x * d2.y - d2.x * d1.y;
-            if det.abs() < 1e-12 {
-                continue;
-            }
-            let sign = det.signum();
-            let along_u = (e1 * d2.y - e2 * d1.y) * sign;
-            let along_v = (e2 * d1.x - e1 * d2.x) * sign;
-            for k in i {
-                tangent[k] += along_u;
-                bitangent[k] += along_v;
-            }
-        }
-        self.normals
-            .iter()
-            .zip(tangent.iter().zip(&bitangent))
-            .map(|(n, (t, b))| {
-                let t = (*t - *n * n.dot(*t)).normalize_or(n.any_orthonormal_vector());
-                let w = if n.cross(t).dot(*b) > 0.0 { -1.0 } else { 1.0 };
-                t.extend(w)
-            })
-            .collect()
     }
 }
 

@@ -6,7 +6,7 @@ use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
 use super::noise::{Rng, smoothstep};
 use super::organic::{damask, polished_wood};
 use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use super::texture_synth::{Maps, Recipe, rgb};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -39,7 +39,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         tile_m,
         surface,
     };
-    let mut sets = synthesize_all(&[
+    let mut sets = [
         recipe(
             "rosewood",
             1024,
@@ -58,7 +58,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             0.7,
             polished_wood([rgb(0xb98a58), rgb(0x8a6038)], 0.4),
         ),
-    ])
+    ]
     .into_iter();
     let mut textured = |scene: &mut SceneBuilder, roughness: f32, mirror: f32| match sets.next() {
         Some(set) => scene.textured(set, |m| {

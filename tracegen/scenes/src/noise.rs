@@ -3,8 +3,9 @@
 //! Textures of a scene share a handful of precomputed fields: looking one up costs a few
 //! nanoseconds where evaluating six octaves would cost fifty, and a scene has some 70 M texels.
 
-use rayon::prelude::*;
+use std::panic::resume_unwind;
 use std::sync::OnceLock;
+use std::thread::ScopedJoinHandle;
 
 /// Edge of the shared noise fields in samples; a power of two, so that wrapping is a mask.
 pub const FIELD_SIZE: usize = 1024;
@@ -86,16 +87,13 @@ pub fn lerp(a: f32, b: f32, t: f32) -> f32 {
 pub struct Field(Vec<f32>);
 
 impl Field {
-    fn build(f: impl Fn(usize, usize) -> f32 + Sync) -> Self {
+    fn build(f: impl Fn(usize, usize) -> f32) -> Self {
         let mut samples = vec![0.0; FIELD_SIZE * FIELD_SIZE];
-        samples
-            .par_chunks_mut(FIELD_SIZE)
-            .enumerate()
-            .for_each(|(y, row)| {
-                for (x, sample) in row.iter_mut().enumerate() {
-                    *sample = f(x, y);
-                }
-            });
+        for (y, row) in samples.chunks_mut(FIELD_SIZE).enumerate() {
+            for (x, sample) in row.iter_mut().enumerate() {
+                *sample = f(x, y);
+            }
+        }
         Self(samples)
     }
 
@@ -106,36 +104,33 @@ impl Field {
         for octave in 0..octaves {
             let period = cells << octave;
             let span = FIELD_SIZE / period;
-            samples
-                .par_chunks_mut(FIELD_SIZE)
-                .enumerate()
-                .for_each(|(y, row)| {
-                    let (cell_y, ty) = (y / span, (y % span) as f32 / span as f32);
-                    let sy = ty * ty * (3.0 - 2.0 * ty);
-                    let next_y = (cell_y + 1) % period;
-                    let column = |cell_x: usize| {
-                        let at =
-                            |y: usize| hash_unit((cell_x % period) as i32, y as i32, seed + octave);
-                        lerp(at(cell_y), at(next_y), sy)
-                    };
-                    let mut left = column(0);
-                    for cell_x in 0..period {
-                        let right = column(cell_x + 1);
-                        for i in 0..span {
-                            let tx = i as f32 / span as f32;
-                            let sx = tx * tx * (3.0 - 2.0 * tx);
-                            row[cell_x * span + i] += amplitude * lerp(left, right, sx);
-                        }
-                        left = right;
+            for (y, row) in samples.chunks_mut(FIELD_SIZE).enumerate() {
+                let (cell_y, ty) = (y / span, (y % span) as f32 / span as f32);
+                let sy = ty * ty * (3.0 - 2.0 * ty);
+                let next_y = (cell_y + 1) % period;
+                let column = |cell_x: usize| {
+                    let at =
+                        |y: usize| hash_unit((cell_x % period) as i32, y as i32, seed + octave);
+                    lerp(at(cell_y), at(next_y), sy)
+                };
+                let mut left = column(0);
+                for cell_x in 0..period {
+                    let right = column(cell_x + 1);
+                    for i in 0..span {
+                        let tx = i as f32 / span as f32;
+                        let sx = tx * tx * (3.0 - 2.0 * tx);
+                        row[cell_x * span + i] += amplitude * lerp(left, right, sx);
                     }
-                });
+                    left = right;
+                }
+            }
             total += amplitude;
             amplitude *= gain;
         }
         // Sums of octaves crowd around one half; stretching restores the contrast.
-        samples
-            .par_iter_mut()
-            .for_each(|s| *s = ((*s / total - 0.5) * 1.7 + 0.5).clamp(0.0, 1.0));
+        for s in &mut samples {
+            *s = ((*s / total - 0.5) * 1.7 + 0.5).clamp(0.0, 1.0);
+        }
         Self(samples)
     }
 
@@ -202,10 +197,23 @@ pub struct NoiseBank {
 #[must_use]
 pub fn bank() -> &'static NoiseBank {
     static BANK: OnceLock<NoiseBank> = OnceLock::new();
-    BANK.get_or_init(|| NoiseBank {
-        cloud: Field::fbm(4, 7, 0.55, 11),
-        mottle: Field::fbm(16, 5, 0.6, 23),
-        grain: Field::fbm(128, 3, 0.7, 37),
-        pebble: Field::cells(24, 53),
+    BANK.get_or_init(|| {
+        // On threads of their own: a worker of the pool that waits for others' shares takes up
+        // other work meanwhile, which may ask for this bank and would wait for itself.
+        std::thread::scope(|scope| {
+            let mottle = scope.spawn(|| Field::fbm(16, 5, 0.6, 23));
+            let grain = scope.spawn(|| Field::fbm(128, 3, 0.7, 37));
+            let pebble = scope.spawn(|| Field::cells(24, 53));
+            let cloud = Field::fbm(4, 7, 0.55, 11);
+            let join = |field: ScopedJoinHandle<'_, Field>| {
+                field.join().unwrap_or_else(|panic| resume_unwind(panic))
+            };
+            NoiseBank {
+                cloud,
+                mottle: join(mottle),
+                grain: join(grain),
+                pebble: join(pebble),
+            }
+        })
     })
 }

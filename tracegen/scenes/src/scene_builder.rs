@@ -1,7 +1,7 @@
 //! Puts materials, meshes, instances, cameras and lights together into a scene.
 
 use super::mesh_builder::MeshBuilder;
-use super::texture_synth::{Rgb, TextureSet, linear};
+use super::texture_synth::{Map, Recipe, Rgb, linear};
 use glam::{Affine3A, Vec3};
 use scene::{Camera, Instance, Light, Material, Scene, TextureRef};
 
@@ -59,17 +59,21 @@ impl SceneBuilder {
         self.material(material, 1.0)
     }
 
-    /// Adds a material with a set of textures, then what `adjust` changes.
-    pub fn textured(&mut self, set: TextureSet, adjust: impl FnOnce(&mut Material)) -> MaterialId {
+    /// Adds a material with its textures, then what `adjust` changes.
+    pub fn textured(&mut self, recipe: Recipe, adjust: impl FnOnce(&mut Material)) -> MaterialId {
+        let (name, tile_m, maps) = (recipe.name, recipe.tile_m, recipe.maps);
+        let source = recipe.into_source(&self.scene.name);
         let images = &mut self.scene.images;
-        let mut add = |image| {
-            images.push(image);
-            TextureRef::new(images.len() - 1)
+        let mut add = |map: Map| {
+            maps.contains(map).then(|| {
+                images.push(map.image(&source));
+                TextureRef::new(images.len() - 1)
+            })
         };
-        let base_color_texture = Some(add(set.color));
-        let normal_texture = set.normal.map(&mut add);
-        let metallic_roughness_texture = set.metallic_roughness.map(&mut add);
-        let occlusion_texture = set.occlusion.map(&mut add);
+        let base_color_texture = add(Map::Color);
+        let normal_texture = add(Map::Normal);
+        let metallic_roughness_texture = add(Map::Roughness);
+        let occlusion_texture = add(Map::Occlusion);
         // The texture multiplies the factors, as in glTF.
         let factor = |plain| {
             if metallic_roughness_texture.is_some() {
@@ -79,7 +83,7 @@ impl SceneBuilder {
             }
         };
         let mut material = Material {
-            name: set.name.to_owned(),
+            name: name.to_owned(),
             base_color_texture,
             normal_texture,
             metallic: factor(0.0),
@@ -89,7 +93,7 @@ impl SceneBuilder {
             ..Material::default()
         };
         adjust(&mut material);
-        self.material(material, set.tile_m)
+        self.material(material, tile_m)
     }
 
     /// Adds a mesh that is not placed yet; returns its index.

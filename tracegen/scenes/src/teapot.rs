@@ -5,7 +5,7 @@ use super::mesh_builder::MeshBuilder;
 use super::organic::polished_wood;
 use super::scene_builder::SceneBuilder;
 use super::teapot_patches::PATCHES;
-use super::texture_synth::{Maps, Recipe, rgb, synthesize_all};
+use super::texture_synth::{Maps, Recipe, rgb};
 use glam::{Affine3A, Vec3, vec2, vec3};
 use scene::Scene;
 
@@ -50,7 +50,7 @@ pub fn scene() -> Scene {
         tile_m,
         surface,
     };
-    let mut sets = synthesize_all(&[
+    let mut sets = [
         recipe(
             "checker-floor",
             0.8,
@@ -61,7 +61,7 @@ pub fn scene() -> Scene {
             0.6,
             polished_wood([rgb(0x8a5a34), rgb(0x5a3518)], 0.4),
         ),
-    ])
+    ]
     .into_iter();
     let glaze = scene.plain("glaze", rgb(0xc9482e), 0.12, |m| {
         m.mirror = 0.08;

@@ -3,7 +3,8 @@
 use super::noise::lerp;
 use formats::texture::ColorSpace;
 use rayon::prelude::*;
-use scene::Image;
+use scene::image::{Image, ImageSource, OpenSource};
+use scene::{SceneError, srgb};
 use std::sync::Arc;
 
 /// A colour as an artist picks it: sRGB-encoded, 0 to 1.
@@ -30,14 +31,7 @@ pub fn shade(a: Rgb, factor: f32) -> Rgb {
 /// The linear-light value of an sRGB colour, for material factors.
 #[must_use]
 pub fn linear(color: Rgb) -> glam::Vec3 {
-    let decode = |c: f32| {
-        if c <= 0.040_45 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        }
-    };
-    glam::Vec3::from(color.map(decode))
+    glam::Vec3::from(color.map(|c| srgb::decode(c.into()) as f32))
 }
 
 /// What a surface looks like at one point.
@@ -102,83 +96,144 @@ pub struct Recipe {
     pub surface: Surface,
 }
 
-/// A material's images.
-pub struct TextureSet {
-    /// Name of the material.
-    pub name: &'static str,
-    /// Metres that one repeat covers.
-    pub tile_m: f32,
+/// One of a material's images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Map {
     /// Base colour, sRGB, with coverage in alpha.
-    pub color: Image,
+    Color = 0,
     /// Tangent-space normal: x along +u, y towards -v.
-    pub normal: Option<Image>,
+    Normal,
     /// Roughness in G, metalness in B.
-    pub metallic_roughness: Option<Image>,
+    Roughness,
     /// Occlusion in R.
-    pub occlusion: Option<Image>,
+    Occlusion,
+}
+
+impl Map {
+    /// This map of a recipe.
+    #[must_use]
+    pub fn image(self, source: &Arc<RecipeSource>) -> Image {
+        let (suffix, color_space) = match self {
+            Self::Color => ("color", ColorSpace::Srgb),
+            Self::Normal => ("normal", ColorSpace::Linear),
+            Self::Roughness => ("roughness", ColorSpace::Linear),
+            Self::Occlusion => ("occlusion", ColorSpace::Linear),
+        };
+        let recipe = &source.recipe;
+        Image {
+            name: format!("{}-{suffix}", recipe.name),
+            size: [recipe.size; 2],
+            color_space,
+            source: Arc::clone(source) as Arc<dyn ImageSource>,
+            part: self as usize,
+        }
+    }
+}
+
+impl Maps {
+    /// True where the material gets this image.
+    #[must_use]
+    pub fn contains(self, map: Map) -> bool {
+        match map {
+            Map::Color => true,
+            Map::Normal => self != Self::Color,
+            Map::Roughness => matches!(self, Self::Full | Self::FullOcclusion),
+            Map::Occlusion => self == Self::FullOcclusion,
+        }
+    }
 }
 
 fn byte(x: f32) -> u8 {
     (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
+/// A recipe as a source of images. Within a scene, its name tells it from all others.
+pub struct RecipeSource {
+    recipe: Recipe,
+    scene: String,
+}
+
 impl Recipe {
-    /// Evaluates the surface once a texel and packs the images.
+    /// The source of the recipe's images in a scene.
     #[must_use]
-    pub fn synthesize(&self) -> TextureSet {
+    pub fn into_source(self, scene: &str) -> Arc<RecipeSource> {
+        Arc::new(RecipeSource {
+            recipe: self,
+            scene: scene.to_owned(),
+        })
+    }
+
+    /// Evaluates the surface once a texel and packs the images that are asked for, by number.
+    fn synthesize(&self, parts: &[usize]) -> Vec<Vec<u8>> {
         let n = self.size as usize;
-        let wants = |maps: &[Maps]| maps.contains(&self.maps);
-        let with_normal = !wants(&[Maps::Color]);
-        let with_mr = wants(&[Maps::Full, Maps::FullOcclusion]);
-        let with_ao = wants(&[Maps::FullOcclusion]);
-        let buffer = |on: bool| vec![255u8; if on { n * n * 4 } else { n * 4 }];
-        let (mut color, mut mr, mut ao) =
-            (vec![255u8; n * n * 4], buffer(with_mr), buffer(with_ao));
-        let mut height = vec![0.0f32; n * n];
-        // Maps that are not wanted are a single row, so that the loop stays one shape.
-        let stride = |on: bool| if on { 4 * n } else { 4 };
-        let (mr_stride, ao_stride) = (stride(with_mr), stride(with_ao));
+        let wants = |map: Map| parts.contains(&(map as usize));
+        // A map that is not wanted has rows of one texel, so that the loop stays one shape.
+        let row_bytes = |map| if wants(map) { 4 * n } else { 4 };
+        let buffer = |map| vec![255u8; row_bytes(map) * n];
+        let (mut color, mut mr, mut ao) = (
+            buffer(Map::Color),
+            buffer(Map::Roughness),
+            buffer(Map::Occlusion),
+        );
+        let height_row = if wants(Map::Normal) { n } else { 1 };
+        let mut height = vec![0.0f32; height_row * n];
         color
-            .par_chunks_mut(4 * n)
-            .zip(mr.par_chunks_mut(mr_stride))
-            .zip(ao.par_chunks_mut(ao_stride))
-            .zip(height.par_chunks_mut(n))
+            .par_chunks_mut(row_bytes(Map::Color))
+            .zip(mr.par_chunks_mut(row_bytes(Map::Roughness)))
+            .zip(ao.par_chunks_mut(row_bytes(Map::Occlusion)))
+            .zip(height.par_chunks_mut(height_row))
             .enumerate()
             .for_each(|(y, (((color, mr), ao), height))| {
                 let v = (y as f32 + 0.5) / n as f32;
                 for x in 0..n {
                     let texel = (self.surface)((x as f32 + 0.5) / n as f32, v);
                     let at = 4 * x..4 * x + 3;
-                    color[at.clone()].copy_from_slice(&texel.color.map(byte));
-                    color[4 * x + 3] = byte(texel.alpha);
-                    if with_mr {
+                    if wants(Map::Color) {
+                        color[at.clone()].copy_from_slice(&texel.color.map(byte));
+                        color[4 * x + 3] = byte(texel.alpha);
+                    }
+                    if wants(Map::Roughness) {
                         mr[at.clone()].copy_from_slice(&[
                             255,
                             byte(texel.rough),
                             byte(texel.metal),
                         ]);
                     }
-                    if with_ao {
+                    if wants(Map::Occlusion) {
                         ao[at].copy_from_slice(&[byte(texel.open); 3]);
                     }
-                    height[x] = texel.height;
+                    if wants(Map::Normal) {
+                        height[x] = texel.height;
+                    }
                 }
             });
-        let image = |suffix: &str, rgba: Vec<u8>, color_space| Image {
-            name: format!("{}-{suffix}", self.name),
-            size: [self.size; 2],
-            rgba: Arc::from(rgba),
-            color_space,
-        };
-        TextureSet {
-            name: self.name,
-            tile_m: self.tile_m,
-            color: image("color", color, ColorSpace::Srgb),
-            normal: with_normal
-                .then(|| image("normal", normal_map(&height, n), ColorSpace::Linear)),
-            metallic_roughness: with_mr.then(|| image("roughness", mr, ColorSpace::Linear)),
-            occlusion: with_ao.then(|| image("occlusion", ao, ColorSpace::Linear)),
+        let normal = wants(Map::Normal).then(|| normal_map(&height, n));
+        let mut made = [color, normal.unwrap_or_default(), mr, ao];
+        parts
+            .iter()
+            .map(|&part| made.get_mut(part).map(std::mem::take).unwrap_or_default())
+            .collect()
+    }
+}
+
+impl ImageSource for RecipeSource {
+    fn open(&self) -> Result<Box<dyn OpenSource + '_>, SceneError> {
+        Ok(Box::new(self))
+    }
+}
+
+impl OpenSource for &RecipeSource {
+    /// A surface is code: what tells it apart is the text of this crate.
+    fn identify(&self, sink: &mut dyn FnMut(&[u8])) {
+        for text in SOURCE_TEXT {
+            sink(text.as_bytes());
         }
+        let Recipe { name, size, .. } = self.recipe;
+        sink(format!("\0{}\0{name}\0{size}", self.scene).as_bytes());
+    }
+
+    fn texels(&self, parts: &[usize]) -> Result<Vec<Vec<u8>>, SceneError> {
+        Ok(self.recipe.synthesize(parts))
     }
 }
 
@@ -201,8 +256,54 @@ fn normal_map(height: &[f32], n: usize) -> Vec<u8> {
     rgba
 }
 
-/// Computes every recipe, in parallel, in order.
-#[must_use]
-pub fn synthesize_all(recipes: &[Recipe]) -> Vec<TextureSet> {
-    recipes.par_iter().map(Recipe::synthesize).collect()
+/// The text of every file of this crate that may take part in a texture.
+const SOURCE_TEXT: &[&str] = &[
+    include_str!("atrium.rs"),
+    include_str!("atrium_furnishing.rs"),
+    include_str!("atrium_materials.rs"),
+    include_str!("atrium_parts.rs"),
+    include_str!("car.rs"),
+    include_str!("car_body.rs"),
+    include_str!("car_details.rs"),
+    include_str!("chess.rs"),
+    include_str!("creature.rs"),
+    include_str!("gears.rs"),
+    include_str!("glassware.rs"),
+    include_str!("jungle.rs"),
+    include_str!("jungle_plants.rs"),
+    include_str!("jungle_temple.rs"),
+    include_str!("lab.rs"),
+    include_str!("lab_still.rs"),
+    include_str!("masonry.rs"),
+    include_str!("meadow.rs"),
+    include_str!("meadow_house.rs"),
+    include_str!("meadow_parts.rs"),
+    include_str!("mesh_builder.rs"),
+    include_str!("music_box.rs"),
+    include_str!("music_train.rs"),
+    include_str!("noise.rs"),
+    include_str!("organic.rs"),
+    include_str!("scene_builder.rs"),
+    include_str!("teapot.rs"),
+    include_str!("teapot_patches.rs"),
+    include_str!("texture_synth.rs"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::SOURCE_TEXT;
+
+    #[test]
+    fn the_keys_of_textures_cover_every_file_of_this_crate() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap_or_default();
+            // The table and the tests make no texture.
+            if name != "lib.rs" && name != "tests.rs" {
+                let text = std::fs::read_to_string(&path).unwrap();
+                assert!(SOURCE_TEXT.contains(&text.as_str()), "{}", path.display());
+            }
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! The command line, one file a subcommand.
 
+mod cache_args;
 pub mod raster;
 pub mod rays;
 pub mod scene_args;

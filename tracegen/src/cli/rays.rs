@@ -69,7 +69,6 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let start = Instant::now();
     let progress = Progress::new("loading the scene", 0, "");
     let textures = LoadOptions {
-        images: true,
         // Base colour, metallic-roughness and emissive: what rays look at.
         slots: [true, false, true, false, false, true],
     };

@@ -417,7 +417,7 @@ mod tests {
         ] {
             let args = parse(flags).unwrap();
             let error = args
-                .setup(None, 1, &LoadOptions::NO_IMAGES)
+                .setup(None, 1, &LoadOptions::ALL)
                 .unwrap_err()
                 .to_string();
             assert!(error.contains(part), "{flags}: {error}");

@@ -1,11 +1,13 @@
 //! `tracegen scenes`: built-in scenes, or what a file holds.
 
+use super::cache_args::CacheArgs;
 use super::scene_args::load_scene;
+use ::scenes::BUILTINS;
 use clap::Args;
 use scene::{LoadOptions, Scene};
 use serde::Serialize;
 use std::time::Instant;
-use textures::{CompressedTexture, TextureSet};
+use textures::{Cache, TextureSet};
 
 /// Arguments of `tracegen scenes`.
 #[derive(Args, Debug)]
@@ -16,6 +18,8 @@ pub struct ScenesArgs {
     /// Also read the images, compress them as a capture does, and tell the bytes.
     #[arg(long, requires = "scene")]
     textures: bool,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -33,6 +37,7 @@ struct Builtin {
     name: &'static str,
     description: &'static str,
     triangles: u64,
+    cameras: &'static [&'static str],
 }
 
 /// JSON of one scene.
@@ -79,9 +84,12 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
         None => list(args.json)?,
         Some(spec) => {
             let description = if args.textures {
-                read_textures(&spec)?
+                {
+                    let cache = args.cache.open()?;
+                    read_textures(&spec, cache.as_ref())?
+                }
             } else {
-                describe(&load_scene(&spec, &LoadOptions::NO_IMAGES)?)
+                describe(&load_scene(&spec, &LoadOptions::ALL)?)
             };
             if args.json {
                 json(&description)?
@@ -94,23 +102,23 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
 }
 
 /// Loads and compresses everything; how long that took goes to stderr.
-fn read_textures(spec: &str) -> anyhow::Result<Description> {
+fn read_textures(spec: &str, cache: Option<&Cache>) -> anyhow::Result<Description> {
     let start = Instant::now();
-    let mut scene = load_scene(spec, &LoadOptions::ALL)?;
+    let scene = load_scene(spec, &LoadOptions::ALL)?;
     let loaded = start.elapsed();
-    let set = TextureSet::compress_and_free(&mut scene)?;
+    let set = TextureSet::prepare(&scene, |_| true, cache)?;
     for note in &set.notes {
         shell::warn(note);
     }
     shell::note(&format!(
-        "loaded in {:.2} s, {} textures compressed in {:.2} s",
+        "loaded in {:.2} s, {} textures made ready in {:.2} s, {} of them from the cache",
         loaded.as_secs_f64(),
         set.textures.len(),
         (start.elapsed() - loaded).as_secs_f64(),
+        set.cached,
     ));
-    let bytes = set.textures.iter().map(CompressedTexture::bytes).sum();
     Ok(Description {
-        texture_bytes: Some(bytes),
+        texture_bytes: Some(set.bytes()),
         ..describe(&scene)
     })
 }
@@ -120,28 +128,29 @@ fn json(value: &impl Serialize) -> serde_json::Result<String> {
 }
 
 fn list(as_json: bool) -> anyhow::Result<String> {
-    let scenes: Vec<Builtin> = ::scenes::names()
-        .iter()
-        .filter_map(|&(name, description)| {
-            let triangles = ::scenes::build(name)?.triangle_count();
-            Some(Builtin {
-                name,
-                description,
-                triangles,
-            })
-        })
-        .collect();
     if as_json {
+        let scenes = BUILTINS
+            .iter()
+            .map(|b| Builtin {
+                name: b.name,
+                description: b.description,
+                triangles: b.triangles,
+                cameras: b.cameras,
+            })
+            .collect();
         let schema = "tracegen.scenes/1";
         return Ok(json(&BuiltinList { schema, scenes })?);
     }
-    let width = scenes.iter().map(|s| s.name.len()).max().unwrap_or(0);
-    Ok(scenes
+    let width = BUILTINS.iter().map(|b| b.name.len()).max().unwrap_or(0);
+    Ok(BUILTINS
         .iter()
-        .map(|s| {
+        .map(|b| {
             format!(
-                "{:width$}  {:>9} triangles  {}\n",
-                s.name, s.triangles, s.description
+                "{:width$}  {:>7} triangles  {} (cameras: {})\n",
+                b.name,
+                b.triangles,
+                b.description,
+                b.cameras.join(", ")
             )
         })
         .collect())

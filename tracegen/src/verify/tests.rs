@@ -13,7 +13,6 @@ use raster::error::RasterError;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
-use std::sync::Arc;
 use textures::TextureSet;
 
 const SIZE_PX: [u32; 2] = [200, 136];
@@ -187,12 +186,7 @@ fn cells(cells: u32, opaque: impl Fn(u32, u32) -> bool) -> Image {
             }
         })
         .collect();
-    Image {
-        name: "cells".into(),
-        size: [edge; 2],
-        rgba: Arc::from(rgba),
-        color_space: ColorSpace::Srgb,
-    }
+    Image::from_texels("cells", [edge; 2], ColorSpace::Srgb, rgba)
 }
 
 /// Triangles of random size, place and slant in front of the camera, some across the near plane.

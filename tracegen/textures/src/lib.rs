@@ -4,46 +4,38 @@
 //! - Opaque images become BC1. So do those of alpha-masked materials, with BC1's one-bit alpha; a
 //!   transparent texel is then black, so the shader divides colour by alpha after filtering.
 //! - Images with smooth alpha that a blended material samples become BC3.
-//! - Only images that a placed mesh samples are compressed.
+//! - Only images that a placed mesh samples become textures.
 //! - Level sizes must be whole blocks at level 0: other sizes are resampled up to the next
 //!   multiple of four, with a note.
+//! - A texture that no view sees gets its entry in the trace's table and no blocks.
+//! - Blocks are kept between runs, see [`Cache`].
 //!
 //! The encoder is texpresso's range fit with fixed weights (perceptual for colour, uniform for
 //! data). It works block by block, so the bytes do not depend on the number of threads.
 
+mod cache;
+mod compress;
 mod mipmap;
 mod role;
 #[cfg(test)]
 mod tests;
 
+pub use cache::Cache;
+
+use cache::KeyHasher;
 use formats::texture::{ColorSpace, TexelFormat, Texture};
-use mipmap::Level;
 use rayon::prelude::*;
 use role::{Alpha, Role};
-use scene::images::MAX_SIZE;
-use scene::{Image, Scene};
-use std::borrow::Cow;
-use std::sync::Arc;
-use texpresso::{Algorithm, COLOUR_WEIGHTS_PERCEPTUAL, COLOUR_WEIGHTS_UNIFORM, Format, Params};
-
-/// Edge of a compressed block in texels.
-const BLOCK: u32 = 4;
+use scene::{Image, MAX_IMAGE_SIZE, Scene, SceneError};
 
 /// A texture ready for upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CompressedTexture {
     /// Its entry in the trace's texture table.
     pub texture: Texture,
-    /// Blocks of each level, row by row from the top, largest level first.
-    pub levels: Vec<Vec<u8>>,
-}
-
-impl CompressedTexture {
-    /// Bytes of all levels.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.levels.iter().map(Vec::len).sum()
-    }
+    /// Blocks of all levels, largest level first, each row by row from the top. Empty for a
+    /// texture that no view sees.
+    pub blocks: Vec<u8>,
 }
 
 /// The textures that a scene samples.
@@ -55,178 +47,251 @@ pub struct TextureSet {
     pub of_image: Vec<Option<usize>>,
     /// What was changed on the way, one sentence each.
     pub notes: Vec<String>,
+    /// Textures whose blocks the cache held.
+    pub cached: usize,
 }
 
-/// An image that cannot become a texture.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("image '{image}': expected {expected}, found {found}")]
-pub struct TextureError {
-    /// Image name.
-    pub image: String,
-    /// What should be there.
-    pub expected: String,
-    /// What is there.
-    pub found: String,
+/// Why an image cannot become a texture.
+#[derive(Debug, thiserror::Error)]
+pub enum TextureError {
+    /// Its size or its texels are out of range.
+    #[error("image '{image}': expected {expected}, found {found}")]
+    Image {
+        /// Image name.
+        image: String,
+        /// What should be there.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// Its texels cannot be made.
+    #[error(transparent)]
+    Source(#[from] SceneError),
 }
 
 impl TextureSet {
-    /// Compresses the images that the scene samples, on all cores.
+    /// Compresses all images that the scene samples, on all cores.
     ///
     /// # Errors
-    /// An image of no size, of more than 16384 texels an edge, or without texels.
+    /// As [`Self::prepare`].
     pub fn compress(scene: &Scene) -> Result<Self, TextureError> {
-        let images = scene.images.iter().map(|i| (i, Arc::clone(&i.rgba)));
-        compress_all(images.collect(), &role::of_images(scene))
+        Self::prepare(scene, |_| true, None)
     }
 
-    /// [`Self::compress`], freeing the texels of each image as soon as it is compressed (and of
-    /// the images that nothing samples), which halves the peak memory of a capture.
+    /// Makes the textures of all images that the scene samples, on all cores. Blocks are made for
+    /// the images that are `seen`, and taken from the cache where it has them.
     ///
     /// # Errors
-    /// As [`Self::compress`].
-    pub fn compress_and_free(scene: &mut Scene) -> Result<Self, TextureError> {
+    /// An image that cannot be read or decoded, of no size or of more than 16384 texels an edge.
+    pub fn prepare(
+        scene: &Scene,
+        seen: impl Fn(usize) -> bool + Sync,
+        cache: Option<&Cache>,
+    ) -> Result<Self, TextureError> {
         let roles = role::of_images(scene);
-        let texels: Vec<Arc<[u8]>> = (scene.images.iter_mut())
-            .map(|i| std::mem::replace(&mut i.rgba, Arc::new([])))
-            .collect();
-        compress_all(scene.images.iter().zip(texels).collect(), &roles)
-    }
-}
-
-fn compress_all(
-    images: Vec<(&Image, Arc<[u8]>)>,
-    roles: &[Option<Role>],
-) -> Result<TextureSet, TextureError> {
-    let compressed: Vec<Option<(CompressedTexture, Option<String>)>> = images
-        .into_par_iter()
-        .zip(roles)
-        // One image at a time to each thread, so that as few as possible are in flight.
-        .with_max_len(1)
-        .map(|((image, rgba), role)| {
-            role.map(|role| compress_image(image, &rgba, role))
-                .transpose()
-        })
-        .collect::<Result<_, _>>()?;
-    let mut set = TextureSet::default();
-    for entry in compressed {
-        set.of_image
-            .push(entry.as_ref().map(|_| set.textures.len()));
-        if let Some((texture, note)) = entry {
-            set.textures.push(texture);
-            set.notes.extend(note);
+        let groups = scene::image::by_source(&scene.images, |i| roles[i].is_some());
+        let made: Vec<Vec<Made>> = groups
+            .into_par_iter()
+            // One source at a time to each thread, so that as few as possible are in flight.
+            .with_max_len(1)
+            .map(|group| {
+                let members = group.into_iter().filter_map(|index| {
+                    roles[index].map(|role| Member {
+                        index,
+                        image: &scene.images[index],
+                        role,
+                        seen: seen(index),
+                    })
+                });
+                prepare_source(members.collect(), cache)
+            })
+            .collect::<Result<_, TextureError>>()?;
+        let mut by_image: Vec<Option<Made>> = scene.images.iter().map(|_| None).collect();
+        for made in made.into_iter().flatten() {
+            let index = made.index;
+            by_image[index] = Some(made);
         }
+        let mut set = Self::default();
+        for made in by_image {
+            set.of_image.push(made.as_ref().map(|_| set.textures.len()));
+            if let Some(made) = made {
+                set.notes.extend(note(&scene.images[made.index]));
+                set.cached += usize::from(made.cached);
+                set.textures.push(made.texture);
+            }
+        }
+        Ok(set)
     }
-    Ok(set)
+
+    /// Bytes of all blocks.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.textures.iter().map(|t| t.blocks.len()).sum()
+    }
+
+    /// Textures that no view sees.
+    #[must_use]
+    pub fn unseen(&self) -> usize {
+        self.textures.iter().filter(|t| t.blocks.is_empty()).count()
+    }
 }
 
-fn compress_image(
-    image: &Image,
-    rgba: &[u8],
+/// An image that is to become a texture.
+#[derive(Clone, Copy)]
+struct Member<'a> {
+    index: usize,
+    image: &'a Image,
     role: Role,
-) -> Result<(CompressedTexture, Option<String>), TextureError> {
-    let error = |expected: String, found: String| TextureError {
-        image: image.name.clone(),
-        expected,
-        found,
-    };
-    let [width, height] = image.size;
-    if !(1..=MAX_SIZE).contains(&width) || !(1..=MAX_SIZE).contains(&height) {
-        return Err(error(
-            format!("a size from 1x1 to {MAX_SIZE}x{MAX_SIZE}"),
-            format!("{width}x{height}"),
-        ));
-    }
-    let expected_bytes = width as usize * height as usize * 4;
-    if rgba.len() != expected_bytes {
-        return Err(error(
-            format!("{expected_bytes} bytes of RGBA8 for {width}x{height}"),
-            format!("{} bytes", rgba.len()),
-        ));
-    }
-    let kind = mipmap::Kind {
-        srgb: image.color_space == ColorSpace::Srgb,
-        normal_map: role.normal_map,
-    };
-    let alpha = match role.alpha {
-        Alpha::Mask(_) | Alpha::Smooth if rgba.chunks_exact(4).all(|t| t[3] == 255) => {
-            Alpha::Ignored
+    seen: bool,
+}
+
+/// What became of it.
+struct Made {
+    index: usize,
+    texture: CompressedTexture,
+    cached: bool,
+}
+
+impl Member<'_> {
+    fn made(&self, format: TexelFormat, blocks: Vec<u8>, cached: bool) -> Made {
+        let size = compress::whole_blocks(self.image.size);
+        let texture = Texture {
+            name: self.image.name.clone(),
+            size,
+            levels: compress::level_count(size),
+            layers: 1,
+            format,
+            color_space: self.image.color_space,
+        };
+        Made {
+            index: self.index,
+            texture: CompressedTexture { texture, blocks },
+            cached,
         }
-        alpha => alpha,
+    }
+
+    /// The cached texture of this key, if it is one of this image's size.
+    fn cached(&self, cache: &Cache, key: cache::Key) -> Option<Made> {
+        let (format, blocks) = cache.load(key)?;
+        let made = self.made(format, blocks, true);
+        let expected = compress::chain_bytes(&made.texture.texture)?;
+        (made.texture.blocks.len() == expected).then_some(made)
+    }
+
+    fn check_size(&self) -> Result<(), TextureError> {
+        let [width, height] = self.image.size;
+        if [width, height]
+            .iter()
+            .all(|e| (1..=MAX_IMAGE_SIZE).contains(e))
+        {
+            return Ok(());
+        }
+        Err(self.error(
+            format!("a size from 1x1 to {MAX_IMAGE_SIZE}x{MAX_IMAGE_SIZE}"),
+            format!("{width}x{height}"),
+        ))
+    }
+
+    fn check_texels(&self, rgba: &[u8]) -> Result<(), TextureError> {
+        let [width, height] = self.image.size;
+        let expected = width as usize * height as usize * 4;
+        if rgba.len() == expected {
+            return Ok(());
+        }
+        Err(self.error(
+            format!("{expected} bytes of RGBA8 for {width}x{height}"),
+            format!("{} bytes", rgba.len()),
+        ))
+    }
+
+    fn error(&self, expected: String, found: String) -> TextureError {
+        TextureError::Image {
+            image: self.image.name.clone(),
+            expected,
+            found,
+        }
+    }
+
+    /// The key of the texture, from that of its source.
+    fn key(&self, source: &KeyHasher) -> cache::Key {
+        let mut hasher = source.clone();
+        let [width, height] = self.image.size;
+        hasher.add(&(self.image.part as u64).to_le_bytes());
+        hasher.add(&width.to_le_bytes());
+        hasher.add(&height.to_le_bytes());
+        hasher.add(&[
+            u8::from(self.image.color_space == ColorSpace::Srgb),
+            u8::from(self.role.normal_map),
+        ]);
+        hasher.add(&match self.role.alpha {
+            Alpha::Ignored => [0, 0],
+            Alpha::Mask(cutoff) => [1, cutoff],
+            Alpha::Smooth => [2, 0],
+        });
+        hasher.finish()
+    }
+}
+
+/// The textures of images that one source makes.
+fn prepare_source(
+    members: Vec<Member<'_>>,
+    cache: Option<&Cache>,
+) -> Result<Vec<Made>, TextureError> {
+    let mut made = Vec::with_capacity(members.len());
+    let mut wanted = Vec::new();
+    for member in members {
+        member.check_size()?;
+        // Only the texels tell whether smooth alpha is smooth, and so the format in the table.
+        if member.seen || member.role.alpha == Alpha::Smooth {
+            wanted.push(member);
+        } else {
+            made.push(member.made(TexelFormat::Bc1, Vec::new(), false));
+        }
+    }
+    let Some(first) = wanted.first() else {
+        return Ok(made);
     };
-    let weigh_by_alpha = alpha != Alpha::Ignored;
-    let size = image.size.map(|e| e.next_multiple_of(BLOCK));
-    let (base, note) = if size == image.size {
-        (Cow::Borrowed(rgba), None)
-    } else {
-        let level = Level::decode(rgba, image.size, kind, weigh_by_alpha);
-        let note = format!(
+    let source = first.image.source.open()?;
+    let source_key = cache.map(|cache| {
+        let mut hasher = KeyHasher::new(compress::ENCODER);
+        source.identify(&mut |bytes| hasher.add(bytes));
+        (cache, hasher)
+    });
+    if let Some((cache, hasher)) = &source_key {
+        wanted.retain(|member| match member.cached(cache, member.key(hasher)) {
+            Some(hit) => {
+                made.push(hit);
+                false
+            }
+            None => true,
+        });
+    }
+    let parts: Vec<usize> = wanted.iter().map(|member| member.image.part).collect();
+    if parts.is_empty() {
+        return Ok(made);
+    }
+    for (member, rgba) in wanted.iter().zip(source.texels(&parts)?) {
+        member.check_texels(&rgba)?;
+        let Image {
+            size, color_space, ..
+        } = *member.image;
+        let (format, blocks) = compress::compress(&rgba, size, color_space, member.role);
+        drop(rgba);
+        if let Some((cache, hasher)) = &source_key {
+            cache.store(member.key(hasher), format, &blocks);
+        }
+        made.push(member.made(format, blocks, false));
+    }
+    Ok(made)
+}
+
+/// What happens to an image that is not whole blocks.
+fn note(image: &Image) -> Option<String> {
+    let ([width, height], size) = (image.size, compress::whole_blocks(image.size));
+    (size != image.size).then(|| {
+        format!(
             "image '{}' resampled from {width}x{height} to {}x{}, whole blocks of 4x4",
             image.name, size[0], size[1]
-        );
-        (Cow::Owned(level.resize(size).encode(kind)), Some(note))
-    };
-
-    let (format, texel_format) = match alpha {
-        Alpha::Smooth => (Format::Bc3, TexelFormat::Bc3),
-        Alpha::Ignored | Alpha::Mask(_) => (Format::Bc1, TexelFormat::Bc1),
-    };
-    let texture = Texture {
-        name: image.name.clone(),
-        size,
-        levels: size[0].max(size[1]).ilog2() + 1,
-        layers: 1,
-        format: texel_format,
-        color_space: image.color_space,
-    };
-    let coverage = match alpha {
-        Alpha::Mask(cutoff) => mipmap::coverage(&base, cutoff),
-        _ => 1.0,
-    };
-    let mut levels = Vec::with_capacity(texture.levels as usize);
-    let mut texels = base.to_vec();
-    let mut level: Option<Level> = None;
-    for index in 0..texture.levels {
-        if index > 0 {
-            // Level 1 comes straight from the bytes: level 0 in floats would be the largest
-            // allocation of the whole capture.
-            let next = match level {
-                None => Level::half_of(&base, size, kind, weigh_by_alpha),
-                Some(level) => level.half(kind),
-            };
-            texels = next.encode(kind);
-            level = Some(next);
-        }
-        match alpha {
-            Alpha::Ignored => mipmap::make_opaque(&mut texels),
-            Alpha::Mask(cutoff) if index == 0 => mipmap::binarise(&mut texels, cutoff),
-            Alpha::Mask(_) => {
-                let cutoff = mipmap::cutoff_for_coverage(&texels, coverage);
-                mipmap::binarise(&mut texels, cutoff);
-            }
-            Alpha::Smooth => {}
-        }
-        levels.push(encode_blocks(
-            &texels,
-            texture.level_size(index),
-            format,
-            kind.srgb,
-        ));
-    }
-    Ok((CompressedTexture { texture, levels }, note))
-}
-
-fn encode_blocks(rgba: &[u8], size: [u32; 2], format: Format, perceptual: bool) -> Vec<u8> {
-    let [width, height] = size.map(|e| e as usize);
-    let params = Params {
-        algorithm: Algorithm::RangeFit,
-        weights: if perceptual {
-            COLOUR_WEIGHTS_PERCEPTUAL
-        } else {
-            COLOUR_WEIGHTS_UNIFORM
-        },
-        weigh_colour_by_alpha: false,
-    };
-    let mut blocks = vec![0; format.compressed_size(width, height)];
-    format.compress(rgba, width, height, params, &mut blocks);
-    blocks
+        )
+    })
 }

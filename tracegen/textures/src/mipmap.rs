@@ -1,6 +1,7 @@
 //! Mip levels: area averages in linear light, with unit normals and kept alpha coverage.
 
 use glam::{Vec3, Vec4};
+use scene::srgb;
 use std::sync::LazyLock;
 
 /// What the texels mean.
@@ -20,19 +21,6 @@ pub(super) struct Level {
     premultiplied: bool,
 }
 
-/// sRGB byte to linear value (IEC 61966-2-1).
-static TO_LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|i| {
-        let c = i as f64 / 255.0;
-        let linear = if c <= 0.04045 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        };
-        linear as f32
-    })
-});
-
 /// Steps of the inverse table: fine enough that the steepest part, near black, is off by at most
 /// 0.05 of a byte.
 const FROM_LINEAR_STEPS: usize = 1 << 16;
@@ -40,13 +28,8 @@ const FROM_LINEAR_STEPS: usize = 1 << 16;
 static FROM_LINEAR: LazyLock<Vec<u8>> = LazyLock::new(|| {
     (0..=FROM_LINEAR_STEPS)
         .map(|i| {
-            let l = i as f64 / FROM_LINEAR_STEPS as f64;
-            let c = if l <= 0.003_130_8 {
-                l * 12.92
-            } else {
-                1.055 * l.powf(1.0 / 2.4) - 0.055
-            };
-            (c * 255.0).round() as u8
+            let encoded = srgb::encode(i as f64 / FROM_LINEAR_STEPS as f64);
+            (encoded * 255.0).round() as u8
         })
         .collect()
 });
@@ -54,7 +37,7 @@ static FROM_LINEAR: LazyLock<Vec<u8>> = LazyLock::new(|| {
 fn decode_texel(texel: &[u8], kind: Kind, premultiply: bool) -> Vec4 {
     let alpha = f32::from(texel[3]) / 255.0;
     let rgb = if kind.srgb {
-        let table = &*TO_LINEAR;
+        let table = &*srgb::LINEAR;
         Vec3::new(
             table[usize::from(texel[0])],
             table[usize::from(texel[1])],

@@ -1,6 +1,7 @@
 //! Quality against an independent decoder, determinism, and what each material makes of an image.
 
 use super::*;
+use crate::compress::{ENCODER, compress};
 use glam::Affine3A;
 use scene::{AlphaMode, Instance, Material, Mesh, TextureRef};
 
@@ -17,12 +18,7 @@ fn scene_of(size: [u32; 2], rgba: Vec<u8>, alpha: AlphaMode) -> Scene {
             alpha,
             ..Material::default()
         }],
-        images: vec![Image {
-            name: "test".into(),
-            size,
-            rgba: rgba.into(),
-            color_space: ColorSpace::Srgb,
-        }],
+        images: vec![Image::from_texels("test", size, ColorSpace::Srgb, rgba)],
         ..Scene::default()
     }
 }
@@ -50,7 +46,12 @@ fn decode(texture: &CompressedTexture) -> Vec<u8> {
     } else {
         16
     };
-    for (i, block) in texture.levels[0].chunks(block_bytes).enumerate() {
+    for (i, block) in texture
+        .blocks
+        .chunks(block_bytes)
+        .take(width * height / 16)
+        .enumerate()
+    {
         let (x, y) = (i % (width / 4) * 4, i / (width / 4) * 4);
         let out = &mut rgba[(y * width + x) * 4..];
         match texture.texture.format {
@@ -90,9 +91,11 @@ fn bc1_keeps_a_smooth_picture_above_36_db() {
 fn levels_are_a_whole_chain_of_whole_blocks() {
     let set = TextureSet::compress(&scene_of([64, 16], picture([64, 16]), AlphaMode::Opaque));
     let texture = &set.unwrap().textures[0];
-    let bytes: Vec<usize> = texture.levels.iter().map(Vec::len).collect();
     // 64x16, 32x8, 16x4, 8x2, 4x1, 2x1, 1x1 in 4x4 blocks of 8 bytes.
-    assert_eq!(bytes, [16 * 4 * 8, 8 * 2 * 8, 4 * 8, 2 * 8, 8, 8, 8]);
+    assert_eq!(
+        texture.blocks.len(),
+        8 * (16 * 4 + 8 * 2 + 4 + 2 + 1 + 1 + 1)
+    );
     assert_eq!(texture.texture.levels, 7);
 }
 
@@ -172,9 +175,111 @@ fn images_that_no_placed_mesh_samples_are_left_out() {
 }
 
 #[test]
-fn freeing_gives_the_same_textures_and_leaves_no_texels() {
-    let mut scene = scene_of([8, 8], picture([8, 8]), AlphaMode::Opaque);
-    let kept = TextureSet::compress(&scene).unwrap();
-    assert_eq!(TextureSet::compress_and_free(&mut scene).unwrap(), kept);
-    assert!(scene.images[0].rgba.is_empty());
+fn a_cached_texture_is_the_one_that_compressing_gives() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path().to_owned(), 1 << 30);
+    for alpha in [AlphaMode::Opaque, AlphaMode::Mask(0.3), AlphaMode::Blend] {
+        let scene = scene_of([30, 16], picture([30, 16]), alpha);
+        let fresh = TextureSet::compress(&scene).unwrap();
+        let prepare = || TextureSet::prepare(&scene, |_| true, Some(&cache)).unwrap();
+        assert_eq!(prepare(), fresh);
+        let hit = prepare();
+        assert_eq!(hit.cached, 1);
+        assert_eq!(TextureSet { cached: 0, ..hit }, fresh);
+    }
+    assert_eq!(folder.path().read_dir().unwrap().count(), 3);
+}
+
+#[test]
+fn a_damaged_cache_is_made_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path().to_owned(), 1 << 30);
+    let scene = scene_of([16, 16], picture([16, 16]), AlphaMode::Opaque);
+    let prepare = || TextureSet::prepare(&scene, |_| true, Some(&cache)).unwrap();
+    let fresh = prepare();
+    let file = folder.path().read_dir().unwrap().next().unwrap().unwrap();
+    let whole = std::fs::read(file.path()).unwrap();
+    let mut damaged = whole.clone();
+    damaged[100] ^= 0x10;
+    for bytes in [&damaged[..], &whole[..60], &[]] {
+        std::fs::write(file.path(), bytes).unwrap();
+        assert_eq!(prepare(), fresh);
+        assert_eq!(std::fs::read(file.path()).unwrap(), whole);
+    }
+}
+
+#[test]
+fn whatever_decides_the_blocks_decides_the_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path().to_owned(), 1 << 30);
+    let mut scenes = vec![
+        scene_of([16, 16], picture([16, 16]), AlphaMode::Opaque),
+        scene_of([32, 8], picture([16, 16]), AlphaMode::Opaque),
+        scene_of([16, 16], picture([16, 16]), AlphaMode::Mask(0.5)),
+        scene_of([16, 16], picture([16, 16]), AlphaMode::Mask(0.6)),
+        scene_of([16, 16], picture([16, 16]), AlphaMode::Blend),
+        scene_of([16, 16], vec![7; 1024], AlphaMode::Opaque),
+    ];
+    let mut linear = scenes[0].clone();
+    linear.images[0].color_space = ColorSpace::Linear;
+    let mut normals = linear.clone();
+    normals.materials[0].normal_texture = Some(TextureRef::new(0));
+    scenes.extend([linear, normals]);
+    for scene in &scenes {
+        let set = TextureSet::prepare(scene, |_| true, Some(&cache)).unwrap();
+        assert_eq!(set.cached, 0);
+    }
+    assert_eq!(folder.path().read_dir().unwrap().count(), scenes.len());
+}
+
+/// A source that must not be read.
+struct Unreadable;
+
+impl scene::image::ImageSource for Unreadable {
+    fn open(&self) -> Result<Box<dyn scene::image::OpenSource + '_>, SceneError> {
+        panic!("an image that no view sees is not read")
+    }
+}
+
+#[test]
+fn what_no_view_sees_keeps_its_table_entry_and_is_not_read() {
+    for alpha in [AlphaMode::Opaque, AlphaMode::Mask(0.3), AlphaMode::Blend] {
+        let mut scene = scene_of([30, 16], picture([30, 16]), alpha);
+        let seen = TextureSet::compress(&scene).unwrap();
+        if alpha != AlphaMode::Blend {
+            scene.images[0].source = std::sync::Arc::new(Unreadable);
+        }
+        let unseen = TextureSet::prepare(&scene, |_| false, None).unwrap();
+        assert_eq!(unseen.textures[0].texture, seen.textures[0].texture);
+        assert_eq!(
+            (&unseen.of_image, &unseen.notes),
+            (&seen.of_image, &seen.notes)
+        );
+        assert_eq!(unseen.unseen(), usize::from(alpha != AlphaMode::Blend));
+    }
+}
+
+#[test]
+fn the_encoder_named_in_keys_makes_these_bytes() {
+    let (name, version) = ENCODER.split_once(", ").unwrap().0.split_once(' ').unwrap();
+    let entry = format!("name = \"{name}\"\nversion = \"{version}\"\n");
+    assert!(
+        include_str!("../../../Cargo.lock").contains(&entry),
+        "{ENCODER}"
+    );
+    let mut hasher = KeyHasher::new("");
+    for color_space in [ColorSpace::Srgb, ColorSpace::Linear] {
+        for alpha in [Alpha::Ignored, Alpha::Mask(77), Alpha::Smooth] {
+            for (size, normal_map) in [([64, 32], false), ([64, 32], true), ([30, 17], false)] {
+                let role = Role { alpha, normal_map };
+                let (_, blocks) = compress(&picture(size), size, color_space, role);
+                hasher.add(&blocks);
+            }
+        }
+    }
+    // Where this changes, ENCODER must change with it: caches hold textures under its name.
+    assert_eq!(
+        format!("{:?}", hasher.finish()),
+        "Key(53964728629684028245313165242808893593)"
+    );
 }

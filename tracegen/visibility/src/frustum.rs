@@ -36,7 +36,7 @@ pub fn crop(origin_px: [u32; 2], region_px: [u32; 2], size_px: [u32; 2]) -> Mat4
 }
 
 /// Planes whose positive side is inside, from the rows of the matrix (Gribb and Hartmann 2001).
-fn frustum_planes(clip_from_world: Mat4) -> [Vec4; 6] {
+pub(crate) fn frustum_planes(clip_from_world: Mat4) -> [Vec4; 6] {
     let row = |i| clip_from_world.row(i);
     [
         row(3) + row(0),

@@ -1,3 +1,4 @@
 //! Which draw enters which view or shadow cascade. One technique a file.
 
 pub mod frustum;
+pub mod triangles;

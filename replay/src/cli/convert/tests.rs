@@ -1,8 +1,9 @@
 use super::*;
 use crate::cli::testing::{file_of, lines};
 use crate::config::{Mode, Order};
-use crate::engine::synthetic::Synthetic;
-use crate::engine::{MemoryTrace, replay};
+use crate::engine::replay;
+use crate::stream::MemoryTrace;
+use crate::stream::synthetic::Synthetic;
 use clap::Parser;
 use formats::interop::read_din;
 use std::collections::HashSet;

@@ -3,7 +3,7 @@ pub mod columns;
 use super::*;
 use crate::config::{Mode, RunConfig};
 use crate::engine::replay;
-use crate::engine::synthetic::Synthetic;
+use crate::stream::synthetic::Synthetic;
 use clap::ValueEnum;
 use formats::textrace::{Pass, PassKind};
 use formats::view::Eye;

@@ -1,8 +1,7 @@
 //! The Z2 paper's experiment: cache configurations times orders on each trace (Table 2, Fig. 5).
 //!
-//! [`model`] turns replay results into rows; tables, plots and the page only print those rows.
+//! [`model`] takes an outcome apart; tables, plots and the page only print its rows.
 
-pub mod experiment;
 pub mod model;
 pub mod page;
 pub mod plots;

@@ -1,12 +1,13 @@
 //! The experiment as a page.
 
-use super::model::{Detail, PaperReport, TraceInfo};
-use super::plots::{self, MAPPED_ORDERS, TileMeasure};
+use super::model::{PaperReport, TraceInfo};
+use super::plots::{self, TileMeasure};
 use super::tables;
 use crate::config::{Mode, Order};
 use crate::report::html::{self, Section, figures, folded};
 use crate::report::picture::Picture;
 use crate::report::plots::PlotError;
+use crate::result::TOOL;
 use maud::{Markup, html};
 
 /// Textures in the charts and tables by texture.
@@ -42,8 +43,10 @@ pub fn page(report: &PaperReport, pictures: &[Picture]) -> Result<String, PlotEr
             utilisation(report)?,
         ));
     }
-    if report.rows.iter().any(|r| r.functional.is_some()) {
-        sections.push(Section::new("Functional against timed mode", modes(report)));
+    if let Some(modes) = tables::modes(report) {
+        let note = "Functional mode knows no latencies: a miss fills at once. The difference shows what timing does to the order in which the cores' accesses meet in the L2.";
+        let body = html! { p { (note) } (modes.markup()) };
+        sections.push(Section::new("Functional against timed mode", body));
     }
     sections.push(Section::new("Bounds and checks", bounds(report)));
     sections.push(Section::new("Tile orders", orders(report)?));
@@ -97,7 +100,7 @@ fn runs(report: &PaperReport) -> Markup {
             h3 { (info.label) }
             dl {
                 dt { "scene" } dd { (info.trace.scene) ", " (thousands(info.meta.scene_triangles)) " triangles, camera " (info.meta.camera) }
-                @if let Some(twin) = &info.twin { dt { "stands for" } dd { (twin) " of the paper" } }
+                @if let Some(scene) = info.stand_in_for { dt { "stands for" } dd { (scene) " of the paper" } }
                 dt { "display" } dd {
                     (info.meta.hmd.name) ", " (info.meta.hmd.eye_size_px[0]) "\u{d7}" (info.meta.hmd.eye_size_px[1]) " px an eye, "
                     (fov(info)) ", " (format!("{:.0}", info.meta.hmd.ipd_m * 1000.0)) " mm between the eyes (" (info.meta.hmd.source) ")"
@@ -144,13 +147,14 @@ fn scenes(pictures: &[Picture]) -> Markup {
 }
 
 fn table_2(report: &PaperReport) -> Markup {
+    let table = tables::table_2(report);
     html! {
-        (tables::table_2(report).markup())
-        p.note {
-            "L1 miss: footprints (one bilinear fetch of one lane) with any missing line over footprints. "
-            "L2 miss: missing line look-ups over line look-ups. External: L2 line misses times the line size; MB = 10\u{2076} bytes. "
-            "Bound: the traffic of an infinite cache. TMU \u{2212} fit: simulated utilisation minus the closed form of the paper's table at our miss rates. "
-            "The paper's saving is computed from its two miss rates."
+        (table.markup())
+        p.note { "A footprint is one bilinear fetch of one lane; MB are 10\u{2076} bytes. The paper's saving is computed from its two miss rates." }
+        dl.note {
+            @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
+                dt { (h.name) ", " (h.unit) } dd { (h.about) }
+            }
         }
     }
 }
@@ -194,13 +198,6 @@ fn utilisation(report: &PaperReport) -> Result<Markup, PlotError> {
     })
 }
 
-fn modes(report: &PaperReport) -> Markup {
-    html! {
-        p { "Functional mode knows no latencies: a miss fills at once. The difference shows what timing does to the order in which the cores' accesses meet in the L2." }
-        (tables::modes(&report.rows).markup())
-    }
-}
-
 fn bounds(report: &PaperReport) -> Markup {
     html! {
         (tables::bounds(report).markup())
@@ -237,26 +234,16 @@ fn orders(report: &PaperReport) -> Result<Markup, PlotError> {
     })
 }
 
-fn of_scene<'a>(report: &'a PaperReport, info: &TraceInfo) -> Vec<&'a Detail> {
-    report
-        .details
-        .iter()
-        .filter(|d| d.scene == info.label)
-        .collect()
-}
-
 fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
     let mut body = Vec::new();
     for info in &report.traces {
-        let details = of_scene(report, info);
+        let details = report.details(&info.label);
         let mut charts = Vec::new();
         for (measure, depends_on_order) in TileMeasure::ALL {
             let mut maps: Vec<_> = details
                 .iter()
-                .filter(|d| {
-                    MAPPED_ORDERS[..if depends_on_order { 2 } else { 1 }].contains(&d.order)
-                })
                 .filter_map(|d| plots::heat_map(info, d, measure))
+                .take(if depends_on_order { usize::MAX } else { 1 })
                 .collect();
             // Orders are compared on one scale.
             let high = maps.iter().map(|m| m.largest()).fold(0.0, f64::max);
@@ -266,7 +253,7 @@ fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
             }
         }
         if let (Some(first), false) = (details.first(), charts.is_empty()) {
-            let caches = tables::caches_title((first.l1_kib, first.l2_kib));
+            let caches = first.caches_title();
             body.push(html! { h3 { (info.label) ", L1/L2 " (caches) " KiB" } (figures(&charts)) });
         }
     }
@@ -276,12 +263,12 @@ fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
 fn levels(report: &PaperReport) -> Result<Markup, PlotError> {
     let mut body = Vec::new();
     for info in &report.traces {
-        let details = of_scene(report, info);
+        let details = report.details(&info.label);
         let charts = plots::by_level(&details)
             .iter()
             .map(|c| Ok((c.svg()?, String::new())))
             .collect::<Result<Vec<_>, PlotError>>()?;
-        let table = tables::parts(&details, "mip level", |d| &d.by_level, usize::MAX);
+        let table = tables::parts(&details, "mip level", |d| &d.result.by_level, usize::MAX);
         body.push(html! { h3 { (info.label) } (figures(&charts)) details { summary { "table" } (table.markup()) } });
     }
     Ok(html! { @for scene in body { (scene) } })
@@ -290,13 +277,18 @@ fn levels(report: &PaperReport) -> Result<Markup, PlotError> {
 fn textures(report: &PaperReport) -> Result<Markup, PlotError> {
     let mut body = Vec::new();
     for info in &report.traces {
-        let details: Vec<&Detail> = of_scene(report, info);
+        let details = report.details(&info.label);
         let charts = plots::by_texture(&details, BUSIEST_TEXTURES)
             .iter()
             .map(|c| Ok((c.svg()?, String::new())))
             .collect::<Result<Vec<_>, PlotError>>()?;
-        let table = tables::parts(&details, "texture", |d| &d.by_texture, BUSIEST_TEXTURES);
-        let all = details.first().map_or(0, |d| d.by_texture.len());
+        let table = tables::parts(
+            &details,
+            "texture",
+            |d| &d.result.by_texture,
+            BUSIEST_TEXTURES,
+        );
+        let all = details.first().map_or(0, |d| d.result.by_texture.len());
         body.push(html! {
             h3 { (info.label) }
             @if all > BUSIEST_TEXTURES { p.note { "The " (BUSIEST_TEXTURES) " of " (all) " textures with the most external traffic; all are in the JSON." } }
@@ -309,11 +301,7 @@ fn textures(report: &PaperReport) -> Result<Markup, PlotError> {
 fn configuration(report: &PaperReport) -> Markup {
     let text = toml::to_string(&report.config).unwrap_or_default();
     let orders: Vec<&str> = report.orders().into_iter().map(Order::title).collect();
-    let caches: Vec<String> = report
-        .caches_kib()
-        .into_iter()
-        .map(tables::caches_title)
-        .collect();
+    let caches = report.caches();
     let mode = match report.config.mode {
         Mode::Timed => "timed",
         Mode::Functional => "functional",
@@ -321,7 +309,7 @@ fn configuration(report: &PaperReport) -> Markup {
     html! {
         p {
             "Mode " (mode) "; varied: orders " (orders.join(", ")) "; L1/L2 " (caches.join(", ")) " KiB. "
-            "Everything else as below. Written by " (report.tool) "."
+            "Everything else as below. Written by " (TOOL) "."
         }
         (folded("full configuration (TOML)", &text))
     }
@@ -329,34 +317,32 @@ fn configuration(report: &PaperReport) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::report;
+    use super::super::testing::with_report;
     use super::*;
 
     #[test]
     fn the_page_holds_every_part_and_is_the_same_every_time() {
-        let report = report();
-        let text = page(&report, &[]).unwrap();
-        assert_eq!(text, page(&report, &[]).unwrap());
-        for part in [
-            "Table 2",
-            "Fig. 5",
-            "paper's surface",
-            "Functional against timed",
-            "Bounds and checks",
-            "Tile orders",
-            "Heat maps by tile",
-            "By texture",
-            "By mip level",
-            "line_bytes = 16",
-            "crytek-sponza",
-            "llvmpipe",
-        ] {
-            assert!(text.contains(part), "{part}");
-        }
-        assert!(
-            !text.contains("http://")
-                || text.matches("http://").count()
-                    == text.matches("http://www.w3.org/2000/svg").count()
-        );
+        with_report(|report| {
+            let text = page(report, &[]).unwrap();
+            assert_eq!(text, page(report, &[]).unwrap());
+            for part in [
+                "Table 2",
+                "Fig. 5",
+                "paper's surface",
+                "Functional against timed",
+                "Bounds and checks",
+                "Tile orders",
+                "Heat maps by tile",
+                "By texture",
+                "By mip level",
+                "line_bytes = 16",
+                "crytek-sponza",
+                "llvmpipe",
+            ] {
+                assert!(text.contains(part), "{part}");
+            }
+            let links = text.matches("http://").count();
+            assert_eq!(links, text.matches("http://www.w3.org/2000/svg").count());
+        });
     }
 }

@@ -1,10 +1,13 @@
 //! The experiment's plots, made of the rows and details of the report.
 
-use super::model::{Detail, PaperReport, Row, TraceInfo};
-use super::tables::{busiest, caches_title, l1_miss_pct, l2_miss_pct};
+use super::model::{PaperReport, TraceInfo};
+use super::tables::busiest;
 use crate::config::Order;
+use crate::experiment::ResultRow;
 use crate::order::{View, WorkItem};
-use crate::paper::z2_table;
+use crate::paper::z2;
+use crate::report::columns::{Column, pick};
+use crate::report::figures::{figure, number};
 use crate::report::plots::bars::{BarChart, BarGroup};
 use crate::report::plots::contours::{ContourChart, PointSeries};
 use crate::report::plots::hbars::HBarChart;
@@ -23,29 +26,25 @@ fn style(order: Order) -> SeriesStyle {
     }
 }
 
-/// Bars over cache configurations, one series an order.
+/// Bars of a figure over cache configurations, one series an order.
 fn by_caches(
     report: &PaperReport,
     scene: &str,
     title: &str,
-    value_label: &str,
+    key: &str,
     mark_name: &str,
-    value: impl Fn(&Row) -> Option<f64>,
-    mark: impl Fn(&Row) -> Option<f64>,
+    mark: impl Fn(&ResultRow) -> Option<f64>,
 ) -> BarChart {
     let orders = report.orders();
     let groups: Vec<BarGroup> = report
-        .caches_kib()
+        .caches()
         .into_iter()
         .map(|caches| {
-            let rows: Vec<Option<&Row>> = orders
-                .iter()
-                .map(|o| report.row(scene, caches, *o))
-                .collect();
+            let row = |order: &Order| report.row(scene, &caches, *order);
             BarGroup {
-                label: caches_title(caches),
-                values: rows.iter().map(|r| r.and_then(&value)).collect(),
-                marks: rows.iter().map(|r| r.and_then(&mark)).collect(),
+                values: orders.iter().map(|o| number(row(o)?, key)).collect(),
+                marks: orders.iter().map(|o| mark(row(o)?)).collect(),
+                label: caches,
             }
         })
         .collect();
@@ -56,7 +55,7 @@ fn by_caches(
         .fold(0.0, f64::max);
     BarChart {
         title: format!("{scene}: {title}"),
-        value_label: value_label.to_owned(),
+        value_label: figure(key).map_or_else(String::new, |f| f.heading.axis_label()),
         group_label: "L1/L2 size, KiB".to_owned(),
         series: orders.into_iter().map(style).collect(),
         groups,
@@ -71,19 +70,19 @@ fn by_caches(
 /// ratios to Morton, applied to our Morton.
 #[must_use]
 pub fn bandwidth(report: &PaperReport, scene: &str) -> BarChart {
-    let mark = |row: &Row| {
-        let saved = row.paper?.reduction_pct?;
-        let morton = report.row(scene, (row.l1_kib, row.l2_kib), Order::MORTON)?;
-        (row.order != Order::MORTON).then_some(morton.external_mb_per_frame * (1.0 - saved / 100.0))
+    let key = "external_mb_per_frame";
+    let mark = |row: &ResultRow| {
+        let saved = row.paper?.reduction_pct()?;
+        let morton = report.row(scene, &row.caches_title(), Order::MORTON)?;
+        let other = row.point.config.order != Order::MORTON;
+        other.then_some(number(morton, key)? * (1.0 - saved / 100.0))
     };
-    let label = "external texture traffic, MB per frame";
     by_caches(
         report,
         scene,
         "bandwidth",
-        label,
+        key,
         "paper's ratio to Morton",
-        |r| Some(r.external_mb_per_frame),
         mark,
     )
 }
@@ -91,38 +90,19 @@ pub fn bandwidth(report: &PaperReport, scene: &str) -> BarChart {
 /// L1 and L2 miss rates and TMU utilisation with the paper's values as marks.
 #[must_use]
 pub fn rates(report: &PaperReport, scene: &str) -> Vec<BarChart> {
-    let mut charts = vec![
-        by_caches(
-            report,
-            scene,
-            "L1 miss rate",
-            "footprints with a missing line, %",
-            "paper",
-            |r| Some(r.figures.l1_miss_pct),
-            |r| Some(r.paper?.l1_miss_pct),
-        ),
-        by_caches(
-            report,
-            scene,
-            "L2 miss rate",
-            "L2 look-ups that miss, %",
-            "paper",
-            |r| Some(r.figures.l2_miss_pct),
-            |r| Some(r.paper?.l2_miss_pct),
-        ),
-    ];
-    if report.rows.iter().any(|r| r.figures.tmu_util_pct.is_some()) {
-        charts.push(by_caches(
-            report,
-            scene,
-            "TMU utilisation",
-            "useful issue cycles, %",
-            "paper",
-            |r| r.figures.tmu_util_pct,
-            |r| r.paper?.tmu_util_pct,
-        ));
-    }
-    charts
+    [
+        ("L1 miss rate", "l1_miss_pct"),
+        ("L2 miss rate", "l2_miss_pct"),
+        ("TMU utilisation", "tmu_util_pct"),
+    ]
+    .into_iter()
+    .filter(|(_, key)| report.rows.iter().any(|r| number(r, key).is_some()))
+    .map(|(title, key)| {
+        by_caches(report, scene, title, key, "paper", |row| {
+            number(row, &format!("paper.{key}"))
+        })
+    })
+    .collect()
 }
 
 /// Miss rates of every row on the paper's utilisation surface.
@@ -135,7 +115,7 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
             name: "paper".to_owned(),
             color: theme::MUTED,
         },
-        points: z2_table()
+        points: z2::table()
             .iter()
             .map(|r| (r.l1_miss_pct, r.l2_miss_pct))
             .collect(),
@@ -147,8 +127,11 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
             points: report
                 .rows
                 .iter()
-                .filter(|r| r.order == order)
-                .map(|r| (r.figures.l1_miss_pct.max(0.5), r.figures.l2_miss_pct))
+                .filter(|r| r.point.config.order == order)
+                .filter_map(|r| {
+                    let l1_miss_pct = number(r, "l1_miss_pct")?;
+                    Some((l1_miss_pct.max(0.5), number(r, "l2_miss_pct")?))
+                })
                 .collect(),
             hollow: false,
         }
@@ -180,8 +163,13 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
             points: report
                 .rows
                 .iter()
-                .filter(|r| r.order == order)
-                .filter_map(|r| Some((r.closed_form_util_pct, r.figures.tmu_util_pct?)))
+                .filter(|r| r.point.config.order == order)
+                .filter_map(|r| {
+                    Some((
+                        number(r, "closed_form_util_pct")?,
+                        number(r, "tmu_util_pct")?,
+                    ))
+                })
                 .collect(),
             mark: Mark::Dots,
         })
@@ -228,86 +216,64 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
 
 /// Miss rates and traffic by mip level, one series an order.
 #[must_use]
-pub fn by_level(details: &[&Detail]) -> Vec<BarChart> {
+pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
     let Some(first) = details.first() else {
         return Vec::new();
     };
-    let chart =
-        |title: &str, value_label: &str, decimals, value: &dyn Fn(&Part) -> Option<f64>| BarChart {
-            title: format!("{}: {title}", first.scene),
-            value_label: value_label.to_owned(),
-            group_label: "mip level, 0 is the finest".to_owned(),
-            series: details.iter().map(|d| style(d.order)).collect(),
-            groups: (0..first.by_level.len())
-                .map(|level| BarGroup {
-                    label: first.by_level[level]
-                        .name
-                        .trim_start_matches("level ")
-                        .to_owned(),
-                    values: details
-                        .iter()
-                        .map(|d| d.by_level.get(level).and_then(value))
-                        .collect(),
-                    marks: Vec::new(),
-                })
-                .collect(),
-            mark_name: None,
-            reference: None,
-            decimals,
-        };
-    vec![
-        chart(
-            "L1 miss rate by mip level",
-            "footprints with a missing line, %",
-            None,
-            &l1_miss_pct,
-        ),
-        chart(
-            "external traffic by mip level",
-            "thousand lines",
-            None,
-            &|p| Some(p.l2.line_misses as f64 / 1e3),
-        ),
-    ]
+    let chart = |(column, title): (Column<Part>, &str)| BarChart {
+        title: format!("{}: {title} by mip level", first.subject.label),
+        value_label: column.heading.axis_label(),
+        group_label: "mip level, 0 is the finest".to_owned(),
+        series: details
+            .iter()
+            .map(|d| style(d.point.config.order))
+            .collect(),
+        groups: (0..first.result.by_level.len())
+            .map(|level| BarGroup {
+                label: level.to_string(),
+                values: details
+                    .iter()
+                    .map(|d| column.value(d.result.by_level.get(level)?).number())
+                    .collect(),
+                marks: Vec::new(),
+            })
+            .collect(),
+        ..BarChart::default()
+    };
+    let columns = pick(&["l1_miss_pct", "external_lines"]).into_iter();
+    let titles = ["L1 miss rate", "external traffic"];
+    columns.zip(titles).map(chart).collect()
 }
 
 /// The textures with the most external traffic.
 #[must_use]
-pub fn by_texture(details: &[&Detail], most: usize) -> Vec<HBarChart> {
+pub fn by_texture(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
     let Some(first) = details.first() else {
         return Vec::new();
     };
-    let chart = |title: &str, value_label: &str, value: &dyn Fn(&Part) -> Option<f64>| HBarChart {
+    let textures = &first.result.by_texture;
+    let chart = |(column, title): (Column<Part>, &str)| HBarChart {
         decimals: None,
-        title: format!("{}: {title}", first.scene),
-        value_label: value_label.to_owned(),
-        series: details.iter().map(|d| style(d.order)).collect(),
-        rows: busiest(&first.by_texture, most)
+        title: format!("{}: {title} by texture", first.subject.label),
+        value_label: column.heading.axis_label(),
+        series: details
+            .iter()
+            .map(|d| style(d.point.config.order))
+            .collect(),
+        rows: busiest(textures, most)
             .into_iter()
             .map(|i| {
-                let values = details
-                    .iter()
-                    .map(|d| d.by_texture.get(i).and_then(value))
-                    .collect();
-                (first.by_texture[i].name.clone(), values)
+                let value = |d: &&ResultRow| column.value(d.result.by_texture.get(i)?).number();
+                (
+                    textures[i].name.clone(),
+                    details.iter().map(value).collect(),
+                )
             })
             .collect(),
     };
-    vec![
-        chart(
-            "L1 miss rate by texture",
-            "footprints with a missing line, %",
-            &l1_miss_pct,
-        ),
-        chart(
-            "L2 miss rate by texture",
-            "L2 look-ups that miss, %",
-            &l2_miss_pct,
-        ),
-        chart("external traffic by texture", "thousand lines", &|p| {
-            Some(p.l2.line_misses as f64 / 1e3)
-        }),
-    ]
+    let columns = pick(&["l1_miss_pct", "l2_miss_pct", "external_lines"]).into_iter();
+    let titles = ["L1 miss rate", "L2 miss rate", "external traffic"];
+    columns.zip(titles).map(chart).collect()
 }
 
 /// What a tile map can show.
@@ -322,9 +288,6 @@ pub enum TileMeasure {
     /// Lines from memory.
     L2Misses,
 }
-
-/// Orders whose tile maps are drawn: the baseline and what the paper proposes.
-pub const MAPPED_ORDERS: [Order; 2] = [Order::MORTON, Order::Z2_STA];
 
 impl TileMeasure {
     /// Every measure, and whether it depends on the order.
@@ -356,14 +319,14 @@ impl TileMeasure {
 
 /// Both eyes' tiles of one run; `None` when the run has no maps of the two eyes.
 #[must_use]
-pub fn heat_map(info: &TraceInfo, detail: &Detail, measure: TileMeasure) -> Option<HeatMap> {
+pub fn heat_map(info: &TraceInfo, detail: &ResultRow, measure: TileMeasure) -> Option<HeatMap> {
     let (title, value_label) = measure.titles();
     let panels: Vec<Panel> = info
         .eye_passes
         .iter()
         .zip(["left eye", "right eye"])
         .filter_map(|(pass, name)| {
-            let map = detail.tile_maps.iter().find(|m| m.pass == *pass)?;
+            let map = detail.result.tile_maps.iter().find(|m| m.pass == *pass)?;
             Some(Panel {
                 name: name.to_owned(),
                 tiles: map.tiles,
@@ -375,7 +338,7 @@ pub fn heat_map(info: &TraceInfo, detail: &Detail, measure: TileMeasure) -> Opti
         .iter()
         .any(|(m, depends)| *m == measure && *depends);
     let order = if of_order {
-        format!(", {}", detail.order.title())
+        format!(", {}", detail.point.config.order.title())
     } else {
         String::new()
     };
@@ -420,48 +383,53 @@ pub fn path(order: Order, seed: u64, tiles: [u32; 2]) -> PathPlot {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::report;
+    use super::super::testing::with_report;
     use super::*;
 
     #[test]
-    fn a_twins_marks_are_the_papers_ratios_on_our_morton() {
-        let report = report();
-        let chart = bandwidth(&report, "crytek-sponza");
-        let group = &chart.groups[3];
-        assert_eq!(group.label, "16/256");
-        // Our rows are the paper's, so bars and marks coincide.
-        let (bar, mark) = (group.values[2].unwrap(), group.marks[2].unwrap());
-        assert!((bar - mark).abs() < 0.01, "{bar} {mark}");
-        assert_eq!(group.marks[0], None);
+    fn a_stand_ins_marks_are_the_papers_ratios_on_our_morton() {
+        with_report(|report| {
+            let chart = bandwidth(report, "crytek-sponza");
+            let group = &chart.groups[3];
+            assert_eq!(group.label, "16/256");
+            // Our rows are the paper's, so bars and marks coincide.
+            let (bar, mark) = (group.values[2].unwrap(), group.marks[2].unwrap());
+            assert!((bar - mark).abs() < 0.01, "{bar} {mark}");
+            assert_eq!(group.marks[0], None);
+        });
     }
 
     #[test]
     fn every_chart_has_a_unit_on_its_values() {
-        let report = report();
-        let mut charts = rates(&report, "crytek-sponza");
-        charts.push(bandwidth(&report, "crytek-sponza"));
-        charts.extend(by_level(&[&report.details[0]]));
-        for chart in charts {
-            assert!(
-                ["%", "MB per frame", "thousand lines"]
-                    .iter()
-                    .any(|u| chart.value_label.ends_with(u)),
-                "{}",
-                chart.value_label
-            );
-        }
+        with_report(|report| {
+            let mut charts = rates(report, "crytek-sponza");
+            charts.push(bandwidth(report, "crytek-sponza"));
+            charts.extend(by_level(&report.details("crytek-sponza")));
+            assert_eq!(charts.len(), 6);
+            for chart in charts {
+                assert!(
+                    ["%", "MB/frame", "1000 lines"]
+                        .iter()
+                        .any(|u| chart.value_label.ends_with(u)),
+                    "{}",
+                    chart.value_label
+                );
+            }
+        });
     }
 
     #[test]
     fn end_labels_of_the_closed_form_chart_do_not_overlap() {
-        let mut at: Vec<f64> = closed_form(&report())
-            .unwrap()
-            .label_positions()
-            .iter()
-            .map(|l| l.y_px)
-            .collect();
-        at.sort_by(f64::total_cmp);
-        assert!(at.windows(2).all(|w| w[1] - w[0] >= 14.9), "{at:?}");
+        with_report(|report| {
+            let mut at: Vec<f64> = closed_form(report)
+                .unwrap()
+                .label_positions()
+                .iter()
+                .map(|l| l.y_px)
+                .collect();
+            at.sort_by(f64::total_cmp);
+            assert!(at.windows(2).all(|w| w[1] - w[0] >= 14.9), "{at:?}");
+        });
     }
 
     #[test]
@@ -479,10 +447,12 @@ mod tests {
 
     #[test]
     fn heat_maps_show_both_eyes() {
-        let report = report();
-        let map = heat_map(&report.traces[0], &report.details[0], TileMeasure::L2Misses).unwrap();
-        assert_eq!(map.panels.len(), 2);
-        assert_eq!(map.title, "crytek-sponza: external traffic, Morton");
-        assert!(map.svg().unwrap().len() < 60_000);
+        with_report(|report| {
+            let row = report.details("crytek-sponza")[0];
+            let map = heat_map(&report.traces[0], row, TileMeasure::L2Misses).unwrap();
+            assert_eq!(map.panels.len(), 2);
+            assert_eq!(map.title, "crytek-sponza: external traffic, Morton");
+            assert!(map.svg().unwrap().len() < 60_000);
+        });
     }
 }

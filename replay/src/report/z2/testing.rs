@@ -1,49 +1,64 @@
 //! An experiment with made-up but consistent numbers: the paper's own miss rates.
 
-use super::model::{PaperReport, Run, TraceInfo};
-use crate::config::{CacheConfig, RunConfig};
-use crate::paper::{Z2_CACHES_KIB, Z2_ORDERS, z2_row};
+use super::model::PaperReport;
+use crate::config::RunConfig;
+use crate::experiment::{Outcome, Plan, Subject};
+use crate::paper::z2;
 use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap, TmuResult, TraceId};
-use formats::textrace::TraceMeta;
-use formats::view::{FovTangents, Hmd};
+use crate::stream::MemoryTrace;
+use crate::stream::testing::tables;
 
-pub(crate) const TILES: [u32; 2] = [60, 68];
+const TILES: [u32; 2] = [60, 68];
 
-/// Two scenes that replay exactly as the paper's table says.
-pub(crate) fn report() -> PaperReport {
-    let (traces, config, runs) = inputs();
-    let functional: Vec<Run> = runs.clone();
-    PaperReport::new(traces, config, &runs, &functional)
+/// Two scenes that replay exactly as the paper's table says, in both modes.
+pub(crate) fn with_report<T>(check: impl FnOnce(&PaperReport) -> T) -> T {
+    with_edited(|_, _| (), check)
 }
 
-pub(crate) fn inputs() -> (Vec<TraceInfo>, RunConfig, Vec<Run>) {
+/// The same, each result changed by its point's index.
+pub(crate) fn with_edited<T>(
+    edit: impl Fn(usize, &mut RunResult),
+    check: impl FnOnce(&PaperReport) -> T,
+) -> T {
     let scenes = ["crytek-sponza", "l-bench-sponza-shadows"];
-    let traces = scenes.iter().map(|s| info(s)).collect();
-    let mut runs = Vec::new();
-    for (trace, scene) in scenes.iter().enumerate() {
-        for (l1, l2) in Z2_CACHES_KIB {
-            for order in Z2_ORDERS {
-                let config = RunConfig {
-                    order,
-                    l1: CacheConfig::lru(u64::from(l1) << 10),
-                    l2: CacheConfig::lru(u64::from(l2) << 10),
-                    tile_maps: true,
-                    ..RunConfig::default()
-                };
-                let row = z2_row(scene, l1, l2, order).unwrap();
-                let maps = (l1, l2) == Z2_CACHES_KIB[0];
-                runs.push(Run {
-                    trace,
-                    config,
-                    result: result(row.l1_miss_pct, row.l2_miss_pct, row.tmu_util_pct, maps),
-                });
-            }
+    let trace = trace();
+    let subjects = scenes.map(|scene| Subject {
+        stand_in_for: z2::SCENES.into_iter().find(|s| *s == scene),
+        ..Subject::new(&trace, TraceId::default(), scene.to_owned())
+    });
+    let caches = z2::CACHES_KIB.map(|(l1, l2)| (u64::from(l1) << 10, u64::from(l2) << 10));
+    let plan = Plan::paper(RunConfig::default(), &caches, &z2::ORDERS, true)
+        .unwrap()
+        .with_tile_maps();
+    let mut results = Vec::new();
+    for scene in scenes {
+        for (index, point) in plan.points.iter().enumerate() {
+            let [l1, l2] = [&point.config.l1, &point.config.l2].map(|c| c.size_bytes as u32 >> 10);
+            let row = z2::row(scene, l1, l2, point.config.order).unwrap();
+            let rates = [row.l1_miss_pct, row.l2_miss_pct, row.tmu_util_pct];
+            let mut result = result(rates, point.config.tile_maps);
+            edit(index, &mut result);
+            results.push(result);
         }
     }
-    (traces, RunConfig::default(), runs)
+    check(&PaperReport::new(&Outcome::new(
+        &plan, &subjects, results, 0,
+    )))
 }
 
-fn result(l1_pct: f64, l2_pct: f64, tmu_pct: f64, maps: bool) -> RunResult {
+fn trace() -> MemoryTrace {
+    let mut tables = tables(&[]);
+    tables.meta.driver = "llvmpipe".to_owned();
+    for pass in &mut tables.passes {
+        pass.tiles = TILES;
+    }
+    MemoryTrace {
+        tables,
+        tiles: Vec::new(),
+    }
+}
+
+fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
     let footprints = 20_000_000u64;
     let l1_misses = (footprints as f64 * l1_pct / 100.0) as u64;
     let l2_misses = (l1_misses as f64 * l2_pct / 100.0) as u64;
@@ -121,48 +136,5 @@ fn map(pass: u32) -> TileMap {
         footprints: counts(9000.0),
         l1_misses: counts(900.0),
         l2_misses: counts(300.0),
-    }
-}
-
-fn info(scene: &str) -> TraceInfo {
-    let fov = FovTangents {
-        left: 1.19,
-        right: 1.19,
-        up: 1.34,
-        down: 1.34,
-    };
-    TraceInfo {
-        label: scene.to_owned(),
-        trace: TraceId {
-            scene: format!("scenes/{scene}/sponza.gltf"),
-            checksum: "1234abcd".to_owned(),
-        },
-        twin: Some(scene.to_owned()),
-        frames: 1,
-        quads: 2_000_000,
-        lanes: 7_600_000,
-        footprints: 20_000_000,
-        textures: 24,
-        tiles: TILES,
-        eye_passes: vec![0, 1],
-        meta: TraceMeta {
-            tool: "tracegen 0.1.0".to_owned(),
-            command_line: vec!["raster".to_owned(), format!("{scene}.gltf")],
-            scene: scene.to_owned(),
-            scene_triangles: 262_267,
-            camera: "default".to_owned(),
-            backend: "lavapipe".to_owned(),
-            driver: "llvmpipe".to_owned(),
-            seed: 1,
-            hmd: Hmd {
-                name: "symmetric".to_owned(),
-                source: "Z2 paper, section 4.2".to_owned(),
-                eye_size_px: [960, 1080],
-                fov: [fov; 2],
-                ipd_m: 0.064,
-                cant_deg: 0.0,
-            },
-            frames: Vec::new(),
-        },
     }
 }

@@ -57,12 +57,16 @@ impl SceneBuffers {
         for (mesh, used) in scene.meshes.iter().zip(used) {
             meshes.push(used.then(|| upload_mesh(gpu, mesh, limit)).transpose()?);
         }
+        let absent = upload_texture(gpu, &white())?;
         let views = textures
             .textures
             .iter()
-            .map(|t| upload_texture(gpu, t))
+            .map(|t| match t.blocks.as_slice() {
+                // Seen by no view, and so never sampled.
+                [] => Ok(absent.clone()),
+                _ => upload_texture(gpu, t),
+            })
             .collect::<Result<Vec<_>, _>>()?;
-        let absent = upload_texture(gpu, &white())?;
         let mut samplers = Samplers::default();
         let materials = scene
             .materials
@@ -133,7 +137,7 @@ fn white() -> CompressedTexture {
             format: TexelFormat::Rgba8,
             color_space: ColorSpace::Linear,
         },
-        levels: vec![vec![255; 4]],
+        blocks: vec![255; 4],
     }
 }
 
@@ -184,7 +188,7 @@ fn upload_texture(
                     view_formats: &[],
                 },
                 wgpu::util::TextureDataOrder::LayerMajor,
-                &compressed.levels.concat(),
+                &compressed.blocks,
             )
             .create_view(&wgpu::TextureViewDescriptor::default())
     })

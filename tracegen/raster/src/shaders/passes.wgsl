@@ -71,10 +71,7 @@ fn vertex_background(@builtin(vertex_index) index: u32) -> Background {
 @fragment
 fn fragment_background(in: Background) -> @location(0) vec4<f32> {
     let direction = safe_normalize(in.direction);
-    let zenith = view.sky.rgb * vec3(0.75, 0.85, 1.0);
-    let sky = mix(view.sky.rgb, zenith, clamp(direction.y, 0.0, 1.0));
-    let radiance = mix(view.ground.rgb, sky, smoothstep(-0.1, 0.02, direction.y));
-    return vec4(tone_map(0.75 * radiance), 1.0);
+    return vec4(tone_map(background(direction)), 1.0);
 }
 
 // Fragments per pixel by additive blending (a check of the records).

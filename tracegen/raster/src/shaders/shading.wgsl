@@ -108,8 +108,16 @@ fn reflect_light(s: Surface, to_light: vec3<f32>) -> vec3<f32> {
     return (s.albedo * 0.31830989 + fresnel * (distribution * visibility)) * n_l;
 }
 
-fn sky_radiance(direction: vec3<f32>) -> vec3<f32> {
-    return mix(view.ground.rgb, view.sky.rgb, smoothstep(-0.35, 0.35, direction.y));
+// Mean radiance over the hemisphere around a direction, as scene::light::Sky has it.
+fn ambient(direction: vec3<f32>) -> vec3<f32> {
+    return mix(view.ground.rgb, view.sky.rgb, 0.5 + 0.5 * direction.y);
+}
+
+// Radiance from a direction, as scene::light::Sky has it.
+fn background(direction: vec3<f32>) -> vec3<f32> {
+    let zenith = view.sky.rgb * vec3(0.75, 0.85, 1.0);
+    let sky = mix(view.sky.rgb, zenith, clamp(direction.y, 0.0, 1.0));
+    return mix(view.ground.rgb, sky, smoothstep(-0.1, 0.02, direction.y));
 }
 
 // Narkowicz 2015, a fit of the ACES filmic curve.
@@ -158,6 +166,7 @@ fn shade(in: Fragment, front: bool, base: vec4<f32>, found: ShadowLookup) -> vec
     }
     let mirror = reflect(-s.to_eye, normal);
     let gloss = (1.0 - roughness) * (1.0 - roughness);
-    light += (s.albedo * sky_radiance(normal) + s.f0 * sky_radiance(mirror) * gloss) * occlusion;
-    return vec4(tone_map(0.75 * light), select(1.0, base.a, BLENDED));
+    let mirrored = mix(ambient(mirror), background(mirror), gloss);
+    light += (s.albedo * ambient(normal) + s.f0 * mirrored) * occlusion;
+    return vec4(tone_map(light), select(1.0, base.a, BLENDED));
 }

@@ -5,16 +5,25 @@ use crate::files::Origin;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
-use std::sync::Arc;
+use std::cell::Cell;
 
-/// Most elements of an accessor without a buffer view: zeros cost a hostile file nothing.
-const MAX_ZEROS: u64 = 1 << 22;
+/// Bytes of vertices, indices and instances that a byte of the file may stand for. Primitives that
+/// share accessors, accessors without a buffer view and meshes placed many times cost a file next
+/// to nothing; real scenes stay far below this.
+const MADE_PER_BYTE: u64 = 1024;
+
+/// Bytes that any file may stand for.
+const SMALL_FILE_MADE: u64 = 1 << 26;
 
 /// The JSON tables and the bytes that they describe.
 pub(super) struct Buffers<'a> {
     pub root: &'a Root,
     pub origin: &'a Origin,
-    bytes: Vec<Arc<[u8]>>,
+    bytes: Vec<Vec<u8>>,
+    /// The file uses KHR_mesh_quantization.
+    quantized: bool,
+    /// Bytes of elements and instances that may still be made.
+    budget: Cell<u64>,
 }
 
 /// Elements of an accessor: `count` of them, `stride` bytes apart.
@@ -24,12 +33,34 @@ struct Elements<'a> {
 }
 
 impl<'a> Buffers<'a> {
-    pub fn new(root: &'a Root, bytes: Vec<Arc<[u8]>>, origin: &'a Origin) -> Self {
+    /// `json_bytes` is the size of the JSON, or of the GLB.
+    pub fn new(root: &'a Root, bytes: Vec<Vec<u8>>, origin: &'a Origin, json_bytes: usize) -> Self {
+        let file_bytes = json_bytes + bytes.iter().map(Vec::len).sum::<usize>();
+        let budget = (file_bytes as u64) * MADE_PER_BYTE + SMALL_FILE_MADE;
         Self {
             root,
             origin,
             bytes,
+            quantized: (root.extensions_used.iter().chain(&root.extensions_required))
+                .any(|name| name == "KHR_mesh_quantization"),
+            budget: Cell::new(budget),
         }
+    }
+
+    /// Takes `count` values of type `T` off what the file's size justifies.
+    pub fn spend<T>(&self, count: u64, place: impl FnOnce() -> String) -> Result<(), SceneError> {
+        let left = self.budget.get();
+        let rest = (count.checked_mul(size_of::<T>() as u64))
+            .and_then(|made| left.checked_sub(made))
+            .ok_or_else(|| {
+                self.origin.invalid(
+                    place(),
+                    format!("at most {left} bytes of values more in a file of this size"),
+                    format!("{count} values of {} bytes", size_of::<T>()),
+                )
+            })?;
+        self.budget.set(rest);
+        Ok(())
     }
 
     /// The bytes of a buffer view.
@@ -45,7 +76,7 @@ impl<'a> Buffers<'a> {
         let buffer = view.buffer.value();
         let start = view.byte_offset.map_or(0, |o| o.0);
         let length = view.byte_length.0;
-        let bytes = self.bytes.get(buffer).map_or(&[][..], |b| b);
+        let bytes = self.bytes.get(buffer).map_or(&[][..], Vec::as_slice);
         slice(bytes, start, length).ok_or_else(|| {
             self.origin.invalid(
                 place(),
@@ -55,7 +86,8 @@ impl<'a> Buffers<'a> {
         })
     }
 
-    /// Elements of `N` floats; integers are converted, normalized ones as glTF says.
+    /// Elements of `N` floats; integers are converted. Those that are not normalized take
+    /// KHR_mesh_quantization.
     pub fn floats<const N: usize>(
         &self,
         index: usize,
@@ -68,8 +100,9 @@ impl<'a> Buffers<'a> {
             3 => Type::Vec3,
             _ => Type::Vec4,
         };
+        let normalized = accessor.normalized;
         let allowed = component == ComponentType::F32
-            || (accessor.normalized && component != ComponentType::U32);
+            || (component != ComponentType::U32 && (normalized || self.quantized));
         if accessor.type_ != Checked::Valid(wanted) || !allowed {
             return Err(self.origin.invalid(
                 format!("accessors[{index}]"),
@@ -78,7 +111,9 @@ impl<'a> Buffers<'a> {
             ));
         }
         let read = |bytes: &[u8]| {
-            std::array::from_fn(|i| read_float(&bytes[i * component.size()..], component))
+            std::array::from_fn(|i| {
+                read_float(&bytes[i * component.size()..], component, normalized)
+            })
         };
         self.elements(index, accessor, N * component.size(), [0.0; N], read)
     }
@@ -99,6 +134,11 @@ impl<'a> Buffers<'a> {
         }
         let read = |bytes: &[u8]| read_index(bytes, component);
         self.elements(index, accessor, component.size(), 0, read)
+    }
+
+    /// The type of an accessor's elements.
+    pub fn element_type(&self, index: usize) -> Option<Type> {
+        self.root.accessors.get(index).and_then(|a| valid(&a.type_))
     }
 
     fn accessor(&self, index: usize) -> Result<(&Accessor, ComponentType), SceneError> {
@@ -123,20 +163,14 @@ impl<'a> Buffers<'a> {
     ) -> Result<Vec<T>, SceneError> {
         let count = accessor.count.0;
         let place = || format!("accessors[{index}]");
+        self.spend::<T>(count, place)?;
         let mut values = match accessor.buffer_view {
             Some(view) => {
                 let offset = accessor.byte_offset.map_or(0, |o| o.0);
                 let elements = self.strided(place(), view.value(), offset, count, size)?;
                 elements.iter(size).map(&read).collect()
             }
-            None if count <= MAX_ZEROS => vec![zero; count as usize],
-            None => {
-                return Err(self.origin.invalid(
-                    place(),
-                    format!("at most {MAX_ZEROS} elements without a buffer view"),
-                    count.to_string(),
-                ));
-            }
+            None => vec![zero; count as usize],
         };
         if let Some(sparse) = &accessor.sparse {
             let place = format!("accessors[{index}].sparse");
@@ -183,10 +217,15 @@ impl<'a> Buffers<'a> {
         size: usize,
     ) -> Result<Elements<'_>, SceneError> {
         let bytes = self.view(view)?;
-        let stride = self.root.buffer_views[view]
-            .byte_stride
-            .map_or(size, |s| s.0)
-            .max(1);
+        let stride = self.root.buffer_views[view].byte_stride;
+        let stride = stride.map_or(size, |s| s.0);
+        if stride < size {
+            return Err(self.origin.invalid(
+                format!("bufferViews[{view}].byteStride"),
+                format!("at least {size} bytes, the size of an element of {place}"),
+                stride.to_string(),
+            ));
+        }
         let needed = match count.checked_sub(1) {
             None => Some(0),
             Some(last) => last
@@ -235,16 +274,22 @@ fn slice(bytes: &[u8], start: u64, length: u64) -> Option<&[u8]> {
     bytes.get(start..start.checked_add(length)?)
 }
 
-fn read_float(bytes: &[u8], component: ComponentType) -> f32 {
-    match component {
-        ComponentType::F32 => f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
-        ComponentType::U8 => f32::from(bytes[0]) / 255.0,
-        ComponentType::I8 => (f32::from(bytes[0] as i8) / 127.0).max(-1.0),
-        ComponentType::U16 => f32::from(u16::from_le_bytes([bytes[0], bytes[1]])) / 65535.0,
-        ComponentType::I16 => {
-            (f32::from(i16::from_le_bytes([bytes[0], bytes[1]])) / 32767.0).max(-1.0)
+fn read_float(bytes: &[u8], component: ComponentType, normalized: bool) -> f32 {
+    let two = || [bytes[0], bytes[1]];
+    let (value, one) = match component {
+        ComponentType::F32 => {
+            return f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
         }
-        ComponentType::U32 => read_index(bytes, component) as f32,
+        ComponentType::U8 => (f32::from(bytes[0]), 255.0),
+        ComponentType::I8 => (f32::from(bytes[0] as i8), 127.0),
+        ComponentType::U16 => (f32::from(u16::from_le_bytes(two())), 65535.0),
+        ComponentType::I16 => (f32::from(i16::from_le_bytes(two())), 32767.0),
+        ComponentType::U32 => return read_index(bytes, component) as f32,
+    };
+    if normalized {
+        (value / one).max(-1.0)
+    } else {
+        value
     }
 }
 

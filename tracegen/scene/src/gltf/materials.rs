@@ -3,16 +3,17 @@
 //! For the ray tracer, which follows mirror and glass paths and no glossy ones:
 //! - `transmission` is KHR_materials_transmission's factor; without it, a blended material without
 //!   a base colour texture counts as glass that lets `1 - alpha` through;
-//! - `mirror` is `metallic * (1 - roughness / 0.3)` for metals (metallic above 0.5) smoother than
-//!   0.3, and 0 for everything else. Only factors count: textured metalness is left to the maps.
+//! - `mirror` is 0: glTF has no such factor, and how far a smooth metal mirrors follows from its
+//!   metalness and roughness where it is hit.
 //!
 //! KHR_materials_pbrSpecularGlossiness becomes base colour, specular colour and
 //! roughness = 1 - glossiness; the glossiness channel of its texture is not used.
 
 use super::accessors::Buffers;
-use crate::files::Origin;
-use crate::images::{Request, Requests, Source, Usage};
+use crate::files::{Origin, shown};
+use crate::image_files::{Embedded, Request, Requests, Source, Usage};
 use crate::uri::{self, Uri};
+use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef};
 use formats::texture::{Filter, MipFilter, Sampler, Wrap};
 use glam::{Vec3, Vec4};
@@ -20,11 +21,9 @@ use gltf::json::extensions::texture::TextureTransform;
 use gltf::material::AlphaMode as JsonAlphaMode;
 use gltf::texture::{Info, MagFilter, MinFilter, Texture, WrappingMode};
 use serde::Deserialize;
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Perceptual roughness from which on a metal is no mirror.
-const MIRROR_MAX_ROUGHNESS: f32 = 0.3;
 
 const TRANSFORM: &str = "KHR_texture_transform";
 
@@ -43,14 +42,17 @@ pub(super) struct Table<'a> {
     buffers: &'a Buffers<'a>,
     origin: &'a Origin,
     options: &'a LoadOptions,
-    /// glTF material of each used material (`None` is glTF's default material) and its needs.
-    used: Vec<(Option<usize>, Uses)>,
+    /// The scene's index of each used glTF material (`None` is glTF's default material) and what it
+    /// needs.
+    used: HashMap<Option<usize>, (usize, Uses)>,
+    /// Source and name of each glTF image that was asked for.
+    sources: HashMap<usize, (Source, Option<String>)>,
     /// The used materials.
     pub materials: Vec<Material>,
     /// The images that they sample.
     pub requests: Requests,
     /// What was odd about them.
-    pub warnings: Vec<String>,
+    pub warnings: Warnings,
     /// The material being read, for errors.
     place: String,
 }
@@ -78,18 +80,19 @@ impl<'a> Table<'a> {
             buffers,
             origin,
             options,
-            used: Vec::new(),
+            used: HashMap::new(),
+            sources: HashMap::new(),
             materials: Vec::new(),
             requests: Requests::default(),
-            warnings: Vec::new(),
+            warnings: Warnings::default(),
             place: String::new(),
         }
     }
 
     /// The scene's index of a glTF material and what it needs of a mesh.
     pub fn index(&mut self, material: Option<usize>) -> Result<(usize, Uses), SceneError> {
-        if let Some(index) = self.used.iter().position(|(m, _)| *m == material) {
-            return Ok((index, self.used[index].1));
+        if let Some(known) = self.used.get(&material) {
+            return Ok(*known);
         }
         let read = match material.and_then(|m| self.document.materials().nth(m)) {
             Some(json) => self.build(&json)?,
@@ -105,16 +108,17 @@ impl<'a> Table<'a> {
             uv1: textures().any(|t| t.uv_set == 1),
             normal_map_uv: read.normal_texture.map(|t| t.uv_set),
         };
-        self.used.push((material, uses));
+        let known = (self.materials.len(), uses);
+        self.used.insert(material, known);
         self.materials.push(read);
-        Ok((self.materials.len() - 1, uses))
+        Ok(known)
     }
 
     fn build(&mut self, json: &gltf::Material<'_>) -> Result<Material, SceneError> {
         let index = json.index().unwrap_or_default();
         let name = json
             .name()
-            .map_or_else(|| format!("material-{index}"), str::to_owned);
+            .map_or_else(|| format!("material-{index}"), shown);
         self.place = format!("materials[{index}] '{name}'");
         let pbr = json.pbr_metallic_roughness();
         let mut material = Material {
@@ -195,10 +199,6 @@ impl<'a> Table<'a> {
             }
             None => 0.0,
         };
-        if material.metallic > 0.5 && material.metallic_roughness_texture.is_none() {
-            let smooth = 1.0 - material.roughness / MIRROR_MAX_ROUGHNESS;
-            material.mirror = material.metallic * smooth.max(0.0);
-        }
         Ok(material)
     }
 
@@ -228,8 +228,9 @@ impl<'a> Table<'a> {
             fix(value, 0.0, 100.0, 1.0);
         }
         if bad {
-            self.warnings
-                .push(format!("{} has factors out of range; clamped", self.place));
+            self.warnings.count("factors", || {
+                format!("{} has factors out of range; clamped", self.place)
+            });
         }
     }
 
@@ -282,10 +283,12 @@ impl<'a> Table<'a> {
             .and_then(|t| t.tex_coord)
             .unwrap_or(uv_set);
         if uv_set > 1 {
-            self.warnings.push(format!(
-                "{} uses TEXCOORD_{uv_set}; only 0 and 1 are read, the texture is left out",
-                self.place
-            ));
+            self.warnings.count("uv set", || {
+                format!(
+                    "{} uses TEXCOORD_{uv_set}; only 0 and 1 are read, the texture is left out",
+                    self.place
+                )
+            });
             return Ok(None);
         }
         let request = self.request(texture.source().index(), usage)?;
@@ -305,38 +308,50 @@ impl<'a> Table<'a> {
         }))
     }
 
-    fn request(&self, index: usize, usage: Usage) -> Result<Request, SceneError> {
-        let origin = self.origin;
-        let json = &self.buffers.root.images[index];
+    fn request(&mut self, index: usize, usage: Usage) -> Result<Request, SceneError> {
         let place = format!("images[{index}], used by {}", self.place);
-        let given = json.name.clone().filter(|n| !n.is_empty());
-        let (source, name) = match (&json.uri, &json.buffer_view) {
-            (Some(uri), _) => match uri::parse(uri) {
-                Ok(Uri::Path(path)) => {
-                    let file = origin.sibling(Path::new(&path));
-                    let name = Path::new(&path).file_name();
-                    let name = name.map(|n| n.to_string_lossy().into_owned());
-                    (Source::File(file), name)
-                }
-                Ok(Uri::Data(bytes)) => (Source::Bytes(index, bytes.into()), None),
-                Err(found) => {
-                    return Err(origin.invalid(place, "a data URI or relative path", found));
-                }
-            },
-            (None, Some(view)) => {
-                let bytes: Arc<[u8]> = self.buffers.view(view.value())?.into();
-                (Source::Bytes(index, bytes), None)
-            }
-            (None, None) => {
-                return Err(origin.invalid(place, "a uri or a bufferView", "neither"));
+        let (source, name) = match self.sources.get(&index) {
+            Some(known) => known.clone(),
+            None => {
+                let read = self.source(index, &place)?;
+                self.sources.insert(index, read.clone());
+                read
             }
         };
+        let given = self.buffers.root.images[index].name.clone();
+        let given = given.filter(|name| !name.is_empty());
         Ok(Request {
             source,
             usage,
             name: name.or(given).unwrap_or_else(|| format!("image-{index}")),
             place,
         })
+    }
+
+    /// Where an image is, and its file's name.
+    fn source(&self, index: usize, place: &str) -> Result<(Source, Option<String>), SceneError> {
+        let origin = self.origin;
+        let embedded = |bytes: Arc<[u8]>| {
+            Source::Bytes(Embedded {
+                number: index,
+                bytes,
+            })
+        };
+        let json = &self.buffers.root.images[index];
+        match (&json.uri, &json.buffer_view) {
+            (Some(uri), _) => match uri::parse(uri) {
+                Ok(Uri::Path(path)) => {
+                    let file = origin.sibling(Path::new(&path));
+                    let name = Path::new(&path).file_name();
+                    let name = name.map(|n| n.to_string_lossy().into_owned());
+                    Ok((Source::File(file), name))
+                }
+                Ok(Uri::Data(bytes)) => Ok((embedded(bytes.into()), None)),
+                Err(found) => Err(origin.invalid(place, "a data URI or relative path", found)),
+            },
+            (None, Some(view)) => Ok((embedded(self.buffers.view(view.value())?.into()), None)),
+            (None, None) => Err(origin.invalid(place, "a uri or a bufferView", "neither")),
+        }
     }
 }
 

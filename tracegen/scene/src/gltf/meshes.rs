@@ -4,8 +4,11 @@ use super::accessors::Buffers;
 use super::materials::Table;
 use crate::Mesh;
 use crate::SceneError;
+use crate::files::shown;
 use crate::geometry::{triangulate_fan, triangulate_strip, vertex_normals, vertex_tangents};
+use crate::warnings::Warnings;
 use glam::{Vec2, Vec3, Vec4};
+use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
@@ -14,21 +17,22 @@ pub(super) fn read(
     index: usize,
     buffers: &Buffers<'_>,
     materials: &mut Table<'_>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Warnings,
 ) -> Result<Vec<Mesh>, SceneError> {
     let mesh = &buffers.root.meshes[index];
+    let given = mesh.name.as_deref().map(shown);
     let mut meshes = Vec::with_capacity(mesh.primitives.len());
     for (number, primitive) in mesh.primitives.iter().enumerate() {
         let reader = Reader {
             buffers,
             primitive,
-            place: match &mesh.name {
+            place: match &given {
                 Some(name) => format!("meshes[{index}] '{name}'.primitives[{number}]"),
                 None => format!("meshes[{index}].primitives[{number}]"),
             },
         };
         if let Some(mut read) = reader.read(materials, warnings)? {
-            let name = mesh.name.clone().unwrap_or_else(|| format!("mesh-{index}"));
+            let name = given.clone().unwrap_or_else(|| format!("mesh-{index}"));
             read.name = if mesh.primitives.len() > 1 {
                 format!("{name}.{number}")
             } else {
@@ -52,7 +56,7 @@ impl Reader<'_> {
     fn read(
         &self,
         materials: &mut Table<'_>,
-        warnings: &mut Vec<String>,
+        warnings: &mut Warnings,
     ) -> Result<Option<Mesh>, SceneError> {
         let place = &self.place;
         let mode = match self.primitive.mode {
@@ -63,21 +67,29 @@ impl Reader<'_> {
             mode,
             Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
         ) {
-            warnings.push(format!("{place} is {mode:?}, not triangles; skipped"));
+            warnings.count("not triangles", || {
+                format!("{place} is {mode:?}, not triangles; skipped")
+            });
             return Ok(None);
         }
         if self.primitive.targets.is_some() {
-            warnings.push(format!("{place} has morph targets; the rest pose is used"));
+            warnings.count("morph targets", || {
+                format!("{place} has morph targets; it is shown at rest")
+            });
         }
         let Some(positions) = self.vectors(&Semantic::Positions, "positions: Vec3 of F32")? else {
-            warnings.push(format!("{place} has no positions; skipped"));
+            warnings.count("no positions", || {
+                format!("{place} has no positions; skipped")
+            });
             return Ok(None);
         };
         let positions: Vec<Vec3> = positions.into_iter().map(Vec3::from_array).collect();
         self.check_positions(&positions)?;
         let mut indices = self.indices(mode, positions.len(), warnings)?;
         if indices.is_empty() {
-            warnings.push(format!("{place} has no triangles; skipped"));
+            warnings.count("no triangles", || {
+                format!("{place} has no triangles; skipped")
+            });
             return Ok(None);
         }
 
@@ -85,9 +97,9 @@ impl Reader<'_> {
         let count = positions.len();
         let uv0 = self.texture_coordinates(0, count, warnings)?;
         if uv0.is_none() && uses.uv0 {
-            warnings.push(format!(
-                "{place} has a textured material and no TEXCOORD_0; (0, 0) is used"
-            ));
+            warnings.count("no TEXCOORD_0", || {
+                format!("{place} has a textured material and no TEXCOORD_0; (0, 0) is used")
+            });
         }
         let uv1 = if uses.uv1 {
             self.texture_coordinates(1, count, warnings)?
@@ -107,11 +119,13 @@ impl Reader<'_> {
             tangents: tangents
                 .map(|t| t.into_iter().map(Vec4::from_array).collect())
                 .unwrap_or_default(),
+            colors: self.colors()?,
             material,
             ..Mesh::default()
         };
         self.check_length("NORMAL", mesh.normals.len(), count)?;
         self.check_length("TANGENT", mesh.tangents.len(), count)?;
+        self.check_length("COLOR_0", mesh.colors.len(), count)?;
         compact(&mut mesh, &mut indices);
         mesh.indices = indices;
         complete(&mut mesh, uses.normal_map_uv);
@@ -133,6 +147,30 @@ impl Reader<'_> {
         self.accessor(semantic)
             .map(|accessor| self.buffers.floats::<N>(accessor, expected))
             .transpose()
+    }
+
+    /// Linear colours, white where they are no numbers; empty without COLOR_0.
+    fn colors(&self) -> Result<Vec<Vec4>, SceneError> {
+        let semantic = Semantic::Colors(0);
+        let expected = "colours: Vec3 or Vec4 of F32 or normalized U8 or U16";
+        let accessor = self.accessor(&semantic);
+        let rgb = accessor.and_then(|a| self.buffers.element_type(a)) == Some(Type::Vec3);
+        let colors = if rgb {
+            (self.vectors::<3>(&semantic, expected)?)
+                .map(|colors| colors.iter().map(|&c| Vec3::from(c).extend(1.0)).collect())
+        } else {
+            (self.vectors::<4>(&semantic, expected)?)
+                .map(|colors| colors.into_iter().map(Vec4::from).collect())
+        };
+        let mut colors: Vec<Vec4> = colors.unwrap_or_default();
+        for color in &mut colors {
+            *color = if color.is_nan() {
+                Vec4::ONE
+            } else {
+                color.clamp(Vec4::ZERO, Vec4::ONE)
+            };
+        }
+        Ok(colors)
     }
 
     fn check_positions(&self, positions: &[Vec3]) -> Result<(), SceneError> {
@@ -163,7 +201,7 @@ impl Reader<'_> {
         &self,
         set: u32,
         count: usize,
-        warnings: &mut Vec<String>,
+        warnings: &mut Warnings,
     ) -> Result<Option<Vec<Vec2>>, SceneError> {
         let expected = "texture coordinates: Vec2 of F32 or normalized integers";
         let Some(uv) = self.vectors::<2>(&Semantic::TexCoords(set), expected)? else {
@@ -183,10 +221,12 @@ impl Reader<'_> {
             })
             .collect();
         if bad > 0 {
-            warnings.push(format!(
-                "{}.TEXCOORD_{set} has {bad} coordinates that are not finite; (0, 0) is used",
-                self.place
-            ));
+            warnings.count("bad coordinates", || {
+                format!(
+                    "{}.TEXCOORD_{set} has {bad} coordinates that are not finite; (0, 0) is used",
+                    self.place
+                )
+            });
         }
         Ok(Some(uv))
     }
@@ -196,7 +236,7 @@ impl Reader<'_> {
         &self,
         mode: Mode,
         vertices: usize,
-        warnings: &mut Vec<String>,
+        warnings: &mut Warnings,
     ) -> Result<Vec<u32>, SceneError> {
         let accessor = self.primitive.indices.map(|i| i.value());
         let indices = match accessor {
@@ -221,10 +261,12 @@ impl Reader<'_> {
                 let mut triangles = indices;
                 let left_over = triangles.len() % 3;
                 if left_over > 0 {
-                    warnings.push(format!(
-                        "{} has {left_over} indices after its last triangle; ignored",
-                        self.place
-                    ));
+                    warnings.count("left-over indices", || {
+                        format!(
+                            "{} has {left_over} indices after its last triangle; ignored",
+                            self.place
+                        )
+                    });
                     triangles.truncate(triangles.len() - left_over);
                 }
                 triangles
@@ -264,17 +306,17 @@ fn compact(mesh: &mut Mesh, indices: &mut [u32]) {
     keep(&mut mesh.tangents, &used);
     keep(&mut mesh.uv0, &used);
     keep(&mut mesh.uv1, &used);
+    keep(&mut mesh.colors, &used);
 }
 
 /// Fills normals and tangents, and replaces those that are not unit vectors.
 fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
-    let good = |n: &Vec3| n.is_finite() && n.length_squared() > 1e-12;
     if mesh.normals.is_empty() {
         mesh.normals = vertex_normals(&mesh.positions, &mesh.indices);
-    } else if !mesh.normals.iter().all(good) {
+    } else if !mesh.normals.iter().all(|n| is_direction(*n)) {
         let computed = vertex_normals(&mesh.positions, &mesh.indices);
         for (n, computed) in mesh.normals.iter_mut().zip(computed) {
-            if !good(n) {
+            if !is_direction(*n) {
                 *n = computed;
             }
         }
@@ -282,7 +324,7 @@ fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
     for n in &mut mesh.normals {
         *n = n.normalize();
     }
-    let usable = |t: &Vec4| t.is_finite() && t.truncate().length_squared() > 1e-12;
+    let usable = |t: &Vec4| t.is_finite() && is_direction(t.truncate());
     if mesh.tangents.is_empty() || !mesh.tangents.iter().all(usable) {
         mesh.tangents = match normal_map_uv {
             Some(1) if !mesh.uv1.is_empty() => {
@@ -295,4 +337,10 @@ fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
                 .collect(),
         };
     }
+}
+
+/// Long enough to have a direction, and not too long to be measured.
+fn is_direction(v: Vec3) -> bool {
+    let length_squared = v.length_squared();
+    length_squared > 1e-12 && length_squared.is_finite()
 }

@@ -4,26 +4,28 @@
 //! that touches bytes is read here with its own range checks, because the crate's readers panic
 //! on accessors that lie about their buffers.
 //!
-//! What is read: meshes (triangles, strips, fans; indexed or not), node transforms, cameras,
-//! punctual lights, and materials (see `materials`). What is not: animation, skins, morph
-//! targets (the rest pose is used), points and lines (skipped with a warning).
-//! Degenerate triangles are kept: they cost a primitive number and cover nothing.
+//! docs/scene-files.md says what is read and what is left out. Degenerate triangles are kept: they
+//! cost a primitive number and cover nothing.
 
 mod accessors;
+mod features;
 mod materials;
 mod meshes;
 mod nodes;
 #[cfg(test)]
 mod tests;
 
-use super::files::{Origin, read_file};
+use super::files::{Origin, read_file, read_start};
 use super::uri::{self, Uri};
+use super::warnings::Warnings;
 use super::{Instance, LoadOptions, Loaded, Scene, SceneError};
 use accessors::Buffers;
+use gltf::binary::Glb;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{Path as JsonPath, Root};
+use std::borrow::Cow;
+use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Loads a `.gltf` or `.glb` file.
 ///
@@ -31,13 +33,15 @@ use std::sync::Arc;
 /// See [`SceneError`].
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let origin = Origin::new(path);
-    let bytes = read_file(path, "scene")?;
-    let (document, blob) = parse(&origin, &bytes)?;
+    let bytes = read_file(path, "scene", u64::MAX)?;
+    let mut warnings = Warnings::default();
+    let (document, blob) = parse(&origin, &bytes, &mut warnings)?;
+    let json_bytes = bytes.len();
     drop(bytes);
     let root = document.as_json();
-    let buffers = Buffers::new(root, read_buffers(&origin, root, blob)?, &origin);
+    let buffers = read_buffers(&origin, root, blob, &mut warnings)?;
+    let buffers = Buffers::new(root, buffers, &origin, json_bytes);
 
-    let mut warnings = Vec::new();
     let placed = nodes::walk(root, &origin, &mut warnings)?;
     let mut scene = Scene {
         cameras: placed.cameras,
@@ -47,7 +51,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
 
     let mut materials = materials::Table::new(&document, &buffers, &origin, options);
     // The scene's meshes of each glTF mesh (one a primitive), filled on first use.
-    let mut loaded: Vec<Option<Vec<usize>>> = vec![None; root.meshes.len()];
+    let mut loaded: Vec<Option<Range<usize>>> = vec![None; root.meshes.len()];
     for (mesh, transform) in placed.meshes {
         let primitives = match &loaded[mesh] {
             Some(primitives) => primitives.clone(),
@@ -55,24 +59,34 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
                 let first = scene.meshes.len();
                 let read = meshes::read(mesh, &buffers, &mut materials, &mut warnings)?;
                 scene.meshes.extend(read);
-                let primitives: Vec<usize> = (first..scene.meshes.len()).collect();
+                let primitives = first..scene.meshes.len();
                 loaded[mesh] = Some(primitives.clone());
                 primitives
             }
         };
+        buffers.spend::<Instance>(primitives.len() as u64, || {
+            format!("instances of meshes[{mesh}]")
+        })?;
         scene
             .instances
-            .extend((primitives.into_iter()).map(|mesh| Instance { mesh, transform }));
+            .extend(primitives.map(|mesh| Instance { mesh, transform }));
     }
-    warnings.append(&mut materials.warnings);
-    scene.images = materials.requests.decode(&origin, options)?;
+    warnings.append(materials.warnings);
+    scene.images = materials.requests.images(&origin)?;
     scene.materials = materials.materials;
-    Ok(Loaded { scene, warnings })
+    Ok(Loaded {
+        scene,
+        warnings: warnings.into_sentences(),
+    })
 }
 
 /// Parses the container and the JSON and checks every index.
-fn parse(origin: &Origin, bytes: &[u8]) -> Result<(gltf::Document, Option<Vec<u8>>), SceneError> {
-    if bytes.starts_with(b"glTF") {
+fn parse(
+    origin: &Origin,
+    bytes: &[u8],
+    warnings: &mut Warnings,
+) -> Result<(gltf::Document, Option<Vec<u8>>), SceneError> {
+    let (json, blob) = if bytes.starts_with(b"glTF") {
         let length = bytes.get(8..12).and_then(|b| b.try_into().ok());
         let length = length.map_or(0, u32::from_le_bytes) as usize;
         // The crate subtracts the header from this length unchecked.
@@ -83,17 +97,20 @@ fn parse(origin: &Origin, bytes: &[u8]) -> Result<(gltf::Document, Option<Vec<u8
                 length.to_string(),
             ));
         }
-    }
-    let gltf = gltf::Gltf::from_slice_without_validation(bytes).map_err(|e| {
-        let place = if bytes.starts_with(b"glTF") {
-            "GLB"
-        } else {
-            "JSON"
-        };
-        origin.invalid(place, "a glTF 2.0 asset", e.to_string())
-    })?;
-    validate(origin, gltf.document.as_json())?;
-    Ok((gltf.document, gltf.blob))
+        let glb = Glb::from_slice(bytes)
+            .map_err(|e| origin.invalid("GLB", "a glTF 2.0 asset", e.to_string()))?;
+        (glb.json, glb.bin)
+    } else {
+        (bytes.into(), None)
+    };
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json);
+    features::check(json, origin, warnings)?;
+    let root = Root::from_slice(json).map_err(|e| features::not_gltf(origin, &e))?;
+    validate(origin, &root)?;
+    Ok((
+        gltf::Document::from_json_without_validation(root),
+        blob.map(Cow::into_owned),
+    ))
 }
 
 fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
@@ -118,11 +135,15 @@ fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
     }
     let mut first: Option<(String, Fault)> = None;
     root.validate(root, JsonPath::new, &mut |path, fault| {
+        // The crate knows fewer extensions than are read here.
+        if first.is_some() || fault == Fault::Unsupported {
+            return;
+        }
         let path = path().to_string();
         // Bounds of positions are computed here, so files that leave them out are welcome.
         let unneeded =
             fault == Fault::Missing && (path.ends_with(".min") || path.ends_with(".max"));
-        if first.is_none() && !unneeded {
+        if !unneeded {
             first = Some((path, fault));
         }
     });
@@ -134,52 +155,62 @@ fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
         Fault::Invalid => ("a value that glTF 2.0 allows", "another"),
         Fault::Missing => ("a value", "none"),
         Fault::Oversize => ("a size that fits in memory", "a larger one"),
-        Fault::Unsupported => (
-            "a supported extension",
-            "an unsupported one that is required",
-        ),
+        Fault::Unsupported => ("a supported extension", "another"),
     };
     Err(origin.invalid(place, expected, found))
 }
 
-/// Reads every buffer and checks that it is as long as the file says.
+/// Reads of every buffer as many bytes as the file says, which must be there.
 fn read_buffers(
     origin: &Origin,
     root: &Root,
     mut blob: Option<Vec<u8>>,
-) -> Result<Vec<Arc<[u8]>>, SceneError> {
-    root.buffers
-        .iter()
-        .enumerate()
-        .map(|(index, buffer)| {
-            let place = format!("buffers[{index}]");
-            let (bytes, from) = match &buffer.uri {
-                None if index == 0 && blob.is_some() => (
-                    blob.take().unwrap_or_default(),
-                    "the GLB's BIN chunk".to_owned(),
-                ),
-                None => {
-                    return Err(origin.invalid(place, "a uri or the GLB's BIN chunk", "neither"));
-                }
-                Some(uri) => match uri::parse(uri) {
-                    Ok(Uri::Data(bytes)) => (bytes, "the data URI".to_owned()),
-                    Ok(Uri::Path(path)) => {
-                        let file = origin.sibling(Path::new(&path));
-                        (read_file(&file, &place)?, file.display().to_string())
-                    }
-                    Err(found) => {
-                        return Err(origin.invalid(place, "a data URI or relative path", found));
-                    }
-                },
-            };
-            if (bytes.len() as u64) < buffer.byte_length.0 {
-                return Err(origin.invalid(
-                    place,
-                    format!("{} bytes", buffer.byte_length.0),
-                    format!("{} bytes in {from}", bytes.len()),
-                ));
+    warnings: &mut Warnings,
+) -> Result<Vec<Vec<u8>>, SceneError> {
+    let mut buffers = Vec::with_capacity(root.buffers.len());
+    for (index, buffer) in root.buffers.iter().enumerate() {
+        let place = format!("buffers[{index}]");
+        let wanted = buffer.byte_length.0;
+        let whole = |bytes: Vec<u8>| {
+            let length = bytes.len() as u64;
+            (bytes, length)
+        };
+        let ((mut bytes, length), from) = match &buffer.uri {
+            None if index == 0 && blob.is_some() => (
+                whole(blob.take().unwrap_or_default()),
+                "the GLB's BIN chunk".to_owned(),
+            ),
+            None => {
+                return Err(origin.invalid(place, "a uri or the GLB's BIN chunk", "neither"));
             }
-            Ok(bytes.into())
-        })
-        .collect()
+            Some(uri) => match uri::parse(uri) {
+                Ok(Uri::Data(bytes)) => (whole(bytes), "the data URI".to_owned()),
+                Ok(Uri::Path(path)) => {
+                    let file = origin.sibling(Path::new(&path));
+                    let read = read_start(&file, &place, wanted)?;
+                    (read, file.display().to_string())
+                }
+                Err(found) => {
+                    return Err(origin.invalid(place, "a data URI or relative path", found));
+                }
+            },
+        };
+        if (bytes.len() as u64) < wanted {
+            return Err(origin.invalid(
+                place,
+                format!("{wanted} bytes"),
+                format!("{} bytes in {from}", bytes.len()),
+            ));
+        }
+        // A BIN chunk is padded to four bytes.
+        if length > wanted.next_multiple_of(4) {
+            warnings.count("long buffer", || {
+                format!("{place}: {from} has {length} bytes, {wanted} are used")
+            });
+        }
+        // At most as long as the vector.
+        bytes.truncate(wanted as usize);
+        buffers.push(bytes);
+    }
+    Ok(buffers)
 }

@@ -1,6 +1,7 @@
 //! The node graph: where meshes, cameras and lights are in the world.
 
 use crate::files::Origin;
+use crate::warnings::Warnings;
 use crate::{Camera, Light, SceneError};
 use glam::{Affine3A, Mat4, Quat, Vec3};
 use gltf::json::Root;
@@ -24,7 +25,7 @@ pub(super) struct Placed {
 pub(super) fn walk(
     root: &Root,
     origin: &Origin,
-    warnings: &mut Vec<String>,
+    warnings: &mut Warnings,
 ) -> Result<Placed, SceneError> {
     let scene = root.scene.map_or(0, |s| s.value());
     let roots: Vec<usize> = match root.scenes.get(scene) {
@@ -57,8 +58,11 @@ pub(super) fn walk(
             ));
         }
         if let Some(mesh) = &node.mesh {
-            if transform.matrix3.determinant() == 0.0 {
-                warnings.push(format!("nodes[{index}] is scaled to nothing; skipped"));
+            // Neither 0 nor so small or large that normals could not be transformed.
+            if !transform.matrix3.determinant().is_normal() {
+                warnings.count("no scale", || {
+                    format!("nodes[{index}] is scaled to nothing or beyond measure; skipped")
+                });
             } else {
                 placed.meshes.push((mesh.value(), transform));
             }
@@ -108,7 +112,7 @@ fn camera(
     node: &Node,
     index: usize,
     transform: Affine3A,
-    warnings: &mut Vec<String>,
+    warnings: &mut Warnings,
 ) -> Option<Camera> {
     let camera = root.cameras.get(node.camera?.value())?;
     let name = [&node.name, &camera.name]
@@ -118,21 +122,27 @@ fn camera(
         .cloned()
         .unwrap_or_else(|| format!("camera-{index}"));
     let Some(perspective) = &camera.perspective else {
-        warnings.push(format!("camera '{name}' is orthographic; skipped"));
+        warnings.count("orthographic", || {
+            format!("camera '{name}' is orthographic; skipped")
+        });
         return None;
     };
     let eye = Vec3::from(transform.translation);
     let forward = Vec3::from(-transform.matrix3.z_axis).normalize_or_zero();
     let up = Vec3::from(transform.matrix3.y_axis).normalize_or_zero();
     if forward.cross(up).length() < 1e-4 {
-        warnings.push(format!("camera '{name}' has no direction; skipped"));
+        warnings.count("no direction", || {
+            format!("camera '{name}' has no direction; skipped")
+        });
         return None;
     }
     let (mut near, mut far) = (perspective.znear, perspective.zfar.unwrap_or(DEFAULT_FAR_M));
     if !(near > 0.0 && far > near && far.is_finite()) {
-        warnings.push(format!(
-            "camera '{name}' has planes {near} and {far}; 0.05 and {DEFAULT_FAR_M} are used"
-        ));
+        warnings.count("planes", || {
+            format!(
+                "camera '{name}' has planes {near} and {far}; 0.05 and {DEFAULT_FAR_M} are used"
+            )
+        });
         (near, far) = (0.05, DEFAULT_FAR_M);
     }
     Some(Camera {
@@ -152,15 +162,15 @@ fn light(
     node: &Node,
     index: usize,
     transform: Affine3A,
-    warnings: &mut Vec<String>,
+    warnings: &mut Warnings,
 ) -> Option<Light> {
     let reference = node.extensions.as_ref()?.khr_lights_punctual.as_ref()?;
     let light: &JsonLight = root.get(reference.light)?;
     let color = Vec3::from(light.color) * light.intensity;
     if !color.is_finite() || color.min_element() < 0.0 {
-        warnings.push(format!(
-            "nodes[{index}] has a light of colour {color}; skipped"
-        ));
+        warnings.count("light colour", || {
+            format!("nodes[{index}] has a light of colour {color}; skipped")
+        });
         return None;
     }
     match &light.type_ {
@@ -170,9 +180,9 @@ fn light(
         }
         kind => {
             if *kind == Checked::Valid(LightType::Spot) {
-                warnings.push(format!(
-                    "nodes[{index}] has a spot light; taken as a point light"
-                ));
+                warnings.count("spot light", || {
+                    format!("nodes[{index}] has a spot light; taken as a point light")
+                });
             }
             let position = Vec3::from(transform.translation);
             Some(Light::Point { position, color })

@@ -67,10 +67,13 @@ impl Files {
         load_file(&self.path("scene.gltf"), &LoadOptions::ALL)
     }
 
-    /// The error's text, which must name the file and hold every part.
+    /// The text of the error, which loading or decoding the images gives, must name the file and
+    /// hold every part.
     fn fails_with(&self, parts: &[&str]) {
+        let texels = |loaded: Loaded| crate::image::texels(&loaded.scene.images, |_| true);
         let error = self
             .load()
+            .and_then(texels)
             .expect_err("a broken file was accepted")
             .to_string();
         for part in [self.folder.path().to_str().unwrap()].iter().chain(parts) {
@@ -225,37 +228,37 @@ mod reading {
         assert_eq!(material.base_color_texture.unwrap().image, 0);
         assert_eq!(material.emissive_texture.unwrap().image, 0);
         assert_eq!(material.occlusion_texture.unwrap().image, 1);
-        assert_eq!(&scene.images[0].rgba[..4], [10, 20, 30, 255]);
+        let texels = crate::image::texels(&scene.images, |i| i == 0).unwrap();
+        assert_eq!(texels[0].as_ref().unwrap()[..4], [10, 20, 30, 255]);
+        assert_eq!(texels[1], None);
     }
 
     #[test]
-    fn without_images_an_image_has_its_size_only() {
+    fn images_are_decoded_when_their_texels_are_asked_for() {
         let files = Files::new(&textured());
-        files.write("my image.png", &png([6, 3], [0; 4]));
-        let path = files.path("scene.gltf");
-        let scene = load_file(&path, &LoadOptions::NO_IMAGES).unwrap().scene;
-        assert_eq!(
-            (scene.images[0].size, scene.images[0].rgba.len()),
-            ([6, 3], 0)
-        );
+        let whole = png([6, 3], [0; 4]);
+        files.write("my image.png", &whole[..whole.len() - 20]);
+        let scene = files.load().unwrap().scene;
+        assert_eq!(scene.images[0].size, [6, 3]);
+        let error = crate::image::texels(&scene.images, |_| true).unwrap_err();
+        assert!(error.to_string().contains("my image.png"), "{error}");
     }
 
     #[test]
-    fn materials_keep_their_alpha_mode_transmission_and_mirror() {
+    fn materials_keep_their_alpha_mode_transmission_and_ior() {
         let json = with(
             base(),
             "/materials",
             json!([
                 {"alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": true},
                 {"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}},
-                {"pbrMetallicRoughness": {"metallicFactor": 1.0, "roughnessFactor": 0.0}},
                 {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.5},
                                 "KHR_materials_ior": {"ior": 1.33}}}
             ]),
         );
         let primitive =
             |m: u32| json!({"attributes": {"POSITION": 0}, "indices": 1, "material": m});
-        let primitives: Vec<Value> = (0..4).map(primitive).collect();
+        let primitives: Vec<Value> = (0..3).map(primitive).collect();
         let json = with(json, "/meshes/0/primitives", json!(primitives));
         let materials = Files::new(&json).load().unwrap().scene.materials;
         assert_eq!(materials[0].alpha, AlphaMode::Mask(0.25));
@@ -264,8 +267,7 @@ mod reading {
             (materials[1].alpha, materials[1].transmission),
             (AlphaMode::Blend, 0.75)
         );
-        assert_eq!((materials[2].mirror, materials[1].mirror), (1.0, 0.0));
-        assert_eq!((materials[3].transmission, materials[3].ior), (0.5, 1.33));
+        assert_eq!((materials[2].transmission, materials[2].ior), (0.5, 1.33));
     }
 
     #[test]
@@ -339,6 +341,118 @@ mod reading {
     }
 
     #[test]
+    fn what_is_left_out_is_told_once_with_its_count() {
+        let mut json = with(base(), "/skins", json!([{"joints": [0]}, {"joints": [0]}]));
+        json["animations"] = json!([{"samplers": [], "channels": []}]);
+        json["extensionsUsed"] = json!(["FOO_a", "KHR_texture_transform", "FOO_b"]);
+        let primitive = json!({"attributes": {"POSITION": 0}, "targets": [{"POSITION": 0}]});
+        json["meshes"][0]["primitives"] = json!([primitive, primitive, primitive]);
+        let loaded = Files::new(&json).load().unwrap();
+        let warnings = loaded.warnings;
+        for part in [
+            "1 animations are left out",
+            "2 skins are left out",
+            "2 unsupported extensions are left out: FOO_a, FOO_b",
+            "has morph targets; it is shown at rest (and 2 more like this)",
+        ] {
+            let told = warnings.iter().filter(|w| w.contains(part)).count();
+            assert_eq!(told, 1, "'{part}' in {warnings:?}");
+        }
+        assert_eq!(warnings.len(), 4, "{warnings:?}");
+    }
+
+    #[test]
+    fn a_buffer_longer_than_it_says_is_read_as_far_as_it_says() {
+        let files = Files::new(&base());
+        let mut bytes = triangle_bytes(CORNERS, [0, 1, 2]);
+        bytes.resize(100_000, 7);
+        files.write("mesh.bin", &bytes);
+        let loaded = files.load().unwrap();
+        assert!(
+            loaded.warnings[0].contains("100000 bytes, 42 are used"),
+            "{:?}",
+            loaded.warnings
+        );
+        let json = with(base(), "/bufferViews/1/byteLength", json!(7));
+        files.write("scene.gltf", json.to_string().as_bytes());
+        files.fails_with(&["bufferViews[1]", "buffers[0] of 42 bytes"]);
+    }
+
+    /// `base()` with COLOR_0 of three vertices in `bytes`.
+    fn colored(of: &str, component: u32, bytes: &[u8]) -> Result<Vec<Vec4>, SceneError> {
+        let mut json = with(
+            base(),
+            "/meshes/0/primitives/0/attributes/COLOR_0",
+            json!(2),
+        );
+        let view = json!({"buffer": 1, "byteLength": bytes.len()});
+        json["bufferViews"].as_array_mut().unwrap().push(view);
+        let accessor = json!({"bufferView": 2, "componentType": component, "count": 3, "type": of,
+                              "normalized": component != 5126});
+        json["accessors"].as_array_mut().unwrap().push(accessor);
+        let buffer = json!({"uri": "colors.bin", "byteLength": bytes.len()});
+        json["buffers"].as_array_mut().unwrap().push(buffer);
+        let files = Files::new(&json);
+        files.write("colors.bin", bytes);
+        files
+            .load()
+            .map(|mut loaded| loaded.scene.meshes.remove(0).colors)
+    }
+
+    #[test]
+    fn vertex_colours_of_every_type_are_read() {
+        let floats = |values: &[f32]| -> Vec<u8> {
+            let all = values.repeat(3);
+            all.iter().flat_map(|v| v.to_le_bytes()).collect()
+        };
+        let shorts = |values: &[u16]| -> Vec<u8> {
+            let all = values.repeat(3);
+            all.iter().flat_map(|v| v.to_le_bytes()).collect()
+        };
+        let (rgb, rgba) = (Vec4::new(1.0, 0.0, 0.2, 1.0), Vec4::new(1.0, 0.0, 0.2, 0.4));
+        for (of, component, bytes, expected) in [
+            ("VEC3", 5126, floats(&[1.0, 0.0, 0.2]), rgb),
+            ("VEC4", 5126, floats(&[1.0, 0.0, 0.2, 0.4]), rgba),
+            ("VEC3", 5121, [255, 0, 51].repeat(3), rgb),
+            ("VEC4", 5121, [255, 0, 51, 102].repeat(3), rgba),
+            ("VEC3", 5123, shorts(&[65535, 0, 13107]), rgb),
+            ("VEC4", 5123, shorts(&[65535, 0, 13107, 26214]), rgba),
+            ("VEC4", 5126, floats(&[9.0, -1.0, 0.2, 0.4]), rgba),
+            ("VEC3", 5126, floats(&[f32::NAN, 0.0, 0.2]), Vec4::ONE),
+        ] {
+            let colors = colored(of, component, &bytes).unwrap();
+            assert_eq!(colors, [expected; 3], "{of} of {component}");
+        }
+        let error = colored("VEC2", 5126, &floats(&[1.0, 0.0]))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("accessors[2]") && error.contains("colours"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn quantised_positions_are_read_where_the_extension_is_used() {
+        let positions = [0u16, 0, 0, 0, 4, 0, 0, 0, 0, 4, 0, 0];
+        let mut bytes: Vec<u8> = positions.iter().flat_map(|v| v.to_le_bytes()).collect();
+        bytes.resize(36, 0);
+        bytes.extend([0u16, 1, 2].iter().flat_map(|i| i.to_le_bytes()));
+        let mut json = with(base(), "/accessors/0/componentType", json!(5123));
+        json["bufferViews"][0]["byteStride"] = json!(8);
+        let files = Files::new(&json);
+        files.write("mesh.bin", &bytes);
+        files.fails_with(&["accessors[0]", "positions"]);
+        json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+        files.write("scene.gltf", json.to_string().as_bytes());
+        let scene = files.load().unwrap().scene;
+        assert_eq!(
+            scene.meshes[0].positions,
+            [Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0]
+        );
+    }
+
+    #[test]
     fn degenerate_triangles_are_kept() {
         let files = Files::new(&base());
         files.write("mesh.bin", &triangle_bytes([[1.0; 3]; 3], [0, 0, 0]));
@@ -386,7 +500,6 @@ mod bad_input {
         for (pointer, value, place) in [
             ("/accessors/0/count", json!(4), "accessors[0]"),
             ("/accessors/0/byteOffset", json!(1), "accessors[0]"),
-            ("/accessors/1/count", json!(u64::MAX), "accessors[1]"),
             ("/bufferViews/0/byteLength", json!(1000), "bufferViews[0]"),
             (
                 "/bufferViews/0/byteOffset",
@@ -473,13 +586,89 @@ mod bad_input {
     }
 
     #[test]
-    fn zeros_without_a_buffer_view_are_bounded() {
+    fn elements_beyond_what_the_file_can_hold_are_refused_before_they_are_made() {
         let sparse = json!({"count": 1,
             "indices": {"bufferView": 1, "componentType": 5123},
             "values": {"bufferView": 0}});
-        let accessor = json!({"componentType": 5126, "count": 1_000_000_000_000u64,
-                              "type": "VEC3", "sparse": sparse});
-        Files::new(&with(base(), "/accessors/0", accessor)).fails_with(&["without a buffer view"]);
+        for count in [1_000_000_000_000u64, u64::MAX] {
+            let accessor = json!({"componentType": 5126, "count": count,
+                                  "type": "VEC3", "sparse": sparse});
+            Files::new(&with(base(), "/accessors/0", accessor)).fails_with(&[
+                "accessors[0]",
+                "in a file of this size",
+                &count.to_string(),
+            ]);
+            Files::new(&with(base(), "/accessors/1/count", json!(count))).fails_with(&[
+                "accessors[1]",
+                "in a file of this size",
+                &count.to_string(),
+            ]);
+        }
+    }
+
+    #[test]
+    fn a_mesh_of_many_primitives_placed_many_times_is_refused_before_it_explodes() {
+        let primitive = json!({"attributes": {"POSITION": 0}});
+        let json = with(
+            base(),
+            "/meshes/0/primitives",
+            json!(vec![primitive; 10_000]),
+        );
+        let json = with(json, "/nodes", json!(vec![json!({"mesh": 0}); 10_000]));
+        let nodes: Vec<u32> = (0..10_000).collect();
+        let json = with(json, "/scenes/0/nodes", json!(nodes));
+        Files::new(&json).fails_with(&["instances of meshes[0]", "in a file of this size"]);
+    }
+
+    #[test]
+    fn a_stride_below_the_elements_size_is_told() {
+        for stride in [4, 8] {
+            let json = with(base(), "/bufferViews/0/byteStride", json!(stride));
+            Files::new(&json).fails_with(&[
+                "bufferViews[0].byteStride",
+                "at least 12 bytes",
+                &format!("found {stride}"),
+            ]);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_and_pipes_are_refused_as_buffers_and_images() {
+        for (json, place) in [
+            (
+                with(base(), "/buffers/0/uri", json!("/dev/zero")),
+                "buffers[0]",
+            ),
+            (
+                with(textured(), "/images/0/uri", json!("/dev/zero")),
+                "images[0]",
+            ),
+        ] {
+            let error = Files::new(&json).load().unwrap_err().to_string();
+            for part in ["/dev/zero", place, "a regular file", "a device"] {
+                assert!(error.contains(part), "'{part}' is not in: {error}");
+            }
+        }
+        let files = Files::new(&base());
+        std::fs::remove_file(files.path("mesh.bin")).unwrap();
+        let made = std::process::Command::new("mkfifo")
+            .arg(files.path("mesh.bin"))
+            .status();
+        assert!(made.unwrap().success());
+        files.fails_with(&["mesh.bin", "buffers[0]", "a regular file", "a pipe"]);
+    }
+
+    #[test]
+    fn names_and_paths_with_terminal_escapes_are_shown_escaped() {
+        let json = with(base(), "/buffers/0/uri", json!("no\u{1b}]0;x\u{7}.bin"));
+        Files::new(&json).fails_with(&["no\\u{1b}]0;x\\u{7}.bin", "cannot read"]);
+        let json = with(base(), "/meshes/0/name", json!("a\u{1b}[2Jb\u{9b}"));
+        let files = Files::new(&json);
+        let scene = files.load().unwrap().scene;
+        assert_eq!(scene.meshes[0].name, "a\\u{1b}[2Jb\\u{9b}");
+        files.write("mesh.bin", &triangle_bytes(CORNERS, [0, 1, 3]));
+        files.fails_with(&["'a\\u{1b}[2Jb\\u{9b}'"]);
     }
 
     #[test]
@@ -512,13 +701,45 @@ mod bad_input {
     }
 
     #[test]
-    fn required_extensions_that_are_not_known_are_told() {
-        let json = with(
-            base(),
-            "/extensionsRequired",
-            json!(["KHR_draco_mesh_compression"]),
-        );
-        Files::new(&json).fails_with(&["KHR_draco_mesh_compression", "unsupported"]);
+    fn required_extensions_that_are_not_supported_are_named_before_all_else() {
+        // As such files are: accessors and textures that only the extension fills.
+        let mut draco = base();
+        draco["accessors"][0]
+            .as_object_mut()
+            .unwrap()
+            .remove("bufferView");
+        let mut basis = textured();
+        basis["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+        for (name, json) in [
+            ("KHR_draco_mesh_compression", draco.clone()),
+            ("EXT_meshopt_compression", draco),
+            ("KHR_texture_basisu", basis),
+        ] {
+            let required = json!(["KHR_texture_transform", name, name]);
+            let files = Files::new(&with(json, "/extensionsRequired", required));
+            files.fails_with(&["extensionsRequired", &format!("found {name}, unsupported")]);
+        }
+    }
+
+    #[test]
+    fn a_huge_image_in_a_small_file_is_refused_before_it_is_decoded() {
+        let files = Files::new(&textured());
+        let mut huge = png([1, 1], [0; 4]);
+        // Width and height of the header, with its checksum made good.
+        huge[16..24].copy_from_slice(&[0, 0, 0x40, 0, 0, 0, 0x40, 0]);
+        let checksum = crc(&huge[12..29]);
+        huge[29..33].copy_from_slice(&checksum.to_be_bytes());
+        files.write("my image.png", &huge);
+        files.fails_with(&["my image.png", "16384x16384", "bytes of texels"]);
+    }
+
+    /// CRC-32 as PNG has it.
+    fn crc(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(!0u32, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+                (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg())
+            })
+        })
     }
 
     #[test]

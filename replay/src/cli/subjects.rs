@@ -1,0 +1,39 @@
+//! The texture traces of an experiment, opened and named.
+
+use crate::experiment::{Subject, labels};
+use crate::result::TraceId;
+use anyhow::Result;
+use formats::textrace::Textrace;
+use std::path::PathBuf;
+
+/// Opened traces.
+pub struct Traces(Vec<(Textrace, TraceId, String)>);
+
+impl Traces {
+    /// Opens every file.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is damaged.
+    pub fn open(paths: &[PathBuf]) -> Result<Self> {
+        let open = |path: &PathBuf| {
+            let (trace, id) = super::open_textrace(path)?;
+            let stem = path.file_stem().unwrap_or_default();
+            Ok((trace, id, stem.to_string_lossy().into_owned()))
+        };
+        paths.iter().map(open).collect::<Result<_>>().map(Self)
+    }
+
+    /// The traces under names of their own.
+    #[must_use]
+    pub fn subjects(&self) -> Vec<Subject<'_>> {
+        let named: Vec<_> = self
+            .0
+            .iter()
+            .map(|(trace, id, stem)| (trace.tables(), id, stem.clone()))
+            .collect();
+        let opened = self.0.iter().zip(labels(&named));
+        opened
+            .map(|((trace, id, _), label)| Subject::new(trace, id.clone(), label))
+            .collect()
+    }
+}

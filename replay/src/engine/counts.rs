@@ -1,0 +1,84 @@
+//! Counts of what a cache hierarchy makes of the accesses.
+
+use crate::stream::{Bins, LineSet};
+
+/// Misses of one level.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Misses {
+    /// Footprints with any line that had to be fetched.
+    pub footprints: u64,
+    /// Lines that had to be fetched.
+    pub lines: u64,
+    /// Lines that were on their way already (timed mode only).
+    pub secondary: u64,
+}
+
+/// Misses of both levels. What misses the L1 is what comes to the L2.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CellMisses {
+    /// First level.
+    pub l1: Misses,
+    /// Second level.
+    pub l2: Misses,
+}
+
+/// Misses of one tile.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TileMisses {
+    /// Footprints with an L1 miss.
+    pub l1_footprints: u32,
+    /// Lines fetched from memory.
+    pub l2_lines: u32,
+}
+
+/// What became of the lines of one footprint.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FootprintMisses {
+    /// Lines that the L1 fetched.
+    pub l1_lines: u32,
+    /// Lines on their way into the L1.
+    pub l1_secondary: u32,
+    /// Lines that the L2 fetched.
+    pub l2_lines: u32,
+    /// Lines on their way into the L2.
+    pub l2_secondary: u32,
+}
+
+/// All misses of a replay.
+#[derive(Debug)]
+pub struct CacheCounts {
+    /// By cell, see [`Bins`].
+    pub cells: Vec<CellMisses>,
+    /// By tile.
+    pub tiles: Vec<TileMisses>,
+    /// Lines that missed an L1. A line's first access always does, so these are all lines touched.
+    pub touched: LineSet,
+}
+
+impl CacheCounts {
+    /// All zero, for line numbers below `lines`.
+    #[must_use]
+    pub fn new(bins: &Bins, lines: u64) -> Self {
+        Self {
+            cells: vec![CellMisses::default(); bins.cells()],
+            tiles: vec![TileMisses::default(); bins.tiles()],
+            touched: LineSet::new(lines),
+        }
+    }
+
+    /// Counts a footprint that did not find all its lines.
+    #[inline]
+    pub fn footprint(&mut self, cell: usize, tile: usize, misses: &FootprintMisses) {
+        let (missed_l1, missed_l2) = (misses.l1_lines > 0, misses.l2_lines > 0);
+        let CellMisses { l1, l2 } = &mut self.cells[cell];
+        l1.footprints += u64::from(missed_l1);
+        l1.lines += u64::from(misses.l1_lines);
+        l1.secondary += u64::from(misses.l1_secondary);
+        l2.footprints += u64::from(missed_l2);
+        l2.lines += u64::from(misses.l2_lines);
+        l2.secondary += u64::from(misses.l2_secondary);
+        let tile = &mut self.tiles[tile];
+        tile.l1_footprints = tile.l1_footprints.wrapping_add(u32::from(missed_l1));
+        tile.l2_lines = tile.l2_lines.wrapping_add(misses.l2_lines);
+    }
+}

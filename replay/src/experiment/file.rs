@@ -1,0 +1,236 @@
+//! An experiment file: traces, a base configuration and what is varied around it.
+//!
+//! ```toml
+//! traces = ["crytek.textrace"]      # beside the file; the command line's traces win
+//! [base]                            # any key of the replay configuration
+//! mode = "functional"
+//! [axes]                            # crossed with one another
+//! order = ["morton", "z2-sta"]
+//! l1.size_bytes = ["8KiB", "16KiB"]
+//! [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
+//! layout.block_order = ["morton", "tiled"]
+//! ```
+
+use super::plan::{Axis, MOST_POINTS, Plan, PlanError};
+use crate::config::RunConfig;
+use serde::Deserialize;
+use toml::de::{DeTable, DeValue};
+use toml::{Table, Value};
+
+/// A parsed experiment file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExperimentFile {
+    /// Traces that it names.
+    pub traces: Vec<String>,
+    /// The base configuration.
+    pub base: RunConfig,
+    /// Axes that are crossed, in the order of the file; the last one runs fastest.
+    pub axes: Vec<Axis>,
+    /// Values that are tried alone.
+    pub one_at_a_time: Vec<Axis>,
+}
+
+/// A leaf of the document: its key with dots, where the key stands, and its value.
+type Leaf<'a, 'i> = (String, usize, &'a DeValue<'i>);
+
+/// What is wrong with a key, and where the key stands in the text.
+struct Fault {
+    offset: usize,
+    key: String,
+    message: String,
+}
+
+impl ExperimentFile {
+    /// Parses an experiment file.
+    ///
+    /// # Errors
+    /// Syntax, an unknown key, a value that its key does not take; each with its line.
+    pub fn parse(text: &str) -> Result<Self, PlanError> {
+        let line_at = |offset: usize| 1 + text.bytes().take(offset).filter(|b| *b == b'\n').count();
+        let document = DeTable::parse(text).map_err(|e| PlanError::Syntax {
+            line: line_at(e.span().map_or(0, |s| s.start)),
+            message: e.message().to_owned(),
+        })?;
+        Self::read(document.get_ref()).map_err(|fault| PlanError::Key {
+            line: line_at(fault.offset),
+            key: fault.key,
+            message: fault.message,
+        })
+    }
+
+    fn read(document: &DeTable) -> Result<Self, Fault> {
+        let mut file = Self {
+            traces: Vec::new(),
+            base: RunConfig::default(),
+            axes: Vec::new(),
+            one_at_a_time: Vec::new(),
+        };
+        let mut base = to_table(&file.base);
+        // Axes are checked against the base, wherever the file has it.
+        let mut sections: Vec<_> = document.iter().collect();
+        sections.sort_by_key(|(key, _)| (key.get_ref() != "base", key.span().start));
+        for (key, value) in sections {
+            let fault = |message: String| Fault {
+                offset: key.span().start,
+                key: key.get_ref().to_string(),
+                message,
+            };
+            match (key.get_ref().as_ref(), value.get_ref()) {
+                ("traces", DeValue::Array(traces)) => {
+                    for trace in traces.iter() {
+                        let name = trace.get_ref().as_str();
+                        let name = name.ok_or_else(|| fault("expected paths".to_owned()))?;
+                        file.traces.push(name.to_owned());
+                    }
+                }
+                ("base", DeValue::Table(table)) => {
+                    for (key, offset, value) in leaves(table) {
+                        let set = to_value(value).and_then(|value| {
+                            set(&mut base, &key, value);
+                            parsed(&base)
+                        });
+                        file.base = set.map_err(|message| Fault {
+                            offset,
+                            key,
+                            message,
+                        })?;
+                    }
+                }
+                ("axes", DeValue::Table(table)) => file.axes = axes(table, &base)?,
+                ("one-at-a-time", DeValue::Table(table)) => {
+                    file.one_at_a_time = axes(table, &base)?;
+                }
+                (name @ ("traces" | "base" | "axes" | "one-at-a-time"), other) => {
+                    let expected = if name == "traces" {
+                        "a list"
+                    } else {
+                        "a table"
+                    };
+                    let found = other.type_str();
+                    return Err(fault(format!("expected {expected}, found {found}")));
+                }
+                _ => {
+                    return Err(fault(
+                        "unknown key, expected one of traces, base, axes, one-at-a-time".to_owned(),
+                    ));
+                }
+            }
+        }
+        Ok(file)
+    }
+
+    /// Every point of the file.
+    ///
+    /// # Errors
+    /// Too many points, or one whose configuration is impossible.
+    pub fn plan(&self) -> Result<Plan, PlanError> {
+        Plan::cross(self.base, &self.axes, &self.one_at_a_time)
+    }
+}
+
+/// The axes of a section, in the order of the file, every value checked against the base.
+fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
+    let axis = |key: &str, value: &DeValue| {
+        let values = match to_value(value)? {
+            Value::Array(values) if values.len() > MOST_POINTS => {
+                let found = values.len();
+                return Err(format!(
+                    "expected at most {MOST_POINTS} values, found {found}"
+                ));
+            }
+            Value::Array(values) if !values.is_empty() => values,
+            other => {
+                let found = other.to_string();
+                return Err(format!("expected a list of values, found {found:.60}"));
+            }
+        };
+        let mut table = base.clone();
+        for value in &values {
+            set(&mut table, key, value.clone());
+            parsed(&table)?;
+        }
+        Ok(Axis {
+            key: key.to_owned(),
+            values,
+        })
+    };
+    leaves(table)
+        .into_iter()
+        .map(|(key, offset, value)| {
+            axis(&key, value).map_err(|message| Fault {
+                offset,
+                key,
+                message,
+            })
+        })
+        .collect()
+}
+
+/// The leaves of nested tables with dotted keys, in the order of the file.
+fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Vec<Leaf<'a, 'i>> {
+    fn walk<'a, 'i>(table: &'a DeTable<'i>, prefix: &str, out: &mut Vec<Leaf<'a, 'i>>) {
+        for (key, value) in table.iter() {
+            let path = format!("{prefix}{}", key.get_ref());
+            match value.get_ref() {
+                DeValue::Table(inner) => walk(inner, &format!("{path}."), out),
+                leaf => out.push((path, key.span().start, leaf)),
+            }
+        }
+    }
+    let mut out = Vec::new();
+    walk(table, "", &mut out);
+    out.sort_by_key(|(_, offset, _)| *offset);
+    out
+}
+
+fn to_value(value: &DeValue) -> Result<Value, String> {
+    match value {
+        DeValue::String(text) => Ok(Value::String(text.to_string())),
+        DeValue::Boolean(flag) => Ok(Value::Boolean(*flag)),
+        DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix())
+            .map(Value::Integer)
+            .map_err(|e| format!("{}: {e}", number.as_str())),
+        DeValue::Float(number) => number
+            .as_str()
+            .parse()
+            .map(Value::Float)
+            .map_err(|e| format!("{}: {e}", number.as_str())),
+        DeValue::Array(items) => items
+            .iter()
+            .map(|i| to_value(i.get_ref()))
+            .collect::<Result<_, _>>()
+            .map(Value::Array),
+        other => Err(format!(
+            "expected text, a number or a list, found {}",
+            other.type_str()
+        )),
+    }
+}
+
+/// Sets a dotted key, making the tables on its way.
+pub(super) fn set(table: &mut Table, key: &str, value: Value) {
+    match key.split_once('.') {
+        None => {
+            table.insert(key.to_owned(), value);
+        }
+        Some((first, rest)) => {
+            let inner = table
+                .entry(first)
+                .or_insert_with(|| Value::Table(Table::new()));
+            if !inner.is_table() {
+                *inner = Value::Table(Table::new());
+            }
+            if let Value::Table(inner) = inner {
+                set(inner, rest, value);
+            }
+        }
+    }
+}
+
+fn to_table(config: &RunConfig) -> Table {
+    Table::try_from(config).unwrap_or_default()
+}
+
+pub(super) fn parsed(table: &Table) -> Result<RunConfig, String> {
+    RunConfig::deserialize(Value::Table(table.clone())).map_err(|e| e.message().to_owned())
+}

@@ -1,0 +1,157 @@
+//! Results in the order of the plan, as rows that know the points they are held against.
+
+use super::plan::functional;
+use super::{Plan, Point, Setting, Subject, frame_count};
+use crate::config::Order;
+use crate::paper::z2::{self, PublishedRow};
+use crate::result::RunResult;
+use std::collections::HashMap;
+
+/// What a plan yields.
+pub struct Outcome<'a> {
+    /// The traces.
+    pub subjects: &'a [Subject<'a>],
+    /// The points.
+    pub plan: &'a Plan,
+    /// Replays that were run now; other results came from the store or were the same point's.
+    pub replays: usize,
+    /// `results[subject * points + point]`.
+    results: Vec<RunResult>,
+}
+
+/// A point of a trace with its result, and the results of the points it is held against.
+#[derive(Clone, Copy)]
+pub struct ResultRow<'a> {
+    /// The trace.
+    pub subject: &'a Subject<'a>,
+    /// The point.
+    pub point: &'a Point,
+    /// Its result.
+    pub result: &'a RunResult,
+    /// Everything the same in Morton order; none where the order does not vary.
+    pub morton: Option<&'a RunResult>,
+    /// The same settings without the change; none where there is no change.
+    pub unchanged: Option<&'a RunResult>,
+    /// The same settings in functional mode, where this is not that change.
+    pub functional: Option<&'a RunResult>,
+    /// The paper's row for the scene that the trace stands for.
+    pub paper: Option<&'static PublishedRow>,
+}
+
+/// Name of a point in an index.
+type PointName = (Vec<(String, String)>, Option<(String, String)>);
+
+fn name(settings: &[Setting], change: Option<&Setting>, order: Option<&str>) -> PointName {
+    let text = |(key, value): &Setting| match order {
+        Some(order) if key == "order" => (key.clone(), format!("\"{order}\"")),
+        _ => (key.clone(), value.to_string()),
+    };
+    (settings.iter().map(text).collect(), change.map(text))
+}
+
+impl<'a> Outcome<'a> {
+    /// Results of every point on every trace, `results[subject * points + point]`.
+    #[must_use]
+    pub fn new(
+        plan: &'a Plan,
+        subjects: &'a [Subject<'a>],
+        results: Vec<RunResult>,
+        replays: usize,
+    ) -> Self {
+        Self {
+            subjects,
+            plan,
+            replays,
+            results,
+        }
+    }
+
+    /// A row for every point of every trace, in that order.
+    #[must_use]
+    pub fn rows(&self) -> Vec<ResultRow<'_>> {
+        let points = &self.plan.points;
+        let index: HashMap<PointName, usize> = points
+            .iter()
+            .enumerate()
+            .map(|(i, p)| (name(&p.settings, p.change.as_ref(), None), i))
+            .collect();
+        let find = |settings: &[Setting], change, order| {
+            index.get(&name(settings, change, order)).copied()
+        };
+        let functional = functional();
+        let neighbours: Vec<[Option<usize>; 3]> = points
+            .iter()
+            .map(|p| {
+                let varies = p.settings.iter().any(|(key, _)| key == "order");
+                let morton = Order::MORTON.name();
+                [
+                    varies.then(|| find(&p.settings, p.change.as_ref(), Some(morton))),
+                    p.change.as_ref().map(|_| find(&p.settings, None, None)),
+                    (p.change.is_none()).then(|| find(&p.settings, Some(&functional), None)),
+                ]
+                .map(Option::flatten)
+            })
+            .collect();
+        let mut rows = Vec::with_capacity(self.results.len());
+        for (subject, results) in self.subjects.iter().zip(self.results.chunks(points.len())) {
+            for ((point, result), of) in points.iter().zip(results).zip(&neighbours) {
+                let [morton, unchanged, functional] = of.map(|i| i.map(|i| &results[i]));
+                rows.push(ResultRow {
+                    subject,
+                    point,
+                    result,
+                    morton,
+                    unchanged,
+                    functional,
+                    paper: published(subject, point, point.config.order),
+                });
+            }
+        }
+        rows
+    }
+}
+
+/// The paper's row for a trace's scene, if the caches are the paper's, too.
+fn published(subject: &Subject, point: &Point, order: Order) -> Option<&'static PublishedRow> {
+    let [l1, l2] = [&point.config.l1, &point.config.l2].map(|cache| cache.size_bytes);
+    let exact = l1.is_multiple_of(1024) && l2.is_multiple_of(1024);
+    let kib = |bytes: u64| u32::try_from(bytes / 1024).ok().filter(|_| exact);
+    z2::row(subject.stand_in_for?, kib(l1)?, kib(l2)?, order)
+}
+
+impl ResultRow<'_> {
+    /// L1 and L2 size in KiB.
+    #[must_use]
+    pub fn caches_kib(&self) -> (f64, f64) {
+        let config = &self.point.config;
+        let kib = |bytes: u64| bytes as f64 / 1024.0;
+        (kib(config.l1.size_bytes), kib(config.l2.size_bytes))
+    }
+
+    /// Both sizes in KiB, as `8/128`.
+    #[must_use]
+    pub fn caches_title(&self) -> String {
+        let (l1, l2) = self.caches_kib();
+        format!("{l1}/{l2}")
+    }
+
+    /// Bytes of all frames as MB (10^6 bytes) a frame.
+    #[must_use]
+    pub fn mb_per_frame(&self, bytes: u64) -> f64 {
+        let frames = frame_count(self.subject.source.tables()).max(1);
+        bytes as f64 / 1e6 / f64::from(frames)
+    }
+
+    /// Traffic of an infinite cache, bytes.
+    #[must_use]
+    pub fn bound_bytes(&self) -> u64 {
+        self.result.unique_lines * u64::from(self.point.config.line_bytes)
+    }
+
+    /// External traffic saved against another result, percent; none where that has none.
+    #[must_use]
+    pub fn saved_pct(&self, against: Option<&RunResult>) -> Option<f64> {
+        let whole = against?.external_bytes as f64;
+        (whole > 0.0).then(|| 100.0 * (1.0 - self.result.external_bytes as f64 / whole))
+    }
+}

@@ -1,0 +1,164 @@
+//! The figures of a replayed point, a line each: every table, file and chart takes them from here.
+
+use super::columns::{Column, Row, Show, Value, pick};
+use crate::experiment::ResultRow;
+use crate::result::{Part, RunResult};
+use crate::tmu::closed_form;
+
+/// A column of point results.
+pub type Figure<'a> = Column<'static, ResultRow<'a>>;
+
+/// What names a point: the trace, and what the Z2 paper's experiment varies.
+fn identity<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::text("scene", "scene", |r| r.subject.label.clone()),
+        Figure::text("trace", "trace", |r| r.subject.id.checksum.clone()),
+        Figure::text("twin", "stands for", |r| r.subject.stand_in_for),
+        Figure::real("caches", "L1/L2", "KiB", 0, ResultRow::caches_title),
+        Figure::real("l1_kib", "L1", "KiB", 0, |r| r.caches_kib().0),
+        Figure::real("l2_kib", "L2", "KiB", 0, |r| r.caches_kib().1),
+        Figure::text("order", "order", |r| {
+            let order = r.point.config.order;
+            Value::Named(order.name(), order.title())
+        }),
+    ]
+}
+
+/// What is counted, and what follows from it.
+#[rustfmt::skip]
+pub fn figures<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::real("l1_miss_pct", "L1 miss", "%", 2, |r| 100.0 * r.result.l1.miss_rate)
+            .about("footprints with a missing line"),
+        Figure::real("l2_miss_pct", "L2 miss", "%", 2, |r| 100.0 * r.result.l2.miss_rate)
+            .about("line look-ups of the L2 that miss"),
+        Figure::real("tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.result))
+            .about("cycles in which a footprint leaves the texture unit"),
+        Figure::real("tmu_ratio", "TMU", "\u{d7} Morton", 3, |r| Some(utilization(r.result)? / utilization(r.morton?)?))
+            .about("utilisation over Morton order's"),
+        Figure::real("reduction_pct", "saved", "% of Morton", 1, |r| r.saved_pct(r.morton))
+            .about("external traffic saved against Morton order, everything else the same"),
+        Figure::real("external_bytes", "external", "bytes", 0, |r| r.result.external_bytes)
+            .about("line misses of the L2 times the line size, all frames"),
+        Figure::real("external_mb_per_frame", "external", "MB/frame", 2, |r| r.mb_per_frame(r.result.external_bytes))
+            .about("external texture traffic"),
+        Figure::real("bound_mb_per_frame", "bound", "MB/frame", 2, |r| r.mb_per_frame(r.bound_bytes()))
+            .about("external traffic of an infinite cache"),
+        Figure::real("over_bound", "external", "\u{d7} bound", 2, |r| over(r.result.external_bytes, r.bound_bytes()))
+            .about("external traffic over the bound"),
+        Figure::real("over_base", "external", "\u{d7} base", 3, |r| over(r.result.external_bytes, r.unchanged?.external_bytes))
+            .about("external traffic over that of the same settings without the change"),
+        Figure::real("closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.result))
+            .about("utilisation that the Z2 paper's table implies for these miss rates"),
+        Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| Some(tmu_util_pct(r.result)? - closed_form_pct(r.result)))
+            .about("simulated utilisation less the one that the Z2 paper's table implies for these miss rates"),
+        Figure::real("cycles", "cycles", "", 0, |r| r.result.cycles)
+            .about("cycles until the last core is done"),
+    ]
+}
+
+/// The paper's figures for the same point; its saving follows from its two miss rates.
+#[rustfmt::skip]
+fn published<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::real("paper.l1_miss_pct", "paper L1", "%", 2, |r| Some(r.paper?.l1_miss_pct)),
+        Figure::real("paper.l2_miss_pct", "paper L2", "%", 2, |r| Some(r.paper?.l2_miss_pct)),
+        Figure::real("paper.tmu_util_pct", "paper TMU", "%", 2, |r| Some(r.paper?.tmu_util_pct)),
+        Figure::real("paper.tmu_ratio", "paper TMU", "\u{d7} Morton", 3, |r| r.paper?.tmu_ratio()),
+        Figure::real("paper.reduction_pct", "paper saved", "% of Morton", 1, |r| r.paper?.reduction_pct()),
+    ].into_iter().map(Column::published).collect()
+}
+
+/// The same point in functional mode.
+#[rustfmt::skip]
+fn functional<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::real("functional.l1_miss_pct", "functional L1", "%", 2, |r| Some(100.0 * r.functional?.l1.miss_rate)),
+        Figure::real("functional.l2_miss_pct", "functional L2", "%", 2, |r| Some(100.0 * r.functional?.l2.miss_rate)),
+        Figure::real("functional.external_mb_per_frame", "functional", "MB/frame", 2, |r| Some(r.mb_per_frame(r.functional?.external_bytes))),
+        Figure::real("functional.external_difference_pct", "difference", "%", 2, |r| Some(100.0 * (over(r.functional?.external_bytes, r.result.external_bytes).unwrap_or(1.0) - 1.0))),
+    ]
+}
+
+impl Row for ResultRow<'_> {
+    fn columns() -> Vec<Column<'static, Self>> {
+        [identity(), figures(), published(), functional()]
+            .into_iter()
+            .flatten()
+            .collect()
+    }
+}
+
+/// The figure with this key.
+#[must_use]
+pub fn figure<'a>(key: &str) -> Option<Figure<'a>> {
+    pick(&[key]).pop()
+}
+
+/// A row's figure with this key, if it is a number.
+#[must_use]
+pub fn number(row: &ResultRow, key: &str) -> Option<f64> {
+    figure(key)?.value(row).number()
+}
+
+impl Row for Part {
+    #[rustfmt::skip]
+    fn columns() -> Vec<Column<'static, Self>> {
+        vec![
+            Column::text("name", "", |p: &Self| p.name.clone()),
+            Column::new("footprints", "footprints", "millions", Show::Millions(3), |p: &Self| p.l1.footprints),
+            Column::real("l1_miss_pct", "L1 miss", "%", 2, |p: &Self| Some(100.0 * over(p.l1.footprint_misses, p.l1.footprints)?))
+                .about("footprints with a missing line"),
+            Column::real("l2_miss_pct", "L2 miss", "%", 2, |p: &Self| Some(100.0 * over(p.l2.line_misses, p.l2.line_lookups)?))
+                .about("line look-ups of the L2 that miss"),
+            Column::real("external_lines", "external", "1000 lines", 1, |p: &Self| p.l2.line_misses as f64 / 1e3)
+                .about("external traffic"),
+        ]
+    }
+}
+
+fn utilization(result: &RunResult) -> Option<f64> {
+    Some(result.tmu.as_ref()?.utilization)
+}
+
+fn tmu_util_pct(result: &RunResult) -> Option<f64> {
+    Some(100.0 * utilization(result)?)
+}
+
+fn closed_form_pct(result: &RunResult) -> f64 {
+    100.0 * closed_form(result.l1.miss_rate, result.l2.miss_rate)
+}
+
+/// `part / whole`, none when the whole is nothing.
+fn over(part: u64, whole: u64) -> Option<f64> {
+    (whole > 0).then(|| part as f64 / whole as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_figure_has_a_key_of_its_own_and_a_place_in_json() {
+        let keys: Vec<String> = ResultRow::columns()
+            .iter()
+            .map(|c| c.heading.key.to_string())
+            .collect();
+        for (i, key) in keys.iter().enumerate() {
+            assert!(!keys[..i].contains(key), "{key} twice");
+        }
+        // Keys with the same prefix must stand together: they are one object in JSON.
+        let prefixes: Vec<&str> = keys
+            .iter()
+            .filter_map(|k| Some(k.split_once('.')?.0))
+            .collect();
+        let mut runs = prefixes.clone();
+        runs.dedup();
+        assert_eq!(runs, ["paper", "functional"]);
+    }
+
+    #[test]
+    fn what_is_counted_says_what_it_is() {
+        assert!(figures().iter().all(|f| !f.heading.about.is_empty()));
+    }
+}

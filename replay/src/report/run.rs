@@ -1,0 +1,180 @@
+//! One replay, and one in both modes.
+
+use super::columns::{Column, Row, Show, Value};
+use super::figures::figures;
+use super::table::Table;
+use crate::config::{Mode, RunConfig};
+use crate::experiment::ResultRow;
+use crate::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TOOL, TraceId};
+use crate::size::format_bytes;
+use serde::Serialize;
+
+/// Schema of the object that `--compare-modes --json` prints.
+const COMPARE_SCHEMA: &str = "replay.compare-modes/1";
+
+/// What `replay run --json` prints.
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    schema: &'a str,
+    tool: &'a str,
+    trace: &'a TraceId,
+    config: &'a RunConfig,
+    result: &'a RunResult,
+}
+
+impl<'a> Document<'a> {
+    fn new(row: &'a ResultRow) -> Self {
+        Self {
+            schema: RUN_SCHEMA,
+            tool: TOOL,
+            trace: &row.subject.id,
+            config: &row.point.config,
+            result: row.result,
+        }
+    }
+}
+
+/// One result as JSON.
+///
+/// # Errors
+/// A figure that is not finite.
+pub fn json(row: &ResultRow) -> serde_json::Result<String> {
+    serde_json::to_string_pretty(&Document::new(row))
+}
+
+/// One result as tables: levels, views, and the figures of the whole.
+#[must_use]
+pub fn text(row: &ResultRow) -> String {
+    let ResultRow { result, point, .. } = row;
+    let config = &point.config;
+    let level: Vec<Column<(&str, &LevelResult)>> = vec![
+        Column::text("level", "", |l: &(&str, _)| l.0),
+        count("footprints", |l| l.1.counters.footprints),
+        count("with a miss", |l| l.1.counters.footprint_misses),
+        count("line look-ups", |l| l.1.counters.line_lookups),
+        count("line misses", |l| l.1.counters.line_misses),
+        count("merged", |l| l.1.counters.secondary_misses),
+        Column::real("miss_pct", "miss rate", "%", 2, |l: &(_, &LevelResult)| {
+            100.0 * l.1.miss_rate
+        }),
+    ];
+    let levels = Table::new(&level, &[("L1", &result.l1), ("L2", &result.l2)]);
+    let views = Table::new(&Part::columns(), &result.by_view);
+    let mode = match config.mode {
+        Mode::Timed => "timed",
+        Mode::Functional => "functional",
+    };
+    let mut text = format!(
+        "{} ({}), {}, {mode}, L1 {}, L2 {}\n\n{}\n{}\n{}\n",
+        row.subject.id.scene,
+        row.subject.id.checksum,
+        config.order.name(),
+        format_bytes(config.l1.size_bytes),
+        format_bytes(config.l2.size_bytes),
+        levels.text(),
+        views.text(),
+        whole(row).text().trim_start(),
+    );
+    text += &format!(
+        "quads {}, covered pixels {}, access hash {}\n",
+        result.quads, result.lanes, result.access_hash,
+    );
+    if let Some(tmu) = &result.tmu {
+        text += &format!("{} loops of threads that missed\n", tmu.loops);
+    }
+    text
+}
+
+type Level<'a> = (&'a str, &'a LevelResult);
+
+fn count<'a>(
+    name: &'static str,
+    value: impl Fn(&Level<'a>) -> u64 + 'static,
+) -> Column<'static, Level<'a>> {
+    Column::new(name, name, "", Show::Decimals(0), value)
+}
+
+/// Every figure of the point that has a value, one a line.
+fn whole(row: &ResultRow) -> Table {
+    type Line = (&'static str, String, &'static str);
+    let mut lines: Vec<Line> = Vec::new();
+    for figure in figures() {
+        let (heading, value) = (&figure.heading, figure.value(row));
+        if value != Value::None {
+            lines.push((heading.about, heading.show.write(&value), heading.unit));
+        }
+    }
+    let columns = [
+        Column::text("about", "", |l: &Line| l.0),
+        Column::real("value", "", "", 0, |l: &Line| l.1.clone()),
+        Column::text("unit", "", |l: &Line| l.2),
+    ];
+    Table::new(&columns, &lines)
+}
+
+/// Timed over functional less one; nothing over nothing is no difference.
+fn difference(timed: f64, functional: f64) -> f64 {
+    if functional == 0.0 {
+        0.0
+    } else {
+        timed / functional - 1.0
+    }
+}
+
+/// What the modes are compared by: key in JSON, name, unit, decimals, value.
+type Measure = (
+    &'static str,
+    &'static str,
+    &'static str,
+    usize,
+    fn(&RunResult) -> f64,
+);
+
+const MEASURES: [Measure; 3] = [
+    ("l1_miss_rate", "L1 miss rate", "%", 2, |r| r.l1.miss_rate),
+    ("l2_miss_rate", "L2 miss rate", "%", 2, |r| r.l2.miss_rate),
+    ("external_bytes", "external", "bytes", 0, |r| {
+        r.external_bytes as f64
+    }),
+];
+
+/// Both modes of a point and their difference as JSON.
+///
+/// # Errors
+/// A figure that is not finite.
+pub fn modes_json(timed: &ResultRow, functional: &ResultRow) -> serde_json::Result<String> {
+    let differences: serde_json::Map<String, serde_json::Value> = MEASURES
+        .iter()
+        .map(|(key, .., value)| {
+            let difference = difference(value(timed.result), value(functional.result));
+            ((*key).to_owned(), difference.into())
+        })
+        .collect();
+    serde_json::to_string_pretty(&serde_json::json!({
+        "schema": COMPARE_SCHEMA,
+        "timed": Document::new(timed),
+        "functional": Document::new(functional),
+        "timed_over_functional_less_one": differences,
+    }))
+}
+
+/// Both modes of a point side by side.
+#[must_use]
+pub fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
+    let cell = |(.., unit, decimals, value): &Measure, row: &ResultRow| {
+        let scale = if *unit == "%" { 100.0 } else { 1.0 };
+        format!("{:.*} {unit}", decimals, scale * value(row.result))
+    };
+    let columns = [
+        Column::text("measure", "", |m: &Measure| m.1),
+        Column::real("timed", "timed", "", 0, |m: &Measure| cell(m, timed)),
+        Column::real("functional", "functional", "", 0, |m: &Measure| {
+            cell(m, functional)
+        }),
+        Column::real("difference", "difference", "", 0, |m: &Measure| {
+            let [timed, functional] = [timed, functional].map(|row| m.4(row.result));
+            format!("{:+.2} %", 100.0 * difference(timed, functional))
+        }),
+    ];
+    Table::new(&columns, &MEASURES).text()
+}

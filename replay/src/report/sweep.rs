@@ -1,0 +1,298 @@
+//! A sweep's results: rows, table, CSV and page.
+
+use super::columns::{Column, Record};
+use super::figures::{Figure, figure, figures, number};
+use super::html::{self, Section, folded};
+use super::plots::bars::{BarChart, BarGroup};
+use super::plots::hbars::HBarChart;
+use super::plots::{PlotError, SeriesStyle};
+use super::table::Table;
+use super::theme;
+use crate::config::{Order, RunConfig};
+use crate::experiment::{ExperimentFile, Outcome, ResultRow, Setting, plain, point_key};
+use crate::palette;
+use crate::result::{TOOL, TraceId};
+use maud::html;
+use serde::Serialize;
+use toml::Value;
+
+/// Schema of a sweep's JSON.
+pub const SWEEP_SCHEMA: &str = "replay.sweep/1";
+
+const ORDER: &str = "order";
+const TRAFFIC: &str = "external_mb_per_frame";
+
+/// A sweep: what its file says and what came out, by trace, change, axis values.
+pub struct SweepReport<'a> {
+    file: &'a ExperimentFile,
+    outcome: &'a Outcome<'a>,
+    rows: Vec<ResultRow<'a>>,
+}
+
+/// The JSON object.
+#[derive(Serialize)]
+struct Document<'a, 'r> {
+    schema: &'a str,
+    tool: &'a str,
+    /// Labels and traces.
+    traces: Vec<(&'a str, &'a TraceId)>,
+    base: RunConfig,
+    axes: &'a [crate::experiment::Axis],
+    one_at_a_time: &'a [crate::experiment::Axis],
+    rows: Vec<Point<'a, 'r>>,
+}
+
+/// A point of a trace in JSON.
+#[derive(Serialize)]
+struct Point<'a, 'r> {
+    scene: &'a str,
+    /// Values of the axes, in their order.
+    settings: &'a [Setting],
+    /// The value tried alone.
+    change: Option<&'a Setting>,
+    /// Name of the point's file, which holds the whole configuration and result.
+    point: String,
+    #[serde(flatten)]
+    figures: Record<'a, 'static, ResultRow<'r>>,
+}
+
+fn change_title(change: Option<&Setting>) -> String {
+    change.map_or_else(
+        || "base".to_owned(),
+        |(key, value)| format!("{key} = {}", plain(value)),
+    )
+}
+
+impl<'a> SweepReport<'a> {
+    /// The outcome of a file's plan.
+    #[must_use]
+    pub fn new(file: &'a ExperimentFile, outcome: &'a Outcome<'a>) -> Self {
+        Self {
+            file,
+            outcome,
+            rows: outcome.rows(),
+        }
+    }
+
+    /// As one JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        let columns = figures();
+        let mut rows = Vec::with_capacity(self.rows.len());
+        for row in &self.rows {
+            rows.push(Point {
+                scene: &row.subject.label,
+                settings: &row.point.settings,
+                change: row.point.change.as_ref(),
+                point: point_key(&row.subject.id, &row.point.config),
+                figures: Record {
+                    columns: &columns,
+                    row,
+                },
+            });
+        }
+        let subjects = self.outcome.subjects.iter();
+        serde_json::to_string(&Document {
+            schema: SWEEP_SCHEMA,
+            tool: TOOL,
+            traces: subjects.map(|s| (s.label.as_str(), &s.id)).collect(),
+            base: self.file.base,
+            axes: &self.file.axes,
+            one_at_a_time: &self.file.one_at_a_time,
+            rows,
+        })
+    }
+
+    /// The trace, the axes and the change.
+    fn identity(&self) -> Vec<Figure<'a>> {
+        let mut columns = vec![Figure::text("scene", "scene", |r| r.subject.label.clone())];
+        for (i, axis) in self.file.axes.iter().enumerate() {
+            columns.push(Column::text(
+                axis.key.clone(),
+                axis.key.clone(),
+                move |r: &ResultRow| r.point.settings.get(i).map(|(_, value)| plain(value)),
+            ));
+        }
+        columns.push(Figure::text("change", "change", |r| {
+            change_title(r.point.change.as_ref())
+        }));
+        columns
+    }
+
+    /// The rows in full precision.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let mut columns = self.identity();
+        columns.push(Figure::text("point", "point", |r| {
+            point_key(&r.subject.id, &r.point.config)
+        }));
+        columns.extend(figures());
+        Table::new(&columns, &self.rows).csv()
+    }
+
+    /// The rows as a table; sets rows of a trace and a change apart.
+    #[must_use]
+    pub fn table(&self) -> Table {
+        let mut columns = self.identity();
+        if self.file.one_at_a_time.is_empty() {
+            columns.pop();
+        } else {
+            // Rows are set apart by trace and change, so these two come first.
+            columns[1..].rotate_right(1);
+        }
+        let groups = 1 + usize::from(!self.file.one_at_a_time.is_empty());
+        let shown = [
+            "l1_miss_pct",
+            "l2_miss_pct",
+            "tmu_util_pct",
+            TRAFFIC,
+            "bound_mb_per_frame",
+            "reduction_pct",
+            "over_base",
+        ];
+        columns.extend(super::columns::pick(&shown));
+        let table = Table::new(&columns, &self.rows).grouped_by(groups);
+        table.without_empty_columns()
+    }
+
+    /// The sweep as a page.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn.
+    pub fn page(&self, title: &str) -> Result<String, PlotError> {
+        let subjects = self.outcome.subjects;
+        let mut pictures = Vec::new();
+        for subject in subjects {
+            let charts = Charts::new(self, &subject.label);
+            if !self.file.one_at_a_time.is_empty() {
+                pictures.push((charts.changes().svg()?, String::new()));
+            }
+            for chart in charts.axes() {
+                pictures.push((chart.svg()?, String::new()));
+            }
+        }
+        let base = toml::to_string(&self.file.base).unwrap_or_default();
+        let lead = html! {
+            p {
+                (self.rows.len()) " points over " (subjects.len()) @if subjects.len() == 1 { " trace. " } @else { " traces. " }
+                "The same numbers are in the JSON and CSV files next to this page; each point's whole configuration and result is in points/."
+            }
+        };
+        let traces = html! {
+            ul { @for s in subjects { li { (s.label) ": " (s.id.scene) ", checksum " (s.id.checksum) } } }
+        };
+        let sections = [
+            Section::new("Charts", html::figures(&pictures)),
+            Section::new("Results", self.table().markup()),
+            Section::new("Traces", traces),
+            Section::new("Base configuration", folded("TOML", &base)),
+        ];
+        Ok(html::page(title, &lead, &sections))
+    }
+}
+
+fn value_label() -> String {
+    figure(TRAFFIC).map_or_else(String::new, |f| f.heading.axis_label())
+}
+
+/// The charts of one trace: external traffic in MB a frame.
+struct Charts<'a> {
+    report: &'a SweepReport<'a>,
+    scene: &'a str,
+    rows: Vec<&'a ResultRow<'a>>,
+    /// Values of the order axis; empty where the order is no axis.
+    orders: &'a [Value],
+}
+
+impl<'a> Charts<'a> {
+    fn new(report: &'a SweepReport<'a>, scene: &'a str) -> Self {
+        let orders = report.file.axes.iter().find(|a| a.key == ORDER);
+        let rows = report.rows.iter();
+        Self {
+            report,
+            scene,
+            rows: rows.filter(|r| r.subject.label == scene).collect(),
+            orders: orders.map_or(&[], |a| &a.values),
+        }
+    }
+
+    /// One series an order, or a single one.
+    fn series(&self) -> Vec<SeriesStyle> {
+        if self.orders.is_empty() {
+            return vec![SeriesStyle::nth("external traffic", 2)];
+        }
+        let style = |o: &Value| SeriesStyle {
+            name: plain(o),
+            color: theme::color(Order::find(&plain(o)).map_or(palette::GREY, Order::color)),
+        };
+        self.orders.iter().map(style).collect()
+    }
+
+    /// One value a series; axes that are not named are at their first value.
+    fn values(&self, axis: Option<(&str, &Value)>, change: Option<&Setting>) -> Vec<Option<f64>> {
+        let with = |order: Option<&Value>| {
+            let named = |key: &str| {
+                let order = order.filter(|_| key == ORDER);
+                order.or(axis.filter(|(k, _)| *k == key).map(|(_, value)| value))
+            };
+            let axes = &self.report.file.axes;
+            let matches = |row: &&&ResultRow| {
+                let mut settings = row.point.settings.iter().zip(axes);
+                row.point.change.as_ref() == change
+                    && settings.all(|((key, value), axis)| {
+                        named(key).or(axis.values.first()) == Some(value)
+                    })
+            };
+            number(self.rows.iter().find(matches)?, TRAFFIC)
+        };
+        if self.orders.is_empty() {
+            return vec![with(None)];
+        }
+        self.orders.iter().map(|o| with(Some(o))).collect()
+    }
+
+    /// A row for the base and one for each single change.
+    fn changes(&self) -> HBarChart {
+        let axes = self.report.file.one_at_a_time.iter();
+        let changes: Vec<Setting> = axes
+            .flat_map(|axis| axis.values.iter().map(|v| (axis.key.clone(), v.clone())))
+            .collect();
+        let row = |change| (change_title(change), self.values(None, change));
+        HBarChart {
+            title: format!("{}: one change at a time", self.scene),
+            value_label: value_label(),
+            series: self.series(),
+            rows: std::iter::once(None)
+                .chain(changes.iter().map(Some))
+                .map(row)
+                .collect(),
+            decimals: Some(2),
+        }
+    }
+
+    /// A chart for each axis but the order, the other axes at their first value.
+    fn axes(&self) -> Vec<BarChart> {
+        let axes = self.report.file.axes.iter();
+        axes.filter(|a| a.key != ORDER && a.values.len() > 1)
+            .map(|axis| BarChart {
+                title: format!("{}: {}", self.scene, axis.key),
+                value_label: value_label(),
+                group_label: axis.key.clone(),
+                series: self.series(),
+                groups: axis
+                    .values
+                    .iter()
+                    .map(|v| BarGroup {
+                        label: plain(v),
+                        values: self.values(Some((&axis.key, v)), None),
+                        marks: Vec::new(),
+                    })
+                    .collect(),
+                decimals: Some(1),
+                ..BarChart::default()
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,219 @@
+//! Quad records to cache lines: the hot path of every replay.
+//!
+//! All that does not depend on the record is computed once a trace: per draw, uv group and
+//! distinct kind of texture (size, sampler, layout) the byte offset of every column and row of
+//! texels of every level, which turns an address into two table look-ups and a sum. Textures of a
+//! group that differ only in their base address share level of detail and footprints.
+
+mod axis;
+mod build;
+mod bundle;
+
+pub use bundle::Bundle;
+
+use super::StreamError;
+use crate::config::{RunConfig, SamplingConfig};
+use axis::Axis;
+use formats::footprint::{LodFormula, fast_log2, quad_lod, select_levels};
+use formats::textrace::{QuadRecord, Tables};
+use formats::texture::{Filter, Sampler};
+use std::sync::Arc;
+
+/// A texture that a footprint falls into.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleRef {
+    /// Line that its relative lines count from.
+    pub base_line: u32,
+    /// Index into the texture table.
+    pub texture: u32,
+}
+
+/// Memory for the footprints of one record, kept from quad to quad.
+#[derive(Clone, Debug)]
+pub struct Scratch {
+    /// By kind of texture: its one or two levels.
+    bundles: Vec<[Bundle; 2]>,
+    both: Vec<bool>,
+}
+
+/// Footprint generator of a trace under one sampling and layout.
+#[derive(Debug)]
+pub struct Footprints {
+    draws: Vec<Vec<Group>>,
+    line_shift: u32,
+    helper_lanes: bool,
+    sampling: SamplingConfig,
+    lines: u64,
+}
+
+/// A uv group: its kinds of textures, and its samples in shader order.
+#[derive(Debug, Default)]
+struct Group {
+    kinds: Vec<Arc<Kind>>,
+    samples: Vec<(usize, SampleRef)>,
+}
+
+/// What the textures have in common that share footprints.
+#[derive(Debug)]
+struct Kind {
+    /// Texels of level 0.
+    size: [u32; 2],
+    /// The group's, which defines the fixed-point step.
+    extent: [u32; 2],
+    /// Fixed-point steps to texels of level 0.
+    to_texels: [f32; 2],
+    sampler: Sampler,
+    /// Bytes by which the texture starts after the start of a line.
+    skew_bytes: u32,
+    levels: Vec<Level>,
+}
+
+#[derive(Debug)]
+struct Level {
+    /// First byte within the layer.
+    base_bytes: u32,
+    u: Axis,
+    v: Axis,
+}
+
+impl Footprints {
+    /// Generator for the draws of a trace.
+    ///
+    /// # Errors
+    /// Tables that refer to what is not there, or more than 2^32 - 1 lines of addresses.
+    pub fn new(tables: &Tables, config: &RunConfig) -> Result<Self, StreamError> {
+        build::Builder::new(tables, config)?.finish()
+    }
+
+    /// Memory for [`Self::for_quad`].
+    #[must_use]
+    pub fn scratch(&self) -> Scratch {
+        let kinds = self
+            .draws
+            .iter()
+            .flatten()
+            .map(|g| g.kinds.len())
+            .max()
+            .unwrap_or(0);
+        Scratch {
+            bundles: vec![[Bundle::default(); 2]; kinds],
+            both: vec![false; kinds],
+        }
+    }
+
+    /// Lines of the whole address space.
+    #[must_use]
+    pub fn lines(&self) -> u64 {
+        self.lines
+    }
+
+    /// Calls `emit` for every sample and level of a quad: records, then samples in shader order,
+    /// then levels.
+    #[inline(always)]
+    pub fn for_quad(
+        &self,
+        draw: u32,
+        records: &[QuadRecord],
+        scratch: &mut Scratch,
+        mut emit: impl FnMut(SampleRef, &Bundle),
+    ) {
+        let groups = &self.draws[draw as usize];
+        for record in records {
+            let Some(group) = groups.get(usize::from(record.group)) else {
+                // NO_GROUP: nothing is sampled.
+                continue;
+            };
+            let slots = scratch.bundles.iter_mut().zip(&mut scratch.both);
+            for (kind, (bundles, both)) in group.kinds.iter().zip(slots) {
+                *both = self.bundles(kind, record, bundles);
+            }
+            for &(slot, sample) in &group.samples {
+                let [first, second] = &scratch.bundles[slot];
+                emit(sample, first);
+                if scratch.both[slot] {
+                    emit(sample, second);
+                }
+            }
+        }
+    }
+
+    /// Footprints of a record in one kind of texture; true if two levels are read.
+    #[inline(always)]
+    fn bundles(&self, kind: &Kind, record: &QuadRecord, out: &mut [Bundle; 2]) -> bool {
+        let lod = self.lod(kind, record) + self.sampling.lod_bias;
+        let levels = select_levels(lod, &kind.sampler, kind.levels.len() as u32);
+        let both = levels.count > 1;
+        let lanes = if self.helper_lanes {
+            15
+        } else {
+            record.mask & 15
+        };
+        let uv = [0, 1, 2, 3].map(|lane| record.lane_uv(lane));
+        self.fill(kind, levels.first, levels.filter, lanes, &uv, &mut out[0]);
+        if both {
+            self.fill(
+                kind,
+                levels.first + 1,
+                levels.filter,
+                lanes,
+                &uv,
+                &mut out[1],
+            );
+        }
+        both
+    }
+
+    /// `quad_lod`, with the scale computed once a trace for the formula that is used by default.
+    #[inline(always)]
+    fn lod(&self, kind: &Kind, record: &QuadRecord) -> f32 {
+        if self.sampling.lod != LodFormula::Llvmpipe {
+            return quad_lod(record, kind.extent, kind.size, self.sampling.lod);
+        }
+        let squared = |d: [i32; 2]| {
+            let [u, v] = [0, 1].map(|a| d[a] as f32 * kind.to_texels[a]);
+            u * u + v * v
+        };
+        0.5 * fast_log2(squared(record.dx).max(squared(record.dy)))
+    }
+
+    #[inline(always)]
+    fn fill(
+        &self,
+        kind: &Kind,
+        level: u32,
+        filter: Filter,
+        lanes: u8,
+        uv: &[[i32; 2]; 4],
+        out: &mut Bundle,
+    ) {
+        out.begin(level as u8);
+        let Level { base_bytes, u, v } = &kind.levels[level as usize];
+        let base = base_bytes + kind.skew_bytes;
+        let line = |offset: u32| (base + offset) >> self.line_shift;
+        let [us, vs] = [0, 1].map(|axis| uv.map(|lane| lane[axis]));
+        match filter {
+            Filter::Linear => {
+                let (columns, rows) = (u.linear(us), v.linear(vs));
+                for lane in lanes_of(lanes) {
+                    let ([x0, x1], [y0, y1]) = (columns[lane], rows[lane]);
+                    out.push([line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)]);
+                }
+            }
+            Filter::Nearest => {
+                let (columns, rows) = (u.nearest(us), v.nearest(vs));
+                for lane in lanes_of(lanes) {
+                    out.push([line(columns[lane] + rows[lane]); 4]);
+                }
+            }
+        }
+    }
+}
+
+/// The lanes of a mask, ascending.
+#[inline(always)]
+fn lanes_of(mask: u8) -> impl Iterator<Item = usize> {
+    (0..4).filter(move |lane| mask >> lane & 1 != 0)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,56 @@
+//! Where tiles come from: a file, or memory (tests, benchmarks, generated traces).
+
+use super::StreamError;
+use formats::textrace::{Tables, Textrace, Tile};
+
+/// A trace that can be read tile by tile.
+pub trait TileSource: Sync {
+    /// Its tables.
+    fn tables(&self) -> &Tables;
+
+    /// Decodes a tile into `tile`, which keeps its memory from call to call.
+    ///
+    /// # Errors
+    /// The tile does not exist or is damaged.
+    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError>;
+}
+
+/// A trace in memory.
+#[derive(Clone, Debug)]
+pub struct MemoryTrace {
+    /// Tables.
+    pub tables: Tables,
+    /// Tiles by pass.
+    pub tiles: Vec<Vec<Tile>>,
+}
+
+impl TileSource for MemoryTrace {
+    fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
+        let stored = self
+            .tiles
+            .get(pass as usize)
+            .and_then(|tiles| tiles.get(index as usize))
+            .ok_or_else(|| StreamError::Tile {
+                pass,
+                tile: index,
+                message: "no such tile".to_owned(),
+            })?;
+        tile.runs.clone_from(&stored.runs);
+        tile.records.clone_from(&stored.records);
+        Ok(())
+    }
+}
+
+impl TileSource for Textrace {
+    fn tables(&self) -> &Tables {
+        self.tables()
+    }
+
+    fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
+        Ok(self.decode_tile(pass as usize, index as usize, tile)?)
+    }
+}

@@ -1,0 +1,320 @@
+//! Images in files: found when a scene is loaded, decoded when their texels are asked for.
+
+use crate::SceneError;
+use crate::files::{Origin, read_file, read_start};
+use crate::image::{Image, ImageSource, OpenSource};
+use formats::texture::ColorSpace;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Largest image edge in texels: what a Vulkan texture may have on the drivers used.
+pub const MAX_SIZE: u32 = 16384;
+
+/// What turns files into texels. A test holds the versions to Cargo.lock: another decoder may
+/// round differently, and prepared textures are kept under this name.
+const DECODERS: &str = "image 0.25.10, png 0.18.1, zune-jpeg 0.5.15";
+
+/// Most bytes of an image's file: more than a PNG of [`MAX_SIZE`] squared takes.
+const MAX_FILE_BYTES: u64 = 1 << 31;
+
+/// Most bytes of texels that a byte of an encoded image stands for: deflate reaches 1,032, a JPEG
+/// of one colour about as much. Larger images cannot be whole, and would cost a small file nothing.
+const MAX_EXPANSION: u64 = 2048;
+
+/// Bytes of texels that any image may have.
+const SMALL_IMAGE_BYTES: u64 = 1 << 20;
+
+/// Encoded bytes of an image, or where they are.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Source {
+    /// A file.
+    File(PathBuf),
+    /// Bytes inside the scene file.
+    Bytes(Embedded),
+}
+
+/// An image inside the scene file. Two are the same where their numbers are.
+#[derive(Clone, Debug)]
+pub(crate) struct Embedded {
+    pub number: usize,
+    pub bytes: Arc<[u8]>,
+}
+
+impl PartialEq for Embedded {
+    fn eq(&self, other: &Self) -> bool {
+        self.number == other.number
+    }
+}
+
+impl Eq for Embedded {}
+
+impl Hash for Embedded {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.number.hash(state);
+    }
+}
+
+/// How a material reads an image, which decides its colour space and channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Usage {
+    /// sRGB colour.
+    Color,
+    /// Linear data.
+    Data,
+    /// A factor in the alpha channel (specularTexture), spread over RGB as linear data.
+    AlphaFactor,
+    /// Colour with an alpha that another image's luminance gives (OBJ's `map_d`), at that index of
+    /// the requests' `masks`.
+    Masked(usize),
+}
+
+/// One image to decode.
+#[derive(Clone, Debug)]
+pub(crate) struct Request {
+    pub source: Source,
+    pub usage: Usage,
+    /// Name for reports.
+    pub name: String,
+    /// Who refers to it, for errors.
+    pub place: String,
+}
+
+/// The images of a scene, each source and usage once.
+#[derive(Debug, Default)]
+pub(crate) struct Requests {
+    list: Vec<Request>,
+    /// Where each source and usage stands in `list`.
+    known: HashMap<(Source, Usage), usize>,
+    /// Opacity maps of `Usage::Masked`.
+    masks: Vec<Request>,
+    known_masks: HashMap<Source, usize>,
+}
+
+impl Requests {
+    /// The index of the image in the scene's table, added where it is new.
+    pub fn index(&mut self, request: Request) -> usize {
+        let key = (request.source.clone(), request.usage);
+        *self.known.entry(key).or_insert_with(|| {
+            self.list.push(request);
+            self.list.len() - 1
+        })
+    }
+
+    /// The index of an opacity map among the masks.
+    pub fn mask(&mut self, request: Request) -> usize {
+        let key = request.source.clone();
+        *self.known_masks.entry(key).or_insert_with(|| {
+            self.masks.push(request);
+            self.masks.len() - 1
+        })
+    }
+
+    /// The images, their sizes read from the files' headers on all cores, in order.
+    pub fn images(&self, origin: &Origin) -> Result<Vec<Image>, SceneError> {
+        self.list
+            .par_iter()
+            .map(|request| {
+                let encoded = Encoded {
+                    request: request.clone(),
+                    mask: match request.usage {
+                        Usage::Masked(mask) => Some(self.masks[mask].clone()),
+                        _ => None,
+                    },
+                    scene_file: origin.file.clone(),
+                };
+                Ok(Image {
+                    name: request.name.clone(),
+                    size: encoded.size()?,
+                    color_space: match request.usage {
+                        Usage::Color | Usage::Masked(_) => ColorSpace::Srgb,
+                        Usage::Data | Usage::AlphaFactor => ColorSpace::Linear,
+                    },
+                    source: Arc::new(encoded),
+                    part: 0,
+                })
+            })
+            .collect()
+    }
+}
+
+/// An image and its opacity map as files hold them.
+struct Encoded {
+    request: Request,
+    mask: Option<Request>,
+    /// Named in errors about images that the scene file itself holds.
+    scene_file: PathBuf,
+}
+
+/// The encoded bytes of both.
+struct Read<'a> {
+    of: &'a Encoded,
+    image: Arc<[u8]>,
+    mask: Option<Arc<[u8]>>,
+}
+
+impl Encoded {
+    fn read(&self, request: &Request) -> Result<Arc<[u8]>, SceneError> {
+        match &request.source {
+            Source::File(path) => Ok(read_file(path, &request.place, MAX_FILE_BYTES)?.into()),
+            Source::Bytes(embedded) => Ok(Arc::clone(&embedded.bytes)),
+        }
+    }
+
+    /// Width and height from the headers; the opacity map's is checked as well.
+    fn size(&self) -> Result<[u32; 2], SceneError> {
+        if let Some(mask) = &self.mask {
+            self.decoder(mask, &self.read(mask)?)?;
+        }
+        let (_, size) = self.decoder(&self.request, &self.read(&self.request)?)?;
+        Ok(size)
+    }
+
+    /// Size and RGBA8 texels.
+    fn decode(&self, request: &Request, bytes: &[u8]) -> Result<([u32; 2], Vec<u8>), SceneError> {
+        let (decoder, size) = self.decoder(request, bytes)?;
+        let most = bytes.len() as u64 * MAX_EXPANSION + SMALL_IMAGE_BYTES;
+        if decoder.total_bytes() > most {
+            let [width, height] = size;
+            return Err(self.invalid(
+                request,
+                &format!("at most {most} bytes of texels from {} bytes", bytes.len()),
+                format!("{width}x{height}, {} bytes", decoder.total_bytes()),
+            ));
+        }
+        let decoded = DynamicImage::from_decoder(decoder).map_err(|e| self.corrupt(request, &e))?;
+        Ok((size, decoded.into_rgba8().into_raw()))
+    }
+
+    /// A decoder that has read the header, and the size that this tells.
+    fn decoder<'a>(
+        &self,
+        request: &Request,
+        bytes: &'a [u8],
+    ) -> Result<(impl ImageDecoder + 'a, [u32; 2]), SceneError> {
+        let mut reader = ImageReader::new(Cursor::new(bytes))
+            .with_guessed_format()
+            .map_err(|e| self.corrupt(request, &e))?;
+        let mut limits = Limits::no_limits();
+        limits.max_image_width = Some(MAX_SIZE);
+        limits.max_image_height = Some(MAX_SIZE);
+        // Eight bytes a texel of the largest image: 16-bit RGBA before it becomes RGBA8.
+        limits.max_alloc = Some(u64::from(MAX_SIZE) * u64::from(MAX_SIZE) * 8);
+        reader.limits(limits);
+        let decoder = reader
+            .into_decoder()
+            .map_err(|e| self.corrupt(request, &e))?;
+        let (width, height) = decoder.dimensions();
+        if width == 0 || height == 0 || width > MAX_SIZE || height > MAX_SIZE {
+            return Err(self.invalid(
+                request,
+                &format!("a size from 1x1 to {MAX_SIZE}x{MAX_SIZE}"),
+                format!("{width}x{height}"),
+            ));
+        }
+        Ok((decoder, [width, height]))
+    }
+
+    fn corrupt(&self, request: &Request, error: &dyn std::fmt::Display) -> SceneError {
+        self.invalid(request, "a readable PNG or JPEG image", error.to_string())
+    }
+
+    fn invalid(&self, request: &Request, expected: &str, found: String) -> SceneError {
+        let file = match &request.source {
+            Source::File(path) => path,
+            Source::Bytes(_) => &self.scene_file,
+        };
+        let place = format!("{} (image '{}')", request.place, request.name);
+        Origin::new(file).invalid(place, expected, found)
+    }
+}
+
+impl ImageSource for Encoded {
+    fn open(&self) -> Result<Box<dyn OpenSource + '_>, SceneError> {
+        let mask = self.mask.as_ref().map(|mask| self.read(mask));
+        Ok(Box::new(Read {
+            of: self,
+            image: self.read(&self.request)?,
+            mask: mask.transpose()?,
+        }))
+    }
+}
+
+impl OpenSource for Read<'_> {
+    fn identify(&self, sink: &mut dyn FnMut(&[u8])) {
+        sink(DECODERS.as_bytes());
+        sink(match self.of.request.usage {
+            Usage::Color => b"color",
+            Usage::Data => b"data",
+            Usage::AlphaFactor => b"alpha",
+            Usage::Masked(_) => b"masked",
+        });
+        // The length tells where the image ends and its opacity map starts.
+        sink(&(self.image.len() as u64).to_le_bytes());
+        sink(&self.image);
+        if let Some(mask) = &self.mask {
+            sink(mask);
+        }
+    }
+
+    fn texels(&self, parts: &[usize]) -> Result<Vec<Vec<u8>>, SceneError> {
+        let (size, mut rgba) = self.of.decode(&self.of.request, &self.image)?;
+        if self.of.request.usage == Usage::AlphaFactor {
+            rgba = spread_alpha(rgba);
+        }
+        if let (Some(request), Some(bytes)) = (&self.of.mask, &self.mask) {
+            let (mask_size, mask) = self.of.decode(request, bytes)?;
+            rgba = with_mask(rgba, size, &mask, mask_size);
+        }
+        Ok(vec![rgba; parts.len()])
+    }
+}
+
+/// Whether the file begins as a PNG or a JPEG; `None` where it cannot be read.
+pub(crate) fn is_png_or_jpeg(file: &Path) -> Option<bool> {
+    let (start, _) = read_start(file, "image", 16).ok()?;
+    let format = image::guess_format(&start).ok();
+    Some(matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg)))
+}
+
+fn spread_alpha(mut rgba: Vec<u8>) -> Vec<u8> {
+    for texel in rgba.chunks_exact_mut(4) {
+        let alpha = texel[3];
+        texel.copy_from_slice(&[alpha, alpha, alpha, 255]);
+    }
+    rgba
+}
+
+/// Puts the mask's red channel (or its alpha, where it has one) into alpha, sampling the nearest
+/// texel where the sizes differ.
+fn with_mask(mut rgba: Vec<u8>, size: [u32; 2], mask: &[u8], mask_size: [u32; 2]) -> Vec<u8> {
+    let alpha_map = mask.chunks_exact(4).any(|t| t[3] != 255);
+    let channel = if alpha_map { 3 } else { 0 };
+    let [width, height] = size.map(|e| e as usize);
+    let [mask_width, mask_height] = mask_size.map(|e| e as usize);
+    for (i, texel) in rgba.chunks_exact_mut(4).enumerate() {
+        let x = (i % width) * mask_width / width;
+        let y = (i / width) * mask_height / height;
+        texel[3] = mask[(y * mask_width + x) * 4 + channel];
+    }
+    rgba
+}
+
+#[cfg(test)]
+mod tests {
+    use super::DECODERS;
+
+    #[test]
+    fn the_decoders_named_in_keys_are_those_of_the_lock_file() {
+        let lock = include_str!("../../../Cargo.lock");
+        for decoder in DECODERS.split(", ") {
+            let (name, version) = decoder.split_once(' ').unwrap_or_default();
+            let entry = format!("name = \"{name}\"\nversion = \"{version}\"\n");
+            assert!(lock.contains(&entry), "{decoder} is not in Cargo.lock");
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Finding the files that OBJ and MTL files name, whichever system wrote the names.
+
+use super::statements::latin1;
+use std::collections::HashMap;
+use std::ffi::OsString;
+use std::path::{Component, Path, PathBuf};
+
+/// A file that was found, and what had to be overlooked for that.
+#[derive(Debug, PartialEq)]
+pub(super) struct Found {
+    pub path: PathBuf,
+    /// True where letter case, encoding or the folder differ from what the file says.
+    pub inexact: bool,
+}
+
+/// Looks names up; folders are listed once.
+#[derive(Debug, Default)]
+pub(super) struct Lookup {
+    /// By folder: its names by how they read in lower case.
+    listings: HashMap<PathBuf, HashMap<String, OsString>>,
+}
+
+impl Lookup {
+    /// The first of `names` that is there: as it stands, else in another letter case, else its last
+    /// part beside the file that names it. Backslashes separate folders.
+    pub fn find(&mut self, folder: &Path, names: &[String]) -> Option<Found> {
+        let paths: Vec<PathBuf> = names
+            .iter()
+            .map(|name| name.replace('\\', "/").into())
+            .collect();
+        let exact = |paths: &[PathBuf]| {
+            let mut paths = paths.iter().map(|path| folder.join(path));
+            paths.find(|path| is_no_folder(path))
+        };
+        if let Some(path) = exact(&paths) {
+            let inexact = false;
+            return Some(Found { path, inexact });
+        }
+        let last_parts: Vec<PathBuf> = (paths.iter())
+            .filter_map(|path| path.file_name())
+            .map(PathBuf::from)
+            .collect();
+        let mut any_case = |paths: &[PathBuf]| {
+            let mut paths = paths.iter().filter_map(|path| self.walk(folder, path));
+            paths.find(|path| is_no_folder(path))
+        };
+        let path = any_case(&paths)
+            .or_else(|| exact(&last_parts))
+            .or_else(|| any_case(&last_parts))?;
+        let inexact = true;
+        Some(Found { path, inexact })
+    }
+
+    /// Goes down the path part by part, in any letter case.
+    fn walk(&mut self, folder: &Path, path: &Path) -> Option<PathBuf> {
+        path.components()
+            .try_fold(folder.to_owned(), |at, part| match part {
+                Component::Normal(name) => {
+                    let exact = at.join(name);
+                    if exact.exists() {
+                        return Some(exact);
+                    }
+                    let names = (self.listings.entry(at.clone())).or_insert_with_key(|at| list(at));
+                    let name = names.get(&name.to_string_lossy().to_lowercase())?;
+                    Some(at.join(name))
+                }
+                other => Some(at.join(other)),
+            })
+    }
+}
+
+fn is_no_folder(path: &Path) -> bool {
+    path.metadata().is_ok_and(|metadata| !metadata.is_dir())
+}
+
+/// The folder's names by how they read in lower case; of several the first in byte order.
+fn list(folder: &Path) -> HashMap<String, OsString> {
+    let folder = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<OsString> = entries.map(|entry| entry.file_name()).collect();
+    names.sort_by(|a, b| b.cmp(a));
+    (names.into_iter())
+        .map(|name| (text(&name).to_lowercase(), name))
+        .collect()
+}
+
+/// A file name as text: one that is no UTF-8 comes from a system that wrote Latin-1.
+fn text(name: &OsString) -> String {
+    match name.to_str() {
+        Some(name) => name.to_owned(),
+        None => latin1(name.as_encoded_bytes()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn find(folder: &Path, name: &str) -> Option<(PathBuf, bool)> {
+        let found = Lookup::default().find(folder, &[name.to_owned()])?;
+        let path = found.path.strip_prefix(folder).unwrap().to_owned();
+        Some((path, found.inexact))
+    }
+
+    #[test]
+    fn names_are_found_in_any_case_with_either_slash_and_beside_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        std::fs::create_dir(folder.join("Maps")).unwrap();
+        for file in ["Maps/Brick Wall.PNG", "wood.png", "Wood.png", "größe.png"] {
+            std::fs::write(folder.join(file), "").unwrap();
+        }
+        for (name, path, inexact) in [
+            ("Maps/Brick Wall.PNG", "Maps/Brick Wall.PNG", false),
+            ("Maps\\Brick Wall.PNG", "Maps/Brick Wall.PNG", false),
+            ("maps\\brick wall.png", "Maps/Brick Wall.PNG", true),
+            ("wood.png", "wood.png", false),
+            ("WOOD.png", "Wood.png", true),
+            ("C:\\Users\\me\\wood.png", "wood.png", true),
+            ("/nowhere/GRÖSSE.png", "", false),
+            ("/nowhere/GRÖßE.png", "größe.png", true),
+            ("maps", "", false),
+        ] {
+            let expected = Some((path.into(), inexact)).filter(|_| !path.is_empty());
+            assert_eq!(find(folder, name), expected, "{name}");
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_name_on_disk_in_latin_1_is_found() {
+        use std::os::unix::ffi::OsStringExt;
+        let folder = tempfile::tempdir().unwrap();
+        let name = OsString::from_vec(b"caf\xe9.png".to_vec());
+        std::fs::write(folder.path().join(&name), "").unwrap();
+        assert_eq!(find(folder.path(), "café.png"), Some((name.into(), true)));
+    }
+}

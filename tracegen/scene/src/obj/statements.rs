@@ -1,0 +1,108 @@
+//! OBJ and MTL text: encoding, continued lines, comments and numbers.
+
+use crate::error::SceneError;
+use crate::files::Origin;
+use std::borrow::Cow;
+
+/// The file as text: UTF-8 with or without a byte order mark, and otherwise Latin-1, in which
+/// every byte is a character.
+///
+/// # Errors
+/// UTF-16, told by its byte order mark.
+pub(super) fn decode(bytes: Vec<u8>, origin: &Origin) -> Result<String, SceneError> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(origin.invalid("byte 0", "text in UTF-8 or Latin-1", "UTF-16"));
+    }
+    let mut text = String::from_utf8(bytes).unwrap_or_else(|e| latin1(e.as_bytes()));
+    if text.starts_with('\u{feff}') {
+        text.drain(..'\u{feff}'.len_utf8());
+    }
+    Ok(text)
+}
+
+/// Every byte as the character of the same number.
+pub(super) fn latin1(bytes: &[u8]) -> String {
+    bytes.iter().map(|&b| char::from(b)).collect()
+}
+
+/// One statement: a line, joined with those that continue it.
+#[derive(Debug, PartialEq)]
+pub(super) struct Statement<'a> {
+    /// Number of its first line, from 1.
+    pub line: usize,
+    /// Its first word.
+    pub keyword: &'a str,
+    /// What follows the keyword, trimmed. Names may hold spaces and `#`, so comments are still in.
+    pub rest: &'a str,
+}
+
+impl Statement<'_> {
+    /// The words before any comment.
+    pub fn words(&self) -> impl Iterator<Item = &str> {
+        without_comment(self.rest).split_ascii_whitespace()
+    }
+
+    /// The numbers before any comment; the word that is none is the error.
+    pub fn numbers(&self) -> Result<Vec<f32>, &str> {
+        self.words().map(|w| number(w).ok_or(w)).collect()
+    }
+}
+
+/// The text up to a word that starts with `#`.
+pub(super) fn without_comment(text: &str) -> &str {
+    let starts = |&(at, _): &(usize, &str)| at == 0 || text[..at].ends_with([' ', '\t']);
+    let comment = text.match_indices('#').find(starts);
+    text[..comment.map_or(text.len(), |(at, _)| at)].trim_end()
+}
+
+/// What a line holds before the backslash with which it goes on. A backslash that ends a comment is
+/// part of a drawing or of a path.
+fn continued(line: &str) -> Option<&str> {
+    let open = line.trim_end().strip_suffix('\\')?;
+    (without_comment(open).len() == open.trim_end().len()).then_some(open)
+}
+
+/// A number, with the not-a-numbers that C libraries print.
+pub(super) fn number(word: &str) -> Option<f32> {
+    word.parse().ok().or_else(|| {
+        let lower = word.to_ascii_lowercase();
+        let not_a_number = ["#ind", "#qnan", "#snan", "nan("];
+        (not_a_number.iter().any(|n| lower.contains(n))).then_some(f32::NAN)
+    })
+}
+
+/// Calls `each` with every statement of the text; blank lines and comment lines are none.
+///
+/// # Errors
+/// The first that `each` returns.
+pub(super) fn for_each<E>(
+    text: &str,
+    mut each: impl FnMut(Statement<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut lines = (1..).zip(text.lines());
+    while let Some((line, first)) = lines.next() {
+        let mut whole = Cow::Borrowed(first);
+        let mut last = first;
+        while let Some(open) = continued(last) {
+            let cut = last.len() - open.len();
+            last = lines.next().map_or("", |(_, next)| next);
+            let whole = whole.to_mut();
+            whole.truncate(whole.len() - cut);
+            whole.push(' ');
+            whole.push_str(last);
+        }
+        let whole = whole.trim();
+        let (keyword, rest) = whole
+            .split_once(|c: char| c.is_ascii_whitespace())
+            .unwrap_or((whole, ""));
+        if !keyword.is_empty() && !keyword.starts_with('#') {
+            let rest = rest.trim();
+            each(Statement {
+                line,
+                keyword,
+                rest,
+            })?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,41 @@
+//! The sRGB transfer function (IEC 61966-2-1).
+
+use std::sync::LazyLock;
+
+/// Linear value of each encoded byte.
+pub static LINEAR: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|byte| decode(byte as f64 / 255.0) as f32));
+
+/// Linear value of an encoded one, both 0 to 1.
+#[must_use]
+pub fn decode(encoded: f64) -> f64 {
+    if encoded <= 0.04045 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// Encoded value of a linear one, both 0 to 1.
+#[must_use]
+pub fn encode(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 {
+        linear * 12.92
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_survives_the_way_to_linear_light_and_back() {
+        for byte in 0..=255u8 {
+            let linear = LINEAR[usize::from(byte)];
+            assert_eq!((encode(linear.into()) * 255.0).round() as u8, byte);
+        }
+        assert_eq!([LINEAR[0], LINEAR[255]], [0.0, 1.0]);
+    }
+}

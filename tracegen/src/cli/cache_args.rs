@@ -1,0 +1,79 @@
+//! The cache of prepared textures: where it is, how large it may be, whether it is used.
+
+use anyhow::Context;
+use clap::Args;
+use std::env;
+use std::path::PathBuf;
+use textures::Cache;
+
+/// Bound of the cache where `PARALLAX_CACHE_SIZE` does not say otherwise.
+const DEFAULT_BYTES: u64 = 2 << 30;
+
+/// `--no-cache`.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct CacheArgs {
+    /// Prepare all textures anew. Prepared ones are kept in ~/.cache/parallax or where
+    /// XDG_CACHE_HOME or PARALLAX_CACHE_DIR say, at most 2GiB or PARALLAX_CACHE_SIZE.
+    #[arg(long)]
+    no_cache: bool,
+}
+
+impl CacheArgs {
+    /// The cache, if one is to be used and there is a place for it.
+    ///
+    /// # Errors
+    /// A size that cannot be read.
+    pub fn open(self) -> anyhow::Result<Option<Cache>> {
+        let limit = match env::var("PARALLAX_CACHE_SIZE") {
+            Ok(text) if text == "0" => 0,
+            Ok(text) => super::raster::parse_bytes(&text)
+                .map_err(anyhow::Error::msg)
+                .context("PARALLAX_CACHE_SIZE")?,
+            Err(_) => DEFAULT_BYTES,
+        };
+        if self.no_cache || limit == 0 {
+            return Ok(None);
+        }
+        Ok(folder(|name| env::var_os(name).map(PathBuf::from))
+            .map(|folder| Cache::new(folder.join("textures"), limit)))
+    }
+}
+
+/// The folder of everything that is kept between runs.
+fn folder(variable: impl Fn(&str) -> Option<PathBuf>) -> Option<PathBuf> {
+    let set = |name| variable(name).filter(|path| !path.as_os_str().is_empty());
+    if let Some(folder) = set("PARALLAX_CACHE_DIR") {
+        return Some(folder);
+    }
+    // The XDG specification has relative paths ignored.
+    let caches = set("XDG_CACHE_HOME").filter(|path| path.is_absolute());
+    let caches = caches.or_else(|| Some(set("HOME")?.join(".cache")))?;
+    Some(caches.join("parallax"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_is_the_first_that_the_environment_names() {
+        let with = |set: &[(&str, &str)]| {
+            folder(|name| {
+                let found = set.iter().find(|(known, _)| *known == name)?;
+                Some(PathBuf::from(found.1))
+            })
+        };
+        let (home, xdg) = (("HOME", "/h"), ("XDG_CACHE_HOME", "/x"));
+        let own = ("PARALLAX_CACHE_DIR", "own");
+        assert_eq!(with(&[home, xdg, own]), Some("own".into()));
+        assert_eq!(with(&[home, xdg]), Some("/x/parallax".into()));
+        assert_eq!(with(&[home]), Some("/h/.cache/parallax".into()));
+        let relative = ("XDG_CACHE_HOME", "x");
+        assert_eq!(with(&[home, relative]), Some("/h/.cache/parallax".into()));
+        assert_eq!(
+            with(&[home, ("PARALLAX_CACHE_DIR", "")]),
+            Some("/h/.cache/parallax".into())
+        );
+        assert_eq!(with(&[]), None);
+    }
+}

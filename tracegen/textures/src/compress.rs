@@ -1,0 +1,124 @@
+//! One image to a block-compressed mip chain.
+
+use crate::mipmap::{self, Level};
+use crate::role::{Alpha, Role};
+use formats::texture::{ColorSpace, TexelFormat, Texture};
+use std::borrow::Cow;
+use texpresso::{Algorithm, COLOUR_WEIGHTS_PERCEPTUAL, COLOUR_WEIGHTS_UNIFORM, Format, Params};
+
+/// What turns texels into blocks: the encoder's version, and the version of this crate's own part,
+/// which grows whenever that makes other bytes of the same texels. Prepared textures are kept
+/// under this name; tests hold both.
+pub const ENCODER: &str = "texpresso 2.0.2, mip chain 1";
+
+/// Edge of a compressed block in texels.
+const BLOCK: u32 = 4;
+
+/// Size of level 0: whole blocks.
+pub fn whole_blocks(size: [u32; 2]) -> [u32; 2] {
+    size.map(|e| e.next_multiple_of(BLOCK))
+}
+
+/// Levels of a whole mip chain.
+pub fn level_count([width, height]: [u32; 2]) -> u32 {
+    width.max(height).ilog2() + 1
+}
+
+/// Bytes of all levels of a compressed texture; `None` for a format that is not made here.
+pub fn chain_bytes(texture: &Texture) -> Option<usize> {
+    let format = match texture.format {
+        TexelFormat::Bc1 => Format::Bc1,
+        TexelFormat::Bc3 => Format::Bc3,
+        _ => return None,
+    };
+    let bytes = |level| {
+        let [width, height] = texture.level_size(level).map(|e| e as usize);
+        format.compressed_size(width, height)
+    };
+    Some((0..texture.levels).map(bytes).sum())
+}
+
+/// Compresses RGBA8 texels of the given size; the blocks of all levels follow each other, largest
+/// level first.
+pub fn compress(
+    rgba: &[u8],
+    size: [u32; 2],
+    color_space: ColorSpace,
+    role: Role,
+) -> (TexelFormat, Vec<u8>) {
+    let kind = mipmap::Kind {
+        srgb: color_space == ColorSpace::Srgb,
+        normal_map: role.normal_map,
+    };
+    let alpha = match role.alpha {
+        Alpha::Mask(_) | Alpha::Smooth if rgba.chunks_exact(4).all(|t| t[3] == 255) => {
+            Alpha::Ignored
+        }
+        alpha => alpha,
+    };
+    let weigh_by_alpha = alpha != Alpha::Ignored;
+    let base_size = whole_blocks(size);
+    let base = if base_size == size {
+        Cow::Borrowed(rgba)
+    } else {
+        let level = Level::decode(rgba, size, kind, weigh_by_alpha);
+        Cow::Owned(level.resize(base_size).encode(kind))
+    };
+    let (format, texel_format) = match alpha {
+        Alpha::Smooth => (Format::Bc3, TexelFormat::Bc3),
+        Alpha::Ignored | Alpha::Mask(_) => (Format::Bc1, TexelFormat::Bc1),
+    };
+    let coverage = match alpha {
+        Alpha::Mask(cutoff) => mipmap::coverage(&base, cutoff),
+        _ => 1.0,
+    };
+    let mut blocks = Vec::new();
+    let mut texels = base.to_vec();
+    let mut level: Option<Level> = None;
+    for index in 0..level_count(base_size) {
+        if index > 0 {
+            // Level 1 comes straight from the bytes: level 0 in floats would be the largest
+            // allocation of the whole capture.
+            let next = match level {
+                None => Level::half_of(&base, base_size, kind, weigh_by_alpha),
+                Some(level) => level.half(kind),
+            };
+            texels = next.encode(kind);
+            level = Some(next);
+        }
+        match alpha {
+            Alpha::Ignored => mipmap::make_opaque(&mut texels),
+            Alpha::Mask(cutoff) if index == 0 => mipmap::binarise(&mut texels, cutoff),
+            Alpha::Mask(_) => {
+                let cutoff = mipmap::cutoff_for_coverage(&texels, coverage);
+                mipmap::binarise(&mut texels, cutoff);
+            }
+            Alpha::Smooth => {}
+        }
+        let level_size = base_size.map(|e| (e >> index).max(1));
+        append_blocks(&mut blocks, &texels, level_size, format, kind.srgb);
+    }
+    (texel_format, blocks)
+}
+
+fn append_blocks(
+    blocks: &mut Vec<u8>,
+    rgba: &[u8],
+    size: [u32; 2],
+    format: Format,
+    perceptual: bool,
+) {
+    let [width, height] = size.map(|e| e as usize);
+    let params = Params {
+        algorithm: Algorithm::RangeFit,
+        weights: if perceptual {
+            COLOUR_WEIGHTS_PERCEPTUAL
+        } else {
+            COLOUR_WEIGHTS_UNIFORM
+        },
+        weigh_colour_by_alpha: false,
+    };
+    let start = blocks.len();
+    blocks.resize(start + format.compressed_size(width, height), 0);
+    format.compress(rgba, width, height, params, &mut blocks[start..]);
+}
