@@ -291,9 +291,10 @@ impl Summary {
             per(tile_bytes, records)
         ));
         note(&format!(
-            "{} draws in {} draw calls, {} shadow maps in {:.3} s, {} pipelines, {} samplers",
+            "{} draws in {} draw calls, {} regions, {} shadow maps in {:.3} s, {} pipelines, {} samplers",
             work.draws,
             work.calls,
+            work.regions,
             work.shadow_maps,
             self.shadows.as_secs_f64(),
             work.pipelines,
