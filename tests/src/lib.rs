@@ -1,5 +1,8 @@
 //! Helpers of the end-to-end tests: the built programs, the golden traces, the real scenes.
 
+pub mod repair;
+pub mod traces;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

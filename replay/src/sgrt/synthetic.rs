@@ -10,7 +10,7 @@ use formats::raytrace::{
     encode_ray_tile,
 };
 use formats::textrace::TraceMeta;
-use formats::view::{Eye, FovTangents, Hmd};
+use formats::view::{Eye, FovTangents, FrameViews, Hmd};
 use glam::Vec3;
 use std::error::Error;
 
@@ -160,7 +160,7 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
                     ipd_m: view.ipd_m,
                     cant_deg: 0.0,
                 },
-                frames: Vec::new(),
+                frames: vec![FrameViews::default()],
             },
             origin: [0.0; 3],
             eyes,

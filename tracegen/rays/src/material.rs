@@ -3,7 +3,7 @@
 use super::soup::{Attributes, Soup};
 use super::texture::{Pyramid, fast_log2};
 use formats::raytrace::RayMaterial;
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
 
@@ -41,6 +41,9 @@ pub struct Surface {
     /// Emitted radiance.
     pub emissive: Vec3,
 }
+
+/// A primitive and the weights of its second and third vertex.
+type Hit = (u32, [f32; 2]);
 
 /// Materials and their textures.
 pub struct Materials {
@@ -84,7 +87,7 @@ impl Materials {
     pub fn surface(&self, material: usize, at: &Attributes, footprint_m: f32) -> Surface {
         let m = &self.materials[material];
         let sample = |t: &Option<TextureRef>| self.sample(t.as_ref(), at, footprint_m);
-        let base = m.base_color * sample(&m.base_color_texture).unwrap_or(Vec4::ONE);
+        let base = m.base_color * at.color * sample(&m.base_color_texture).unwrap_or(Vec4::ONE);
         let rough_metal = sample(&m.metallic_roughness_texture).unwrap_or(Vec4::ONE);
         let roughness = (m.roughness * rough_metal.y).clamp(0.0, 1.0);
         let metallic = (m.metallic * rough_metal.z).clamp(0.0, 1.0);
@@ -117,23 +120,32 @@ impl Materials {
     }
 
     /// Alpha of a masked or blended material at full resolution.
-    fn alpha(&self, material: &Material, uv: impl Fn(u32) -> Vec2) -> f32 {
+    fn alpha(&self, material: &Material, scene: &Scene, soup: &Soup, hit: Hit) -> f32 {
+        let (primitive, bary) = hit;
         let texel = material.base_color_texture.as_ref().and_then(|t| {
             let pyramid = self.pyramids.get(t.image)?.as_ref()?;
-            Some(pyramid.sample(t, uv(t.uv_set), 0.0, self.srgb).w)
+            let uv = soup.uv(scene, primitive, bary, t.uv_set);
+            Some(pyramid.sample(t, uv, 0.0, self.srgb).w)
         });
-        material.base_color.w * texel.unwrap_or(1.0)
+        // As in the raster capture, where a mask without a texture is decided once for a draw.
+        let constant = texel.is_none() && material.alpha != AlphaMode::Blend;
+        let vertex = if constant {
+            1.0
+        } else {
+            soup.vertex_alpha(scene, primitive, bary)
+        };
+        material.base_color.w * vertex * texel.unwrap_or(1.0)
     }
 
     /// True where the surface stops a ray that looks for its closest hit.
     #[must_use]
     pub fn stops(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
         let material = &self.materials[soup.material(scene, primitive)];
-        let uv = |set| soup.uv(scene, primitive, bary, set);
+        let alpha = || self.alpha(material, scene, soup, (primitive, bary));
         match material.alpha {
             AlphaMode::Opaque => true,
-            AlphaMode::Mask(cutoff) => self.alpha(material, uv) >= cutoff,
-            AlphaMode::Blend => self.alpha(material, uv) >= 1.0 / 255.0,
+            AlphaMode::Mask(cutoff) => alpha() >= cutoff,
+            AlphaMode::Blend => alpha() >= 1.0 / 255.0,
         }
     }
 
@@ -141,12 +153,12 @@ impl Materials {
     #[must_use]
     pub fn shades(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
         let material = &self.materials[soup.material(scene, primitive)];
-        let uv = |set| soup.uv(scene, primitive, bary, set);
+        let alpha = || self.alpha(material, scene, soup, (primitive, bary));
         match material.alpha {
             _ if material.transmission > 0.5 => false,
             AlphaMode::Opaque => true,
-            AlphaMode::Mask(cutoff) => self.alpha(material, uv) >= cutoff,
-            AlphaMode::Blend => self.alpha(material, uv) >= 0.5,
+            AlphaMode::Mask(cutoff) => alpha() >= cutoff,
+            AlphaMode::Blend => alpha() >= 0.5,
         }
     }
 
