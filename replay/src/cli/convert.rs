@@ -15,7 +15,8 @@ use formats::interop::{
 use formats::layout::Layout;
 use formats::raytrace::{RayTile, Raytrace, RaytraceWriter, encode_ray_tile};
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
-use std::io::{self, BufWriter, IsTerminal, Write};
+use shell::Output;
+use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -32,6 +33,12 @@ pub enum Target {
     Textrace,
     /// A ray trace, its tiles encoded anew
     Raytrace,
+}
+
+impl Target {
+    fn is_text(self) -> bool {
+        matches!(self, Self::Din | Self::Csv | Self::Jsonl)
+    }
 }
 
 /// Tile encodings by name.
@@ -91,17 +98,24 @@ pub struct ConvertArgs {
 /// The trace cannot be read, the configuration is impossible, or the output cannot be written.
 pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     let config = args.machine.resolve()?;
+    let output = if args.to.is_text() {
+        Output::text("--output", &args.output)
+    } else {
+        Output::binary("--output", &args.output)
+    };
+    let inputs = [Some(args.trace.as_path()), args.machine.file()];
+    shell::check_outputs(&[output], inputs.into_iter().flatten())?;
     let trace = Trace::open(&args.trace)?;
     if matches!(args.to, Target::Textrace | Target::Raytrace) {
         reencode(&trace, args)?;
-    } else if args.output.as_os_str() == "-" {
+    } else if is_stdout(&args.output) {
         let mut out = BufWriter::new(io::stdout().lock());
         write_accesses(&trace, &config, args, &mut out)?;
         out.flush()?;
     } else {
-        let name = || args.output.display().to_string();
+        let name = || format!("cannot write {}", args.output.display());
         let mut out = AtomicFile::create(&args.output).with_context(name)?;
-        write_accesses(&trace, &config, args, &mut out)?;
+        write_accesses(&trace, &config, args, &mut out).with_context(name)?;
         out.persist().with_context(name)?;
     }
     Ok(ExitCode::SUCCESS)
@@ -215,9 +229,6 @@ fn write_access(to: Target, access: &RayAccess, out: &mut impl Write) -> io::Res
 
 /// Writes the trace itself.
 fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
-    if is_stdout(&args.output) && io::stdout().is_terminal() {
-        bail!("a trace is binary: name a file with --output, or redirect standard output");
-    }
     match (trace, args.to) {
         (Trace::Texture(trace), Target::Textrace) => {
             let encoding = match args.encoding {

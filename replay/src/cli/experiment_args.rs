@@ -113,6 +113,12 @@ impl ExperimentArgs {
         Ok(())
     }
 
+    /// True where the page is to show pictures.
+    #[must_use]
+    pub fn has_pictures(&self) -> bool {
+        !self.images.is_empty()
+    }
+
     /// The pictures that were asked for, each with its trace's label.
     ///
     /// # Errors
