@@ -5,8 +5,9 @@
 use criterion::{Criterion, Throughput};
 use formats::textrace::{
     Draw, Encoding, Pass, PassKind, PrimitiveRun, QuadRecord, Tables, Textrace, TextraceWriter,
-    Tile, UvGroup, encode_tile_as, quad_morton,
+    Tile, TraceMeta, UvGroup, encode_tile_as, quad_morton,
 };
+use formats::view::{FovTangents, FrameViews};
 use std::hint::black_box;
 use std::path::Path;
 
@@ -115,7 +116,17 @@ fn record(plane: &Plane, x: u8, y: u8, mask: u8) -> QuadRecord {
 
 /// A trace of made-up tiles, half of them of small triangles.
 fn made_up_trace() -> Textrace {
+    let mut meta = TraceMeta::default();
+    meta.frames.push(FrameViews::default());
+    meta.hmd.eye_size_px = [512; 2];
+    meta.hmd.fov = [FovTangents {
+        left: 1.0,
+        right: 1.0,
+        up: 1.0,
+        down: 1.0,
+    }; 2];
     let tables = Tables {
+        meta,
         draws: vec![Draw {
             material: String::new(),
             first_primitive: 0,

@@ -99,3 +99,43 @@ impl FormatError {
         }
     }
 }
+
+/// A rule of the format that data breaks, whether they are read or about to be written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Broken {
+    /// What breaks it: `run 3`, `record 12`, `the display`.
+    pub what: String,
+    /// The rule.
+    pub expected: String,
+    /// What is there instead.
+    pub found: String,
+}
+
+impl Broken {
+    /// Something that breaks a rule.
+    pub fn new(what: impl Into<String>, expected: impl Into<String>, found: impl ToString) -> Self {
+        Self {
+            what: what.into(),
+            expected: expected.into(),
+            found: found.to_string(),
+        }
+    }
+
+    /// The error of whoever wanted to write it.
+    #[must_use]
+    pub fn unwritable(self) -> FormatError {
+        FormatError::Unwritable {
+            what: self.what,
+            expected: self.expected,
+            found: self.found,
+        }
+    }
+}
+
+/// Fails unless `holds`.
+pub(crate) fn ensure(
+    holds: bool,
+    broken: impl FnOnce() -> Broken,
+) -> std::result::Result<(), Broken> {
+    if holds { Ok(()) } else { Err(broken()) }
+}

@@ -8,15 +8,20 @@ pub mod container;
 pub mod error;
 pub mod footprint;
 pub mod interop;
+mod json;
 pub mod layout;
-pub mod parse;
+mod parse;
 pub mod raytrace;
 pub mod text;
 pub mod textrace;
 pub mod texture;
+mod tiles;
+mod trace;
+mod varint;
 pub mod view;
 
 #[cfg(test)]
 mod spec;
 
-pub use error::{FormatError, Result};
+pub use error::{Broken, FormatError, Result};
+pub use trace::Trace;

@@ -51,6 +51,42 @@ impl<'a> ContextError<&'a [u8]> for Fault<'a> {
     }
 }
 
+/// Bytes that parsers take from the front, one after the other.
+#[derive(Clone, Copy, Debug)]
+pub struct Cursor<'a>(&'a [u8]);
+
+impl<'a> Cursor<'a> {
+    /// Starts at the front of `bytes`.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self(bytes)
+    }
+
+    /// The bytes that are left.
+    pub fn rest(&self) -> &'a [u8] {
+        self.0
+    }
+
+    /// Runs a parser and moves behind what it took.
+    ///
+    /// # Errors
+    /// Those of the parser.
+    #[inline]
+    pub fn parse<T>(
+        &mut self,
+        mut parser: impl Parser<&'a [u8], Output = T, Error = Fault<'a>>,
+    ) -> Result<T, nom::Err<Fault<'a>>> {
+        let (rest, value) = parser.parse(self.0)?;
+        self.0 = rest;
+        Ok(value)
+    }
+
+    /// A failure at the next byte.
+    #[cold]
+    pub fn fault(&self, expected: impl Into<String>, found: impl Display) -> nom::Err<Fault<'a>> {
+        nom::Err::Failure(Fault::new(self.0, expected, found))
+    }
+}
+
 /// Fails at `at` unless `holds`.
 pub fn ensure<'a>(
     at: &'a [u8],
@@ -86,15 +122,28 @@ pub fn count<'a>(
     }
 }
 
+/// Reserved bytes, which must be zero so that a later version can give them a meaning.
+pub fn zero(input: &[u8], bytes: usize) -> Parsed<'_, ()> {
+    let (rest, reserved) =
+        nom::error::context("reserved bytes", nom::bytes::complete::take(bytes)).parse(input)?;
+    ensure(
+        input,
+        reserved.iter().all(|byte| *byte == 0),
+        || "zero in reserved bytes".to_owned(),
+        format_args!("{reserved:02x?}"),
+    )?;
+    Ok((rest, ()))
+}
+
 /// Runs `parser` over the whole of `bytes`, which start at `offset` of the file.
 pub fn parse_all<'a, T>(
     file: &str,
     place: Place,
     offset: u64,
     bytes: &'a [u8],
-    mut parser: impl Parser<&'a [u8], Output = T, Error = Fault<'a>>,
+    parser: impl FnOnce(&'a [u8]) -> Parsed<'a, T>,
 ) -> Result<T, FormatError> {
-    let outcome = match parser.parse(bytes) {
+    let outcome = match parser(bytes) {
         Ok(([], value)) => return Ok(value),
         Ok((rest, _)) => Fault::new(rest, "the end", format_args!("{} more bytes", rest.len())),
         Err(nom::Err::Error(fault) | nom::Err::Failure(fault)) => fault,

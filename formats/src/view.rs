@@ -1,9 +1,21 @@
 //! Head-mounted displays, eyes and tiles: how a stereo pair looks at a scene.
 
+use crate::error::{Broken, ensure};
 use serde::{Deserialize, Serialize};
 
 /// Edge length of a tile in pixels, as in Z2 paper section 4.1.
 pub const TILE_SIZE_PX: u32 = 16;
+
+/// Largest width and height of an eye's image.
+pub const MAX_EYE_SIZE_PX: u32 = 16384;
+/// Largest tangent of a half-angle, to either side.
+pub const MAX_TANGENT: f32 = 100.0;
+/// Least sum of the tangents of two opposite half-angles.
+pub const MIN_TANGENT_SUM: f32 = 1e-4;
+/// Largest distance between the eyes in metres.
+pub const MAX_IPD_M: f32 = 1.0;
+/// Largest yaw of an eye in degrees, to either side.
+pub const MAX_CANT_DEG: f32 = 45.0;
 
 /// Which eye a view belongs to. Monoscopic passes (a shadow map) have no eye.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -28,6 +40,52 @@ pub struct FovTangents {
     pub down: f32,
 }
 
+impl FovTangents {
+    /// Checks that the frustum has an inside and that no arithmetic with it overflows.
+    ///
+    /// # Errors
+    /// The tangent or sum that is out of range.
+    pub fn check(&self) -> Result<(), Broken> {
+        let all = [self.left, self.right, self.up, self.down];
+        ensure(
+            all.iter().all(|tangent| tangent.abs() <= MAX_TANGENT),
+            || {
+                Broken::new(
+                    "field-of-view tangents",
+                    format!("left, right, up and down each from -{MAX_TANGENT} to {MAX_TANGENT}"),
+                    format_args!("{all:?}"),
+                )
+            },
+        )?;
+        ensure(
+            self.left + self.right > MIN_TANGENT_SUM && self.up + self.down > MIN_TANGENT_SUM,
+            || {
+                Broken::new(
+                    "field-of-view tangents",
+                    format!("left + right and up + down above {MIN_TANGENT_SUM}"),
+                    format_args!("{all:?}"),
+                )
+            },
+        )
+    }
+}
+
+/// Checks the size of an eye's image.
+pub(crate) fn check_eye_size(size_px: [u32; 2]) -> Result<(), Broken> {
+    ensure(
+        size_px
+            .iter()
+            .all(|size| (1..=MAX_EYE_SIZE_PX).contains(size)),
+        || {
+            Broken::new(
+                "size of an eye's image",
+                format!("1 to {MAX_EYE_SIZE_PX} pixels each way"),
+                format_args!("{size_px:?}"),
+            )
+        },
+    )
+}
+
 /// A head-mounted display: pixels, frusta and eye poses relative to the head.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hmd {
@@ -45,6 +103,33 @@ pub struct Hmd {
     pub cant_deg: f32,
 }
 
+impl Hmd {
+    /// Checks that every figure is in its range.
+    ///
+    /// # Errors
+    /// The first figure that is not, and its range.
+    pub fn check(&self) -> Result<(), Broken> {
+        check_eye_size(self.eye_size_px)?;
+        for fov in &self.fov {
+            fov.check()?;
+        }
+        ensure((0.0..=MAX_IPD_M).contains(&self.ipd_m), || {
+            Broken::new(
+                "distance between the eyes",
+                format!("0 to {MAX_IPD_M} m"),
+                format_args!("{} m", self.ipd_m),
+            )
+        })?;
+        ensure(self.cant_deg.abs() <= MAX_CANT_DEG, || {
+            Broken::new(
+                "cant",
+                format!("-{MAX_CANT_DEG} to {MAX_CANT_DEG} degrees"),
+                format_args!("{} degrees", self.cant_deg),
+            )
+        })
+    }
+}
+
 /// One eye's matrices for one frame, column-major as glam stores them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EyeView {
@@ -56,8 +141,25 @@ pub struct EyeView {
     pub position: [f32; 3],
 }
 
+impl Default for EyeView {
+    /// At the origin, with clip space for a view: what a made-up trace names.
+    fn default() -> Self {
+        let identity = [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        Self {
+            world_to_eye: identity,
+            eye_to_clip: identity,
+            position: [0.0; 3],
+        }
+    }
+}
+
 /// The cameras of one frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameViews {
     /// Frame number, from 0.
     pub frame: u32,

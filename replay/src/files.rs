@@ -20,14 +20,14 @@ fn make_folder(path: &Path) -> std::io::Result<()> {
 }
 
 /// Makes the folders of outputs and checks that each can be written and replaces neither an input
-/// nor another output.
+/// nor another output; tells whether standard output is left for the command's own result.
 ///
 /// # Errors
 /// The first output for which that does not hold.
 pub fn check_outputs<'a>(
     outputs: &[Output],
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<bool> {
     for output in outputs {
         let path = output.path();
         make_folder(path).map_err(|e| anyhow::anyhow!("{}: cannot write: {e}", path.display()))?;

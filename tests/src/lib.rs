@@ -1,5 +1,8 @@
 //! Helpers of the end-to-end tests: the built programs, the golden traces, the real scenes.
 
+pub mod repair;
+pub mod traces;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -46,6 +49,25 @@ pub fn run_ok(command: &mut Command) -> Output {
         output.status.code(),
         String::from_utf8_lossy(&output.stderr)
     );
+    output
+}
+
+/// Runs a command that has to refuse its input: exit code 2, no panic, and a message with every
+/// one of the `expected` parts.
+///
+/// # Panics
+/// When it does anything else.
+pub fn refuse(command: &mut Command, expected: &[&str]) -> Output {
+    let output = command.output().expect("the program starts");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{command:?}:\n{message}");
+    assert!(!message.contains("panicked"), "{message}");
+    for part in expected {
+        assert!(
+            message.contains(part),
+            "{command:?}: no {part:?} in:\n{message}"
+        );
+    }
     output
 }
 

@@ -1,23 +1,8 @@
 //! Bad input: exit code 2, one clear message, no panic, nothing left under the final name.
 
-use parallax_tests::{program, root};
+use parallax_tests::{program, refuse, root};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn refuse(command: &mut Command, expected: &[&str]) -> Output {
-    let output = command.output().expect("the program starts");
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{command:?}:\n{message}");
-    assert!(!message.contains("panicked"), "{message}");
-    for part in expected {
-        assert!(
-            message.contains(part),
-            "{command:?}: no {part:?} in:\n{message}"
-        );
-    }
-    output
-}
 
 fn damaged(folder: &Path, change: impl FnOnce(&mut Vec<u8>)) -> std::path::PathBuf {
     let mut bytes = fs::read(root().join("traces/atrium-shadows.textrace")).expect("golden trace");

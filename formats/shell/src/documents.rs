@@ -1,6 +1,7 @@
 //! Shell completions and manual pages, made from the command line's own definition.
 
 use super::program;
+use anyhow::Context;
 use clap::{Command, CommandFactory, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -43,15 +44,16 @@ impl Documents {
                 out.flush()?;
             }
             Self::Man { folder } => {
-                std::fs::create_dir_all(&folder)?;
-                write_pages(&command, &folder)?;
+                std::fs::create_dir_all(&folder)
+                    .and_then(|()| write_pages(&command, &folder))
+                    .with_context(|| format!("cannot write into {}", folder.display()))?;
             }
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-fn write_pages(command: &Command, folder: &Path) -> anyhow::Result<()> {
+fn write_pages(command: &Command, folder: &Path) -> std::io::Result<()> {
     let page = clap_mangen::Man::new(command.clone());
     let mut roff = Vec::new();
     page.render(&mut roff)?;

@@ -11,28 +11,39 @@ use std::path::{Path, PathBuf};
 pub struct Output {
     flag: &'static str,
     path: PathBuf,
-    is_binary: bool,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Text,
+    Binary,
+    /// The command's own result, on stdout.
+    Result,
 }
 
 impl Output {
     /// Text that the flag asks for.
     #[must_use]
     pub fn text(flag: &'static str, path: &Path) -> Self {
-        let path = path.to_owned();
-        Self {
-            flag,
-            path,
-            is_binary: false,
-        }
+        Self::new(flag, path, Kind::Text)
     }
 
     /// A trace or a picture that the flag asks for.
     #[must_use]
     pub fn binary(flag: &'static str, path: &Path) -> Self {
-        Self {
-            is_binary: true,
-            ..Self::text(flag, path)
-        }
+        Self::new(flag, path, Kind::Binary)
+    }
+
+    /// The form of the command's result that the flag asks for, such as `--json`.
+    #[must_use]
+    pub fn result(flag: &'static str) -> Self {
+        Self::new(flag, Path::new("-"), Kind::Result)
+    }
+
+    fn new(flag: &'static str, path: &Path, kind: Kind) -> Self {
+        let path = path.to_owned();
+        Self { flag, path, kind }
     }
 
     /// Where it goes.
@@ -42,22 +53,26 @@ impl Output {
     }
 
     fn named(&self) -> String {
-        format!("{} {}", self.flag, self.path.display())
+        match self.kind {
+            Kind::Result => self.flag.to_owned(),
+            _ => format!("{} {}", self.flag, self.path.display()),
+        }
     }
 }
 
 /// Checks that every output can be written and that none would replace an input or another output.
+/// Returns whether stdout is left for the command's own result.
 ///
 /// # Errors
 /// The first output for which that does not hold.
 pub fn check_outputs<'a>(
     outputs: &[Output],
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<bool> {
     let inputs: Vec<&Path> = inputs.into_iter().collect();
     for (number, output) in outputs.iter().enumerate() {
         if is_stdout(&output.path) {
-            let on_terminal = output.is_binary && io::stdout().is_terminal();
+            let on_terminal = output.kind == Kind::Binary && io::stdout().is_terminal();
             ensure!(
                 !on_terminal,
                 "{}: binary: name a file, or redirect standard output",
@@ -85,7 +100,8 @@ pub fn check_outputs<'a>(
             );
         }
     }
-    Ok(())
+    let taken = |o: &Output| o.kind != Kind::Result && is_stdout(&o.path);
+    Ok(!outputs.iter().any(taken))
 }
 
 /// True if two paths are one file: by spelling, through links of either kind, or as names that do
@@ -174,5 +190,17 @@ mod tests {
             "--csv - and --html -: the same output twice"
         );
         assert!(!plain.exists());
+        let pair = [Output::result("--json"), Output::text("--csv", stdout)];
+        assert_eq!(
+            refused(&pair, &[]),
+            "--json and --csv -: the same output twice"
+        );
+    }
+
+    #[test]
+    fn an_output_on_stdout_takes_the_results_place() {
+        let is_left = |output| check_outputs(&[output], []).unwrap();
+        assert!(is_left(Output::result("--json")));
+        assert!(!is_left(Output::text("--csv", Path::new("-"))));
     }
 }

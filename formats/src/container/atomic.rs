@@ -1,11 +1,11 @@
 //! Output files that appear under their name whole or not at all.
 
 use std::collections::BTreeSet;
-use std::fs::{self, Metadata};
+use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
 /// Temporary files that a signal handler has to remove. Files are made, renamed and removed with
 /// the lock held, so that none is missed.
@@ -38,8 +38,9 @@ pub fn is_stdout(path: &Path) -> bool {
 /// The target `-` is standard output: what was written is copied there when it is complete.
 #[derive(Debug)]
 pub struct AtomicFile {
+    writer: BufWriter<File>,
     // Removed before it is taken off the list.
-    writer: BufWriter<NamedTempFile>,
+    path: TempPath,
     _listed: Listed,
     target: PathBuf,
 }
@@ -64,12 +65,13 @@ impl AtomicFile {
             check_name(target)?;
         }
         let mut files = unfinished();
-        let file = temporary(target)?;
-        let path = file.path().to_owned();
-        files.insert(path.clone());
+        let (file, path) = temporary(target)?.into_parts();
+        let listed = path.to_path_buf();
+        files.insert(listed.clone());
         Ok(Self {
             writer: BufWriter::with_capacity(1 << 20, file),
-            _listed: Listed(path),
+            path,
+            _listed: Listed(listed),
             target: target.to_owned(),
         })
     }
@@ -97,10 +99,10 @@ impl AtomicFile {
             return stdout.flush();
         }
         if let Some(replaced) = check_name(&self.target)? {
-            file.as_file().set_permissions(replaced.permissions())?;
+            file.set_permissions(replaced.permissions())?;
         }
         let _held = unfinished();
-        file.persist(&self.target)?;
+        self.path.persist(&self.target)?;
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{ChunkEntry, ChunkTag, Kind, MAGIC, VERSION_MAJOR, VERSION_MINOR};
-use crate::parse::{Fault, Parsed, ensure};
+use crate::parse::{Fault, Parsed, ensure, zero};
 use nom::Parser;
 use nom::bytes::complete::take;
 use nom::error::context;
@@ -91,8 +91,11 @@ impl Header {
             let expected = "kind 1 (textrace) or 2 (raytrace)";
             nom::Err::Failure(Fault::new(at_kind, expected, kind_id))
         })?;
-        let (rest, (_, directory_offset, file_bytes, directory_count, directory_crc32, _, _)) =
-            (le_u16, le_u64, le_u64, le_u32, le_u32, le_u32, le_u32).parse(rest)?;
+        let (rest, ()) = zero(rest, 2)?;
+        let (rest, (directory_offset, file_bytes, directory_count, directory_crc32)) =
+            (le_u64, le_u64, le_u32, le_u32).parse(rest)?;
+        let (rest, ()) = zero(rest, 4)?;
+        let (rest, _) = le_u32.parse(rest)?;
         Ok((
             rest,
             Self {

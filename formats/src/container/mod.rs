@@ -12,7 +12,7 @@ mod writer;
 pub use atomic::{AtomicFile, check_target, discard_unfinished, is_stdout};
 pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 pub use reader::Container;
-pub use writer::{ContainerWriter, crc32_of_file};
+pub use writer::ContainerWriter;
 
 use std::fmt;
 

@@ -4,9 +4,10 @@
 use super::header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES, Header};
 use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind};
 use crate::error::{FormatError, Place, Result};
-use crate::parse::{Fault, parse_all};
+use crate::parse::{Parsed, parse_all};
 use memmap2::Mmap;
 use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// A file's bytes, mapped or owned.
@@ -25,22 +26,49 @@ impl Bytes {
     }
 }
 
+/// Largest trace that is read from a pipe, which cannot be mapped.
+const MAX_STREAM_BYTES: u64 = 1 << 30;
+
+/// Reads a trace from a pipe: first the header, which says how much follows.
+fn read_stream(name: &str, mut stream: impl Read) -> Result<Vec<u8>> {
+    let io = |source| FormatError::io(name, "read", source);
+    let mut bytes = Vec::new();
+    let mut header = stream.by_ref().take(HEADER_BYTES as u64);
+    header.read_to_end(&mut bytes).map_err(io)?;
+    let header = parse_all(name, Place::Header, 0, &bytes, Header::parse)?;
+    if header.file_bytes > MAX_STREAM_BYTES {
+        return Err(FormatError::Malformed {
+            file: name.to_owned(),
+            place: Place::Header,
+            offset: 24,
+            expected: format!("at most {MAX_STREAM_BYTES} bytes from a pipe: save it as a file"),
+            found: header.file_bytes.to_string(),
+        });
+    }
+    // One byte more than there should be, so that a longer stream is noticed.
+    let rest = header.file_bytes.saturating_sub(HEADER_BYTES as u64) + 1;
+    stream.take(rest).read_to_end(&mut bytes).map_err(io)?;
+    Ok(bytes)
+}
+
 /// An opened trace file whose header, directory and padding have been checked.
 ///
-/// Chunks are checked when they are asked for, so that opening a large trace is quick.
+/// A chunk's checksum is computed at once and compared when the chunk is asked for.
 #[derive(Debug)]
 pub struct Container {
     file: String,
     bytes: Bytes,
     header: Header,
     directory: Vec<ChunkEntry>,
+    /// CRC-32 of each chunk's bytes, which the directory's should equal.
+    crc32s: Vec<u32>,
 }
 
 impl Container {
-    /// Maps `path` and checks header and directory.
+    /// Maps a file, or reads a pipe into memory, and checks header, directory and padding.
     ///
     /// # Errors
-    /// When the file cannot be mapped or is not a well-formed container.
+    /// When the file cannot be read or is not a well-formed container.
     pub fn open(path: &Path) -> Result<Self> {
         let name = path.display().to_string();
         let io = |action| {
@@ -51,6 +79,10 @@ impl Container {
         let metadata = file.metadata().map_err(io("read the size of"))?;
         if metadata.is_dir() {
             return Err(io("read")(std::io::ErrorKind::IsADirectory.into()));
+        }
+        if !metadata.is_file() {
+            let bytes = read_stream(&name, file)?;
+            return Self::from_named_bytes(name, Bytes::Owned(bytes));
         }
         if metadata.len() == 0 {
             // An empty file cannot be mapped; let the header parser name what is missing.
@@ -125,11 +157,14 @@ impl Container {
         })?;
         check_placement(all, at, &directory)
             .map_err(|(offset, fault)| malformed(Place::Directory, offset, fault.0, fault.1))?;
+        let crc32_of = |entry| crc32fast::hash(slice(all, entry).unwrap_or_default());
+        let crc32s = directory.iter().map(crc32_of).collect();
         Ok(Self {
             file,
             bytes,
             header,
             directory,
+            crc32s,
         })
     }
 
@@ -202,19 +237,42 @@ impl Container {
     /// # Errors
     /// When there is no such chunk or it is damaged.
     pub fn chunk(&self, tag: ChunkTag) -> Result<&[u8]> {
-        let entry = self.entry(tag)?;
-        let bytes = self.chunk_unchecked(tag)?;
-        let crc32 = crc32fast::hash(bytes);
-        if crc32 == entry.crc32 {
-            return Ok(bytes);
+        let mut of_tag = self.directory.iter().zip(&self.crc32s);
+        if let Some((entry, crc32)) = of_tag.find(|(entry, _)| entry.tag == tag)
+            && entry.crc32 != *crc32
+        {
+            let expected = format!("CRC-32 {:08x}", entry.crc32);
+            return Err(self.malformed(tag, 0, expected, format!("{crc32:08x}")));
         }
-        Err(FormatError::Malformed {
-            file: self.file.clone(),
-            place: Place::Chunk(tag),
-            offset: entry.offset_bytes,
-            expected: format!("CRC-32 {:08x}", entry.crc32),
-            found: format!("{crc32:08x}"),
-        })
+        self.chunk_unchecked(tag)
+    }
+
+    /// Fails at the first chunk whose CRC is wrong, known or not.
+    ///
+    /// # Errors
+    /// When a chunk is damaged.
+    pub fn check_chunks(&self) -> Result<()> {
+        let mut tags = self.directory.iter().map(|entry| entry.tag);
+        tags.try_for_each(|tag| self.chunk(tag).map(|_| ()))
+    }
+
+    /// Fails unless the chunks of `tags` are there in this order; others may lie between them.
+    ///
+    /// # Errors
+    /// When one is missing or out of order.
+    pub fn expect_order(&self, tags: &[ChunkTag]) -> Result<()> {
+        let mut previous = None;
+        for tag in tags {
+            let entry = self.entry(*tag)?;
+            if let Some((before, offset)) = previous
+                && offset > entry.offset_bytes
+            {
+                let expected = format!("chunk {tag} behind chunk {before}");
+                return Err(self.malformed(*tag, 0, expected, "it before"));
+            }
+            previous = Some((tag, entry.offset_bytes));
+        }
+        Ok(())
     }
 
     /// Bytes of a chunk whose parts have checksums of their own; its CRC is not checked.
@@ -253,7 +311,7 @@ impl Container {
     pub fn parse_chunk<'a, T>(
         &'a self,
         tag: ChunkTag,
-        parser: impl nom::Parser<&'a [u8], Output = T, Error = Fault<'a>>,
+        parser: impl FnOnce(&'a [u8]) -> Parsed<'a, T>,
     ) -> Result<T> {
         let bytes = self.chunk(tag)?;
         let offset = self.entry(tag)?.offset_bytes;
@@ -261,9 +319,22 @@ impl Container {
     }
 
     /// CRC-32 of the whole file, which names it in results.
+    ///
+    /// The chunks' own are combined with those of the bytes around them, which are few.
     #[must_use]
     pub fn file_checksum(&self) -> u32 {
-        crc32fast::hash(self.bytes.as_slice())
+        let all = self.bytes.as_slice();
+        let mut crc32 = crc32fast::Hasher::new();
+        let mut end = 0;
+        for (entry, of_chunk) in self.directory.iter().zip(&self.crc32s) {
+            let start = usize::try_from(entry.offset_bytes).unwrap_or(usize::MAX);
+            crc32.update(all.get(end..start).unwrap_or_default());
+            let length = entry.length_bytes;
+            crc32.combine(&crc32fast::Hasher::new_with_initial_len(*of_chunk, length));
+            end = start.saturating_add(usize::try_from(length).unwrap_or(usize::MAX));
+        }
+        crc32.update(all.get(end..).unwrap_or_default());
+        crc32.finalize()
     }
 }
 

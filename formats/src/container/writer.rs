@@ -4,8 +4,7 @@ use super::atomic::AtomicFile;
 use super::header::{HEADER_BYTES, Header};
 use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind};
 use crate::error::{FormatError, Result};
-use std::fs::File;
-use std::io::{Cursor, Read, Seek, SeekFrom, Write};
+use std::io::{Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// Writes a container chunk by chunk.
@@ -175,25 +174,5 @@ impl<W: Write + Seek> ContainerWriter<W> {
             .map_err(|source| FormatError::io(&self.file, "write", source))?;
         self.position += bytes.len() as u64;
         Ok(())
-    }
-}
-
-/// CRC-32 of a whole file, as results name traces by.
-///
-/// # Errors
-/// When the file cannot be read.
-pub fn crc32_of_file(path: &Path) -> Result<u32> {
-    let name = path.display().to_string();
-    let mut file = File::open(path).map_err(|source| FormatError::io(&name, "open", source))?;
-    let mut crc32 = crc32fast::Hasher::new();
-    let mut buffer = vec![0; 1 << 20];
-    loop {
-        let read = file
-            .read(&mut buffer)
-            .map_err(|source| FormatError::io(&name, "read", source))?;
-        if read == 0 {
-            return Ok(crc32.finalize());
-        }
-        crc32.update(&buffer[..read]);
     }
 }

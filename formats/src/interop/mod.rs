@@ -1,4 +1,4 @@
-//! Plain texel accesses for other simulators: Dinero's din, CSV, JSON Lines.
+//! Plain accesses for other simulators, texels' and rays': Dinero's din, CSV, JSON Lines.
 //!
 //! What comes out for a record is what replay counts for it, in the order of
 //! [`crate::footprint`]. The order of tiles and primitives is the caller's.
@@ -6,10 +6,12 @@
 mod csv;
 mod din;
 mod jsonl;
+mod rays;
 
 pub use csv::CsvWriter;
 pub use din::{DinAccess, DinWriter, read_din};
 pub use jsonl::{JsonlWriter, record_to_json};
+pub use rays::{Entry, RayAccess, RaySample, ray_samples};
 
 use crate::footprint::{SamplingOptions, record_footprints};
 use crate::layout::Layout;

@@ -4,79 +4,71 @@
 //! normal, object and material. FORMAT.md has the layout.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::bytes::{ByteReader, ByteWriter, Fail};
 use super::camera::sample_position_px;
 use super::{
     EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayRecord, RayTile, RaytraceTables,
     Visit, half, normal,
 };
+use crate::error::Broken;
+use crate::parse::{Cursor, Fault, Parsed};
+use crate::varint::{low_u32, put, put_difference, unzigzag, zigzag};
+use nom::bytes::complete::take;
+use nom::error::context;
+use nom::number::complete::u8 as byte;
 
 /// Ray byte: bits 0-1 kind, 2-3 outcome, then flags.
 const HAS_ALPHA_TESTS: u8 = 1 << 4;
 /// The parent is the pixel's primary ray, and no number follows.
 const PARENT_IS_PRIMARY: u8 = 1 << 5;
 
-/// A tile that breaks an invariant of the format.
-pub(super) struct Broken {
-    pub what: String,
-    pub expected: &'static str,
-    pub found: String,
+/// Bits of a visit: the zigzag of a difference of 32-bit numbers, and the kind.
+const VISIT_BITS: u32 = 34;
+
+/// Fewest bytes of a tile of so many samples: the hit bits, and for each sample three colours, its
+/// number of rays and a ray of three bytes.
+pub(super) fn least_bytes(samples: u64) -> u64 {
+    samples.div_ceil(8) + (3 + 1 + 3) * samples
 }
 
 /// Writes a tile.
 pub(super) fn encode(tile: &RayTile, has_visits: bool) -> Result<Vec<u8>, Broken> {
     check(tile, has_visits)?;
-    let mut out = ByteWriter::default();
+    let mut out = Vec::new();
     let hits = || tile.pixels.iter().filter_map(|p| p.hit.as_ref());
-    let mut bits = 0u8;
-    for (i, pixel) in tile.pixels.iter().enumerate() {
-        bits |= u8::from(pixel.hit.is_some()) << (i % 8);
-        if i % 8 == 7 || i + 1 == tile.pixels.len() {
-            out.byte(bits);
-            bits = 0;
-        }
+    out.extend(tile.pixels.chunks(8).map(|eight| {
+        let bits = (0u8..).zip(eight);
+        bits.fold(0, |bits, (i, p)| bits | u8::from(p.hit.is_some()) << i)
+    }));
+    let mut previous = 0;
+    for hit in hits() {
+        put_difference(&mut previous, hit.primitive, &mut out);
     }
     let mut previous = 0;
     for hit in hits() {
-        out.difference(&mut previous, hit.primitive);
-    }
-    let mut previous = 0;
-    for hit in hits() {
-        out.difference(&mut previous, hit.t.to_bits());
+        put_difference(&mut previous, hit.t.to_bits(), &mut out);
     }
     let mut previous = [0; 2];
     for hit in hits() {
         let code = normal::encode(hit.shading_normal);
         for (previous, value) in previous.iter_mut().zip(code) {
-            out.difference(previous, u32::from(value.cast_unsigned()));
+            put_difference(previous, value.cast_unsigned().into(), &mut out);
         }
     }
     let mut previous = [0; 2];
     for hit in hits() {
         for (previous, value) in previous.iter_mut().zip(hit.uv) {
-            out.difference(previous, value.to_bits());
+            put_difference(previous, value.to_bits(), &mut out);
         }
     }
-    for channel in 0..3 {
-        let mut previous = 0;
-        for pixel in tile.pixels.iter().filter(|p| p.hit.is_some()) {
-            let value = pixel.view_independent.get(channel).copied();
-            out.difference(&mut previous, u32::from(half::encode(value.unwrap_or(0.0))));
-        }
-    }
-    for channel in 0..3 {
-        let mut previous = 0;
-        for pixel in &tile.pixels {
-            let value = pixel.view_dependent.get(channel).copied();
-            out.difference(&mut previous, u32::from(half::encode(value.unwrap_or(0.0))));
-        }
-    }
+    let hit_pixels = tile.pixels.iter().filter(|p| p.hit.is_some());
+    put_colors(hit_pixels.map(|p| p.view_independent), &mut out);
+    put_colors(tile.pixels.iter().map(|p| p.view_dependent), &mut out);
     for pixel in &tile.pixels {
-        out.number(pixel.ray_count);
+        put(pixel.ray_count.into(), &mut out);
     }
     for pixel in &tile.pixels {
         for (own, ray) in (0u32..).zip(tile.rays_of(pixel)) {
-            encode_ray(&mut out, own, ray);
+            put_ray(own, ray, &mut out);
         }
     }
     let mut previous = [0; 2];
@@ -88,13 +80,23 @@ pub(super) fn encode(tile: &RayTile, has_visits: bool) -> Result<Vec<u8>, Broken
         if let Some(previous) = previous.get_mut(kind) {
             let difference = i64::from(index) - i64::from(*previous);
             *previous = index;
-            out.wide(zigzag(difference) << 1 | kind as u64);
+            put(zigzag(difference) << 1 | kind as u64, &mut out);
         }
     }
-    Ok(out.into_bytes())
+    Ok(out)
 }
 
-fn encode_ray(out: &mut ByteWriter, own: u32, ray: &RayRecord) {
+/// Writes red of all, then green, then blue.
+fn put_colors(colors: impl Iterator<Item = [f32; 3]> + Clone, out: &mut Vec<u8>) {
+    for channel in 0..3 {
+        let mut previous = 0;
+        for value in colors.clone().filter_map(|c| c.get(channel).copied()) {
+            put_difference(&mut previous, half::encode(value).into(), out);
+        }
+    }
+}
+
+fn put_ray(own: u32, ray: &RayRecord, out: &mut Vec<u8>) {
     let mut head = ray.kind as u8 | (ray.outcome as u8) << 2;
     if ray.alpha_tests > 0 {
         head |= HAS_ALPHA_TESTS;
@@ -102,26 +104,21 @@ fn encode_ray(out: &mut ByteWriter, own: u32, ray: &RayRecord) {
     if own > 0 && ray.parent == 0 {
         head |= PARENT_IS_PRIMARY;
     }
-    out.byte(head);
+    out.push(head);
     if own > 0 && ray.parent > 0 {
-        out.number(own - ray.parent);
+        put((own - ray.parent).into(), out);
     }
-    out.number(ray.steps);
-    out.number(ray.triangle_tests);
+    put(ray.steps.into(), out);
+    put(ray.triangle_tests.into(), out);
     if ray.alpha_tests > 0 {
-        out.number(ray.alpha_tests);
+        put(ray.alpha_tests.into(), out);
     }
 }
 
 /// Checks what a reader will rely on.
 fn check(tile: &RayTile, has_visits: bool) -> Result<(), Broken> {
-    let broken = |what: String, expected, found: String| {
-        Err(Broken {
-            what,
-            expected,
-            found,
-        })
-    };
+    let broken =
+        |what: String, expected: &str, found: String| Err(Broken::new(what, expected, found));
     let mut next = 0u64;
     for (i, pixel) in tile.pixels.iter().enumerate() {
         let what = || format!("pixel {i}");
@@ -166,41 +163,52 @@ fn check(tile: &RayTile, has_visits: bool) -> Result<(), Broken> {
 }
 
 /// Reads a tile whose `origin_px` and `size_px` are set.
-pub(super) fn decode(
+pub(super) fn decode<'a>(
     tables: &RaytraceTables,
     eye: &EyeCamera,
-    bytes: &[u8],
+    input: &'a [u8],
     tile: &mut RayTile,
-) -> Result<(), Fail> {
-    let mut input = ByteReader::new(bytes);
+) -> Parsed<'a, ()> {
+    let mut input = Cursor::new(input);
     let samples = tables.meta.samples_per_px;
     let [width, height] = tile.size_px;
     let count = width as usize * height as usize * samples as usize;
-    let bits = input.take(count.div_ceil(8), "a hit bit for each pixel")?;
+    let at_bits = input;
+    let bits = input.parse(context(
+        "a hit bit for each sample",
+        take(count.div_ceil(8)),
+    ))?;
     let is_hit = |i: usize| bits.get(i / 8).is_some_and(|b| b >> (i % 8) & 1 == 1);
     if (count..bits.len() * 8).any(is_hit) {
-        return Err(input.fail("zero bits behind the last pixel", "a one"));
+        return Err(at_bits.fault("zero bits behind the last sample's", "a one"));
     }
     let hits = (0..count).filter(|i| is_hit(*i)).count();
 
     let mut primitives = Vec::with_capacity(hits);
     let mut previous = 0;
     for _ in 0..hits {
-        primitives.push(input.difference(&mut previous, "a primitive number")?);
+        let at = input;
+        let primitive = input.difference(&mut previous, "a primitive number")?;
+        let known = tables.triangle(primitive);
+        primitives
+            .push(known.ok_or_else(|| at.fault("a primitive of the triangle table", primitive))?);
     }
     let mut distances = Vec::with_capacity(hits);
     let mut previous = 0;
     for _ in 0..hits {
-        distances.push(f32::from_bits(
-            input.difference(&mut previous, "a distance")?,
-        ));
+        let at = input;
+        let distance = f32::from_bits(input.difference(&mut previous, "a distance")?);
+        if !(0.0..=f32::MAX).contains(&distance) {
+            return Err(at.fault("a distance of 0 or more", distance));
+        }
+        distances.push(distance);
     }
     let mut normals = Vec::with_capacity(hits);
     let mut previous = [0; 2];
     for _ in 0..hits {
         let mut code = [0; 2];
         for (previous, code) in previous.iter_mut().zip(&mut code) {
-            *code = input.short(previous, "a normal")?.cast_signed();
+            *code = decode_short(&mut input, previous, "a normal")?.cast_signed();
         }
         normals.push(code);
     }
@@ -214,101 +222,96 @@ pub(super) fn decode(
         coordinates.push(uv);
     }
 
-    let found = primitives.iter().zip(&distances);
-    let mut found = found.zip(normals.iter().zip(&coordinates));
-    for i in 0..count {
+    let found = primitives.into_iter().zip(distances);
+    let mut found = found.zip(normals.into_iter().zip(coordinates));
+    for (i, number) in (0..count).zip(0u32..) {
         let mut pixel = PixelRecord::default();
-        if let Some(((primitive, t), (code, uv))) = is_hit(i).then(|| found.next()).flatten() {
-            let triangle = tables.triangle(*primitive).ok_or_else(|| {
-                input.fail("a primitive of the triangle table", primitive.to_string())
-            })?;
-            // Tiles are at most 16x16, so the numbers below are small.
-            let number = u32::try_from(i).unwrap_or(0);
+        if let Some(((triangle, t), (code, uv))) = is_hit(i).then(|| found.next()).flatten() {
             let at = number / samples;
             let x = tile.origin_px[0] + at % width;
             let y = tile.origin_px[1] + at / width;
             let point = sample_position_px(x, y, number % samples, samples);
-            let direction = eye.direction(point);
-            pixel.hit = Some(Hit::new(eye, direction, *t, triangle, *code, *uv));
+            pixel.hit = Some(Hit::new(eye, eye.direction(point), t, triangle, code, uv));
         }
         tile.pixels.push(pixel);
     }
-    for channel in 0..3 {
-        let mut previous = 0;
-        for pixel in tile.pixels.iter_mut().filter(|p| p.hit.is_some()) {
-            let value = half::decode(input.short(&mut previous, "a colour")?);
-            if let Some(c) = pixel.view_independent.get_mut(channel) {
-                *c = value;
-            }
-        }
+    let hit_pixels = tile.pixels.iter_mut().filter(|p| p.hit.is_some());
+    decode_colors(
+        &mut input,
+        hit_pixels.map(|p| &mut p.view_independent).collect(),
+    )?;
+    decode_colors(
+        &mut input,
+        tile.pixels
+            .iter_mut()
+            .map(|p| &mut p.view_dependent)
+            .collect(),
+    )?;
+    decode_rays(&mut input, tile)?;
+    if tables.meta.has_visits {
+        decode_visits(&mut input, tables, tile)?;
     }
-    for channel in 0..3 {
-        let mut previous = 0;
-        for pixel in &mut tile.pixels {
-            let value = half::decode(input.short(&mut previous, "a colour")?);
-            if let Some(c) = pixel.view_dependent.get_mut(channel) {
-                *c = value;
-            }
-        }
-    }
-    decode_rays(&mut input, tables.meta.has_visits, tile)?;
-    input.end()
+    Ok((input.rest(), ()))
 }
 
-fn decode_rays(input: &mut ByteReader, has_visits: bool, tile: &mut RayTile) -> Result<(), Fail> {
+/// Reads a value of 16 bits by its difference.
+fn decode_short<'a>(
+    input: &mut Cursor<'a>,
+    previous: &mut u32,
+    what: &'static str,
+) -> Result<u16, nom::Err<Fault<'a>>> {
+    let at = *input;
+    let value = input.difference(previous, what)?;
+    u16::try_from(value).map_err(|_| at.fault(format!("{what}, below 2^16"), value))
+}
+
+fn decode_colors<'a>(
+    input: &mut Cursor<'a>,
+    mut colors: Vec<&mut [f32; 3]>,
+) -> Result<(), nom::Err<Fault<'a>>> {
+    for channel in 0..3 {
+        let mut previous = 0;
+        for value in colors.iter_mut().filter_map(|c| c.get_mut(channel)) {
+            let at = *input;
+            *value = half::decode(decode_short(input, &mut previous, "a colour")?);
+            if !value.is_finite() {
+                return Err(at.fault("a finite colour", *value));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn decode_rays<'a>(input: &mut Cursor<'a>, tile: &mut RayTile) -> Result<(), nom::Err<Fault<'a>>> {
     let mut total = 0u32;
     for pixel in &mut tile.pixels {
-        let count = input.number("a ray count")?;
+        let at = *input;
+        let count = input.number_u32("a ray count")?;
         pixel.first_ray = total;
         pixel.ray_count = count;
         // A ray takes three bytes at least.
         total = total
             .checked_add(count)
-            .filter(|total| count > 0 && *total as usize <= input.left() / 3)
-            .ok_or_else(|| input.fail("1 ray or more, for which there are bytes", count))?;
+            .filter(|total| count > 0 && *total as usize <= input.rest().len() / 3)
+            .ok_or_else(|| at.fault("1 ray or more, for which there are bytes", count))?;
     }
     tile.rays.reserve(total as usize);
-    let mut visits = 0u64;
     for pixel in &tile.pixels {
         for own in 0..pixel.ray_count {
             let ray = decode_ray(input, own, tile.rays.get(pixel.first_ray as usize..))?;
-            visits += ray.visit_count();
             tile.rays.push(ray);
         }
-    }
-    if !has_visits {
-        return Ok(());
-    }
-    if visits > input.left() as u64 {
-        return Err(input.fail("a byte or more for each visit", visits));
-    }
-    let mut previous = [0u32; 2];
-    for _ in 0..visits {
-        let code = input.wide("a visit")?;
-        let slot = usize::from(code & 1 == 1);
-        let difference = unzigzag(code >> 1);
-        let Some(previous) = previous.get_mut(slot) else {
-            break;
-        };
-        let index = i64::from(*previous)
-            .checked_add(difference)
-            .and_then(|v| u32::try_from(v).ok())
-            .ok_or_else(|| input.fail("a visit of less than 2^32", difference))?;
-        *previous = index;
-        tile.visits.push(match slot {
-            0 => Visit::Node(index),
-            _ => Visit::Triangle(index),
-        });
     }
     Ok(())
 }
 
-fn decode_ray(
-    input: &mut ByteReader,
+fn decode_ray<'a>(
+    input: &mut Cursor<'a>,
     own: u32,
     earlier: Option<&[RayRecord]>,
-) -> Result<RayRecord, Fail> {
-    let head = input.byte("a ray")?;
+) -> Result<RayRecord, nom::Err<Fault<'a>>> {
+    let at = *input;
+    let head = input.parse(byte)?;
     let kind = match head & 3 {
         0 => RayKind::Primary,
         1 => RayKind::Shadow,
@@ -319,14 +322,14 @@ fn decode_ray(
         0 => Outcome::Miss,
         1 => Outcome::Hit,
         2 => Outcome::Occluded,
-        _ => return Err(input.fail("an outcome of 0 to 2", 3)),
+        _ => return Err(at.fault("an outcome of 0 to 2", 3)),
     };
-    let flags = HAS_ALPHA_TESTS | PARENT_IS_PRIMARY;
-    if head >> 4 & !(flags >> 4) != 0 || (own == 0) != (kind == RayKind::Primary) {
-        return Err(input.fail(
-            "a primary ray first, then the others",
-            format!("{head:#04x}"),
-        ));
+    if head >> 6 != 0 || (own == 0 && head & PARENT_IS_PRIMARY != 0) {
+        return Err(at.fault("no other flags", format_args!("{head:#04x}")));
+    }
+    if (own == 0) != (kind == RayKind::Primary) {
+        let found = format_args!("{kind:?} as ray {own}").to_string();
+        return Err(at.fault("a primary ray first, then the others", found));
     }
     let (parent, depth) = if own == 0 {
         (NO_PARENT, 0)
@@ -334,34 +337,73 @@ fn decode_ray(
         let parent = if head & PARENT_IS_PRIMARY != 0 {
             Some(0)
         } else {
-            own.checked_sub(input.number("a parent")?)
+            // The primary ray has its flag.
+            own.checked_sub(input.number_u32("a parent")?)
+                .filter(|p| *p > 0)
         };
         let above = parent
             .filter(|p| *p < own)
             .and_then(|p| earlier?.get(p as usize))
             .and_then(|p| p.depth.checked_add(1));
         let number = parent.zip(above);
-        number.ok_or_else(|| input.fail("an earlier ray as parent", format!("{parent:?}")))?
+        number.ok_or_else(|| {
+            at.fault(
+                "an earlier ray as parent, below 255 others",
+                format_args!("{parent:?}"),
+            )
+        })?
     };
+    let steps = input.number_u32("a step count")?;
+    let triangle_tests = input.number_u32("a triangle-test count")?;
+    let alpha_tests = match head & HAS_ALPHA_TESTS {
+        0 => 0,
+        _ => input.number_u32("an alpha-test count")?,
+    };
+    if head & HAS_ALPHA_TESTS != 0 && alpha_tests == 0 {
+        return Err(at.fault("alpha tests where the flag says so", 0));
+    }
     Ok(RayRecord {
         kind,
         outcome,
         depth,
         parent,
-        steps: input.number("a step count")?,
-        triangle_tests: input.number("a triangle-test count")?,
-        alpha_tests: match head & HAS_ALPHA_TESTS {
-            0 => 0,
-            _ => input.number("an alpha-test count")?,
-        },
+        steps,
+        triangle_tests,
+        alpha_tests,
     })
 }
 
-/// Small differences of either sign as small numbers.
-fn zigzag(value: i64) -> u64 {
-    (value << 1 ^ value >> 63).cast_unsigned()
-}
-
-fn unzigzag(code: u64) -> i64 {
-    (code >> 1).cast_signed() ^ -(code & 1).cast_signed()
+fn decode_visits<'a>(
+    input: &mut Cursor<'a>,
+    tables: &RaytraceTables,
+    tile: &mut RayTile,
+) -> Result<(), nom::Err<Fault<'a>>> {
+    let visits: u64 = tile.rays.iter().map(RayRecord::visit_count).sum();
+    if visits > input.rest().len() as u64 {
+        return Err(input.fault("a byte or more for each visit", visits));
+    }
+    let mut previous = [0u32; 2];
+    let ends = [tables.bvh.nodes, tables.bvh.triangles];
+    for _ in 0..visits {
+        let at = *input;
+        let code = input.number("a visit", VISIT_BITS)?;
+        let slot = usize::from(code & 1 == 1);
+        let difference = unzigzag(code >> 1);
+        let (Some(previous), Some(end)) = (previous.get_mut(slot), ends.get(slot)) else {
+            break;
+        };
+        let index = i64::from(*previous)
+            .saturating_add(difference)
+            .cast_unsigned();
+        if index >= *end {
+            let expected = format!("a node or triangle slot below {end}");
+            return Err(at.fault(expected, index.cast_signed()));
+        }
+        *previous = low_u32(index);
+        tile.visits.push(match slot {
+            0 => Visit::Node(*previous),
+            _ => Visit::Triangle(*previous),
+        });
+    }
+    Ok(())
 }

@@ -3,13 +3,14 @@
 
 use super::{RayTile, RaytraceTables, codec, tables};
 use crate::container::{AtomicFile, ChunkTag, Container, ContainerWriter, Kind};
-use crate::error::{FormatError, Result};
-use crate::parse::Parsed;
+use crate::error::{Broken, FormatError, Result, ensure};
+use crate::parse::{Parsed, zero};
+use crate::tiles::{TileChunk, TileSpan};
 use crate::view::Eye;
 use nom::Parser;
 use nom::error::context;
 use nom::multi::count;
-use nom::number::complete::{le_u32, le_u64};
+use nom::number::complete::le_u32;
 use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 
@@ -41,10 +42,9 @@ impl EncodedRayTile {
 /// # Errors
 /// When the tile breaks an invariant of the format.
 pub fn encode_ray_tile(tile: &RayTile, has_visits: bool) -> Result<EncodedRayTile> {
-    let bytes = codec::encode(tile, has_visits).map_err(|broken| FormatError::Unwritable {
-        what: format!("tile at {:?}, {}", tile.origin_px, broken.what),
-        expected: broken.expected.to_owned(),
-        found: broken.found,
+    let bytes = codec::encode(tile, has_visits).map_err(|broken| {
+        let what = format!("tile at {:?}, {}", tile.origin_px, broken.what);
+        Broken { what, ..broken }.unwritable()
     })?;
     let too_many = |_| FormatError::Unwritable {
         what: format!("tile at {:?}", tile.origin_px),
@@ -120,8 +120,13 @@ impl<W: Write + Seek> RaytraceWriter<W> {
     pub fn tile(&mut self, tile: &EncodedRayTile) -> Result<()> {
         self.container.append(&tile.bytes)?;
         let bytes = u32::try_from(tile.bytes.len()).unwrap_or(u32::MAX);
-        self.index.extend(self.offset.to_le_bytes());
-        for number in [bytes, tile.crc32, tile.rays, 0] {
+        let span = TileSpan {
+            offset: self.offset,
+            bytes,
+            crc32: tile.crc32,
+        };
+        span.write(&mut self.index);
+        for number in [tile.rays, 0] {
             self.index.extend(number.to_le_bytes());
         }
         self.offset += u64::from(bytes);
@@ -148,27 +153,15 @@ impl<W: Write + Seek> RaytraceWriter<W> {
 /// One entry of the index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct IndexEntry {
-    offset: u64,
-    bytes: u32,
-    crc32: u32,
+    span: TileSpan,
     rays: u32,
 }
 
 fn index_entry(input: &[u8]) -> Parsed<'_, IndexEntry> {
-    let (rest, (offset, bytes, crc32, rays, zero)) = context(
-        "an index entry of 24 bytes",
-        (le_u64, le_u32, le_u32, le_u32, le_u32),
-    )
-    .parse(input)?;
-    let entry = IndexEntry {
-        offset,
-        bytes,
-        crc32,
-        rays,
-    };
-    let expected = || "a zero at the end of the entry".to_owned();
-    crate::parse::ensure(input, zero == 0, expected, zero)?;
-    Ok((rest, entry))
+    let (rest, (span, rays)) =
+        context("an index entry of 24 bytes", (TileSpan::parse, le_u32)).parse(input)?;
+    let (rest, ()) = zero(rest, 4)?;
+    Ok((rest, IndexEntry { span, rays }))
 }
 
 /// An opened ray trace.
@@ -185,7 +178,7 @@ impl Raytrace {
     /// # Errors
     /// When the file cannot be read or is malformed; the error names the place.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::new(Container::open(path)?)
+        Self::from_container(Container::open(path)?)
     }
 
     /// Reads a trace from memory.
@@ -193,10 +186,14 @@ impl Raytrace {
     /// # Errors
     /// When the bytes are malformed.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
-        Self::new(Container::from_bytes(bytes)?)
+        Self::from_container(Container::from_bytes(bytes)?)
     }
 
-    fn new(container: Container) -> Result<Self> {
+    /// Reads tables and index of an open container, and checks everything but what the tiles hold.
+    ///
+    /// # Errors
+    /// When it is malformed, or of another kind.
+    pub fn from_container(container: Container) -> Result<Self> {
         container.expect_kind(Kind::Raytrace)?;
         let tables = tables::read(&container)?;
         let tiles = 2 * tables.tile_count() as usize;
@@ -205,9 +202,15 @@ impl Raytrace {
             let expected = format!("24 bytes for each of {tiles} tiles");
             return Err(container.malformed(RAY_INDEX, 0, expected, format!("{bytes} bytes")));
         }
-        let index =
+        let index: Vec<IndexEntry> =
             container.parse_chunk(RAY_INDEX, |input| count(index_entry, tiles).parse(input))?;
-        check_placement(&container, &index)?;
+        tile_chunk(&container).check(index.iter().map(|entry| Some(entry.span)))?;
+        for (slot, (entry, tile)) in index.iter().zip(tile_numbers(&tables)).enumerate() {
+            check_entry(&tables, entry, tile).map_err(|broken| {
+                let at = (slot * RAY_INDEX_ENTRY_BYTES) as u64;
+                container.malformed(RAY_INDEX, at, broken.expected, broken.found)
+            })?;
+        }
         Ok(Self {
             container,
             tables,
@@ -256,28 +259,18 @@ impl Raytrace {
     }
 
     fn decode_entry(&self, eye: Eye, entry: &IndexEntry, out: &mut RayTile) -> Result<()> {
-        let chunk = self.container.chunk_unchecked(RAY_TILES)?;
-        // The index was checked against the chunk when the file was opened.
-        let bytes = usize::try_from(entry.offset)
-            .ok()
-            .and_then(|at| chunk.get(at..at.checked_add(entry.bytes as usize)?))
-            .unwrap_or_default();
-        let malformed = |offset: u64, expected: String, found: String| {
-            let at = entry.offset + offset;
-            self.container.malformed(RAY_TILES, at, expected, found)
-        };
-        let crc32 = crc32fast::hash(bytes);
-        if crc32 != entry.crc32 {
-            let expected = format!("a tile with CRC-32 {:08x}", entry.crc32);
-            return Err(malformed(0, expected, format!("{crc32:08x}")));
+        let (tables, camera) = (&self.tables, self.tables.camera(eye));
+        tile_chunk(&self.container).parse(&entry.span, |input| {
+            codec::decode(tables, camera, input, out)
+        })?;
+        if out.rays.len() as u64 == u64::from(entry.rays) {
+            return Ok(());
         }
-        codec::decode(&self.tables, self.tables.camera(eye), bytes, out)
-            .map_err(|fail| malformed(fail.offset as u64, fail.expected, fail.found))?;
-        if out.rays.len() as u64 != u64::from(entry.rays) {
-            let expected = format!("{} rays, as the index says", entry.rays);
-            return Err(malformed(0, expected, out.rays.len().to_string()));
-        }
-        Ok(())
+        let expected = format!("{} rays, as the index says", entry.rays);
+        let found = out.rays.len();
+        Err(self
+            .container
+            .malformed(RAY_TILES, entry.span.offset, expected, found))
     }
 
     fn entry(&self, eye: Eye, tile: u32) -> Result<&IndexEntry> {
@@ -298,21 +291,38 @@ impl Raytrace {
     }
 }
 
-/// Tiles must fill their chunk in index order, so none overlap and no byte is unaccounted for.
-fn check_placement(container: &Container, index: &[IndexEntry]) -> Result<()> {
-    let chunk_bytes = container.entry(RAY_TILES)?.length_bytes;
-    let mut end = 0u64;
-    for (slot, entry) in index.iter().enumerate() {
-        let at = (slot * RAY_INDEX_ENTRY_BYTES) as u64;
-        if entry.offset != end {
-            let found = entry.offset;
-            return Err(container.malformed(RAY_INDEX, at, format!("offset {end}"), found));
-        }
-        end = end.saturating_add(u64::from(entry.bytes));
+fn tile_chunk(container: &Container) -> TileChunk<'_> {
+    TileChunk {
+        container,
+        tiles: RAY_TILES,
+        index: RAY_INDEX,
+        entry_bytes: RAY_INDEX_ENTRY_BYTES,
     }
-    if end == chunk_bytes {
-        return Ok(());
-    }
-    let expected = format!("tiles that fill {chunk_bytes} bytes");
-    Err(container.malformed(RAY_INDEX, 0, expected, format!("{end} bytes of tiles")))
+}
+
+/// Tile numbers in the order of the index.
+fn tile_numbers(tables: &RaytraceTables) -> impl Iterator<Item = u32> + use<> {
+    let tiles = tables.tile_count();
+    (0..tiles).chain(0..tiles)
+}
+
+/// Checks that a tile's bytes and rays are enough for its samples, before anything is allocated
+/// for these.
+fn check_entry(
+    tables: &RaytraceTables,
+    entry: &IndexEntry,
+    tile: u32,
+) -> std::result::Result<(), Broken> {
+    let (_, [width, height]) = tables.tile_rect(tile);
+    let samples = u64::from(width * height) * u64::from(tables.meta.samples_per_px);
+    let least = codec::least_bytes(samples);
+    let IndexEntry { span, rays } = entry;
+    ensure(
+        u64::from(*rays) >= samples && u64::from(span.bytes) >= least,
+        || {
+            let expected = format!("{samples} samples: as many rays, in {least} bytes or more");
+            let found = format!("{rays} rays in {} bytes", span.bytes);
+            Broken::new(format!("tile {tile}"), expected, found)
+        },
+    )
 }

@@ -1,37 +1,17 @@
 //! Half floats (IEEE 754 binary16), in which colours are stored.
 
+use half::f16;
+
 /// The half float nearest to a value, ties to even; values beyond its range become its largest.
 #[must_use]
 pub fn encode(value: f32) -> u16 {
-    const LARGEST: f32 = 65504.0;
-    let bits = value.clamp(-LARGEST, LARGEST).to_bits();
-    let sign = ((bits >> 16) & 0x8000) as u16;
-    let magnitude = bits & 0x7FFF_FFFF;
-    if magnitude > 0x7F80_0000 {
-        return sign | 0x7E00;
-    }
-    // Below 2^-14 a half is a multiple of 2^-24: adding 0.5 makes f32 round to just that.
-    if magnitude < 0x3880_0000 {
-        let aligned = f32::from_bits(magnitude) + 0.5;
-        return sign | (aligned.to_bits() - 0.5f32.to_bits()) as u16;
-    }
-    let odd = (magnitude >> 13) & 1;
-    let rounded = magnitude + 0x0FFF + odd;
-    sign | ((rounded - 0x3800_0000) >> 13) as u16
+    f16::from_f32(value.clamp(f16::MIN.into(), f16::MAX.into())).to_bits()
 }
 
 /// The value of a half float.
 #[must_use]
 pub fn decode(half: u16) -> f32 {
-    let sign = u32::from(half & 0x8000) << 16;
-    let exponent = u32::from(half >> 10) & 0x1F;
-    let mantissa = u32::from(half & 0x3FF);
-    let magnitude = match exponent {
-        0 => (mantissa as f32 / (1u32 << 24) as f32).to_bits(),
-        31 => 0x7F80_0000 | mantissa << 13,
-        _ => (exponent + 112) << 23 | mantissa << 13,
-    };
-    f32::from_bits(sign | magnitude)
+    f16::from_bits(half).into()
 }
 
 /// A colour as it will be read back.

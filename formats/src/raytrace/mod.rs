@@ -5,7 +5,6 @@
 //! cost in the bounding volume hierarchy. Lengths are metres; positions are `f32` relative to
 //! [`RaytraceMeta::origin`], so that a scene far from the world's origin loses no precision.
 
-mod bytes;
 pub mod camera;
 mod codec;
 mod file;
@@ -60,7 +59,8 @@ pub struct RayMaterial {
     pub glass: bool,
     /// Has a specular highlight.
     pub glossy: bool,
-    /// Has texels with alpha below a cutoff, through which rays go on.
+    /// May have texels through which rays go on: below the cutoff of an alpha mask, or below
+    /// 1/255 of a blended surface.
     pub alpha_masked: bool,
 }
 
@@ -93,7 +93,7 @@ pub enum RayLight {
 }
 
 /// A triangle that a primary ray of either eye hit: enough to intersect it again.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RayTriangle {
     /// Primitive number: triangles of all instances in submission order.
     pub primitive: u32,
@@ -216,7 +216,7 @@ pub enum Outcome {
 pub const NO_PARENT: u32 = u32::MAX;
 
 /// One ray and its cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RayRecord {
     /// Why it was cast.
     pub kind: RayKind,
@@ -226,6 +226,7 @@ pub struct RayRecord {
     pub depth: u8,
     /// Index, among the same pixel's rays, of the ray whose hit spawned it; less than its own.
     /// [`NO_PARENT`] for a primary ray.
+    #[serde(serialize_with = "parent_or_null")]
     pub parent: u32,
     /// Inner nodes visited ([`TraversalKind`] says what one step tests).
     pub steps: u32,
@@ -233,6 +234,12 @@ pub struct RayRecord {
     pub triangle_tests: u32,
     /// Alpha look-ups at masked triangles.
     pub alpha_tests: u32,
+}
+
+fn parent_or_null<S: serde::Serializer>(parent: &u32, out: S) -> Result<S::Ok, S::Error> {
+    Some(*parent)
+        .filter(|parent| *parent != NO_PARENT)
+        .serialize(out)
 }
 
 impl RayRecord {
@@ -244,7 +251,7 @@ impl RayRecord {
 }
 
 /// A primary hit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Hit {
     /// Distance from the eye in metres (primary directions have unit length).
     pub t: f32,

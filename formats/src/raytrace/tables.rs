@@ -1,16 +1,17 @@
 //! The tables of a ray trace as chunks: META, RBVH, RMAT and RLIT (JSON), RTRI (binary).
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{RayTriangle, RaytraceTables};
+use super::{BvhSummary, EyeCamera, RayTriangle, RaytraceMeta, RaytraceTables};
 use crate::container::{ChunkTag, Container, ContainerWriter};
-use crate::error::{FormatError, Result};
+use crate::error::{Broken, FormatError, Result, ensure};
+use crate::json;
 use crate::parse::{self, Parsed};
+use crate::view::check_eye_size;
+use glam::Vec3;
 use nom::Parser;
 use nom::error::context;
 use nom::multi::count;
 use nom::number::complete::{le_f32, le_u32};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use std::io::{Seek, Write};
 
 /// JSON of [`super::RaytraceMeta`].
@@ -26,27 +27,28 @@ pub const TRIANGLES: ChunkTag = ChunkTag(*b"RTRI");
 
 /// Bytes of a triangle: primitive, object, material, nine coordinates.
 pub const TRIANGLE_ENTRY_BYTES: usize = 48;
-/// Largest width and height of an eye's image.
-pub const MAX_EYE_SIZE_PX: u32 = 16384;
 /// Most samples of a pixel.
 pub const MAX_SAMPLES_PER_PX: u32 = 1024;
 /// Deepest reflection.
 pub const MAX_DEPTH: u32 = 64;
+/// Largest coordinate of a vertex or an eye, to either side, in metres.
+pub const MAX_COORDINATE_M: f32 = 1e18;
+/// Largest node and largest triangle in memory.
+pub const MAX_ENTRY_BYTES: u32 = 4096;
 
 /// Writes the table chunks.
 pub(super) fn write<W: Write + Seek>(
     tables: &RaytraceTables,
     container: &mut ContainerWriter<W>,
 ) -> Result<()> {
-    check(tables).map_err(|broken| FormatError::Unwritable {
-        what: broken.what,
-        expected: broken.expected,
-        found: broken.found,
-    })?;
-    container.chunk(META, &to_json("trace description", &tables.meta)?)?;
-    container.chunk(BVH, &to_json("hierarchy", &tables.bvh)?)?;
-    container.chunk(MATERIALS, &to_json("material table", &tables.materials)?)?;
-    container.chunk(LIGHTS, &to_json("light table", &tables.lights)?)?;
+    check(tables).map_err(|(_, broken)| broken.unwritable())?;
+    container.chunk(META, &json::write("trace description", &tables.meta)?)?;
+    container.chunk(BVH, &json::write("hierarchy", &tables.bvh)?)?;
+    container.chunk(
+        MATERIALS,
+        &json::write("material table", &tables.materials)?,
+    )?;
+    container.chunk(LIGHTS, &json::write("light table", &tables.lights)?)?;
     let number = |what: &str, n: usize| {
         u32::try_from(n).map_err(|_| FormatError::Unwritable {
             what: what.to_owned(),
@@ -71,15 +73,15 @@ pub(super) fn write<W: Write + Seek>(
 /// Reads and checks the table chunks.
 pub(super) fn read(container: &Container) -> Result<RaytraceTables> {
     let tables = RaytraceTables {
-        meta: from_json(container, META, "the JSON of a trace's description")?,
-        bvh: from_json(container, BVH, "the JSON of a hierarchy")?,
-        materials: from_json(container, MATERIALS, "the JSON of a material table")?,
-        lights: from_json(container, LIGHTS, "the JSON of a light table")?,
+        meta: json::read(container, META, "a trace's description")?,
+        bvh: json::read(container, BVH, "a hierarchy")?,
+        materials: json::read(container, MATERIALS, "a material table")?,
+        lights: json::read(container, LIGHTS, "a light table")?,
         triangles: container.parse_chunk(TRIANGLES, read_triangles)?,
     };
-    check(&tables).map_err(|broken| {
+    check(&tables).map_err(|((chunk, offset), broken)| {
         let expected = format!("{}: {}", broken.what, broken.expected);
-        container.malformed(broken.chunk, broken.offset, expected, broken.found)
+        container.malformed(chunk, offset, expected, broken.found)
     })?;
     Ok(tables)
 }
@@ -105,102 +107,114 @@ fn read_triangle(input: &[u8]) -> Parsed<'_, RayTriangle> {
     Ok((rest, triangle))
 }
 
-fn to_json<T: Serialize + DeserializeOwned + PartialEq>(what: &str, value: &T) -> Result<Vec<u8>> {
-    let unwritable = |found: String| FormatError::Unwritable {
-        what: what.to_owned(),
-        expected: "finite numbers".to_owned(),
-        found,
-    };
-    let json = serde_json::to_vec(value).map_err(|error| unwritable(error.to_string()))?;
-    // JSON has no NaN: what does not come back must not be written.
-    match serde_json::from_slice::<T>(&json) {
-        Ok(back) if back == *value => Ok(json),
-        Ok(_) => Err(unwritable("numbers that change in JSON".to_owned())),
-        Err(error) => Err(unwritable(error.to_string())),
+/// Chunk of a rule that is broken, and the byte in it.
+type At = (ChunkTag, u64);
+
+/// Checks each table and what ties them together.
+fn check(tables: &RaytraceTables) -> std::result::Result<(), (At, Broken)> {
+    check_meta(&tables.meta).map_err(|broken| ((META, 0), broken))?;
+    check_bvh(&tables.bvh).map_err(|broken| ((BVH, 0), broken))?;
+    let mut previous = None;
+    for (index, triangle) in tables.triangles.iter().enumerate() {
+        let at = (TRIANGLES, (4 + index * TRIANGLE_ENTRY_BYTES) as u64);
+        check_triangle(index, triangle, previous, tables.materials.len())
+            .map_err(|broken| (at, broken))?;
+        previous = Some(triangle.primitive);
     }
+    Ok(())
 }
 
-fn from_json<T: DeserializeOwned>(
-    container: &Container,
-    tag: ChunkTag,
-    expected: &str,
-) -> Result<T> {
-    let json = container.chunk(tag)?;
-    serde_json::from_slice(json).map_err(|error| {
-        let before: usize = json
-            .split_inclusive(|byte| *byte == b'\n')
-            .take(error.line().saturating_sub(1))
-            .map(<[u8]>::len)
-            .sum();
-        let offset = before + error.column().saturating_sub(1);
-        container.malformed(tag, offset as u64, expected, error)
+fn check_meta(meta: &RaytraceMeta) -> std::result::Result<(), Broken> {
+    meta.trace.check()?;
+    for eye in &meta.eyes {
+        check_eye(eye, meta.trace.hmd.eye_size_px)?;
+    }
+    ensure(
+        (1..=MAX_SAMPLES_PER_PX).contains(&meta.samples_per_px),
+        || {
+            let expected = format!("1 to {MAX_SAMPLES_PER_PX}");
+            Broken::new("samples per pixel", expected, meta.samples_per_px)
+        },
+    )?;
+    ensure(meta.max_depth <= MAX_DEPTH, || {
+        Broken::new("depth", format!("at most {MAX_DEPTH}"), meta.max_depth)
     })
 }
 
-/// A table that breaks a rule of the format.
-struct Broken {
-    chunk: ChunkTag,
-    offset: u64,
-    what: String,
-    expected: String,
-    found: String,
+fn check_eye(eye: &EyeCamera, size_px: [u32; 2]) -> std::result::Result<(), Broken> {
+    check_eye_size(eye.size_px)?;
+    ensure(eye.size_px == size_px, || {
+        let expected = format!("the display's eye size, {size_px:?} px");
+        Broken::new("eyes", expected, format_args!("{:?} px", eye.size_px))
+    })?;
+    eye.fov.check()?;
+    let [right, up, forward] = [eye.right, eye.up, eye.forward].map(Vec3::from);
+    let lengths = [right, up, forward].map(|axis| axis.length());
+    let angles = [right.dot(up), up.dot(forward), forward.dot(right)];
+    let unit = lengths
+        .iter()
+        .all(|length| (0.999..=1.001).contains(length));
+    ensure(
+        unit && angles.iter().all(|cosine| cosine.abs() <= 0.001),
+        || {
+            let found = format!("{right}, {up}, {forward}");
+            Broken::new("eyes", "unit axes at right angles", found)
+        },
+    )?;
+    ensure(in_range(&eye.position), || {
+        let found = format!("{:?}", eye.position);
+        Broken::new(
+            "eyes",
+            format!("positions within {MAX_COORDINATE_M:e} m"),
+            found,
+        )
+    })
 }
 
-/// Checks what ties the tables together.
-fn check(tables: &RaytraceTables) -> std::result::Result<(), Broken> {
-    let meta = &tables.meta;
-    let broken = |what: &str, expected: String, found: String| Broken {
-        chunk: META,
-        offset: 0,
-        what: what.to_owned(),
-        expected,
-        found,
-    };
-    let [left, right] = &meta.eyes;
-    let fits = left
-        .size_px
-        .iter()
-        .all(|s| (1..=MAX_EYE_SIZE_PX).contains(s));
-    if !fits || left.size_px != right.size_px {
-        let expected = format!("the same size, 1 to {MAX_EYE_SIZE_PX} pixels, for both");
-        let found = format!("{:?} and {:?}", left.size_px, right.size_px);
-        return Err(broken("eyes", expected, found));
-    }
-    if !(1..=MAX_SAMPLES_PER_PX).contains(&meta.samples_per_px) {
-        let expected = format!("1 to {MAX_SAMPLES_PER_PX}");
-        return Err(broken(
-            "samples per pixel",
-            expected,
-            meta.samples_per_px.to_string(),
-        ));
-    }
-    if meta.max_depth > MAX_DEPTH {
-        let expected = format!("at most {MAX_DEPTH}");
-        return Err(broken("depth", expected, meta.max_depth.to_string()));
-    }
-    let mut previous = None;
-    for (index, t) in tables.triangles.iter().enumerate() {
-        let broken = |expected: &str, found: String| Broken {
-            chunk: TRIANGLES,
-            offset: (4 + index * TRIANGLE_ENTRY_BYTES) as u64,
-            what: format!("triangle {index}"),
-            expected: expected.to_owned(),
-            found,
-        };
-        if previous.is_some_and(|p| p >= t.primitive) {
-            return Err(broken(
-                "ascending primitive numbers",
-                t.primitive.to_string(),
-            ));
-        }
-        previous = Some(t.primitive);
-        if t.material as usize >= tables.materials.len() {
-            let expected = format!("a material below {}", tables.materials.len());
-            return Err(broken(&expected, t.material.to_string()));
-        }
-        if t.vertices.as_flattened().iter().any(|x| !x.is_finite()) {
-            return Err(broken("finite vertices", format!("{:?}", t.vertices)));
-        }
-    }
-    Ok(())
+fn in_range(coordinates: &[f32]) -> bool {
+    coordinates.iter().all(|x| x.abs() <= MAX_COORDINATE_M)
+}
+
+fn check_bvh(bvh: &BvhSummary) -> std::result::Result<(), Broken> {
+    let counts = [bvh.triangles, bvh.nodes, bvh.leaves];
+    ensure(counts.iter().all(|count| *count <= u32::MAX.into()), || {
+        let expected = "fewer than 2^32 triangles, nodes and leaves";
+        Broken::new("hierarchy", expected, format_args!("{counts:?}"))
+    })?;
+    ensure(bvh.sah_cost >= 0.0, || {
+        Broken::new("hierarchy", "a cost of 0 or more", bvh.sah_cost)
+    })?;
+    let sizes = [bvh.bytes_per_node, bvh.bytes_per_triangle];
+    ensure(
+        sizes
+            .iter()
+            .all(|size| (1..=MAX_ENTRY_BYTES).contains(size)),
+        || {
+            let expected = format!("1 to {MAX_ENTRY_BYTES} bytes a node and a triangle");
+            Broken::new("hierarchy", expected, format_args!("{sizes:?}"))
+        },
+    )
+}
+
+fn check_triangle(
+    index: usize,
+    triangle: &RayTriangle,
+    previous: Option<u32>,
+    materials: usize,
+) -> std::result::Result<(), Broken> {
+    let what = || format!("triangle {index}");
+    ensure(previous.is_none_or(|p| p < triangle.primitive), || {
+        Broken::new(what(), "ascending primitive numbers", triangle.primitive)
+    })?;
+    ensure((triangle.material as usize) < materials, || {
+        Broken::new(
+            what(),
+            format!("a material below {materials}"),
+            triangle.material,
+        )
+    })?;
+    ensure(in_range(triangle.vertices.as_flattened()), || {
+        let expected = format!("vertices within {MAX_COORDINATE_M:e} m");
+        Broken::new(what(), expected, format_args!("{:?}", triangle.vertices))
+    })
 }

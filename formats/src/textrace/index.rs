@@ -3,6 +3,7 @@
 
 use super::Encoding;
 use crate::parse::{Fault, Parsed, ensure};
+use crate::tiles::TileSpan;
 use nom::Parser;
 use nom::error::context;
 use nom::number::complete::{le_u32, le_u64};
@@ -10,15 +11,11 @@ use nom::number::complete::{le_u32, le_u64};
 /// Size of an index entry.
 pub const INDEX_ENTRY_BYTES: usize = 32;
 
-/// One entry of the index; all zero for a tile that nothing touched.
+/// One entry of the index; all zero but for the encoding where nothing touched the tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct IndexEntry {
-    /// Offset in the tile chunk.
-    pub offset: u64,
-    /// Encoded size.
-    pub bytes: u32,
-    /// CRC-32 of the encoded bytes.
-    pub crc32: u32,
+    /// Where the tile lies.
+    pub span: TileSpan,
     /// Quad records.
     pub records: u32,
     /// Primitive runs.
@@ -28,18 +25,22 @@ pub(super) struct IndexEntry {
 }
 
 impl IndexEntry {
+    /// Where the tile lies, if anything touched it.
+    pub(super) fn touched(&self) -> Option<TileSpan> {
+        (self.records > 0).then_some(self.span)
+    }
+
     pub(super) fn write(&self, bytes: &mut Vec<u8>) {
-        bytes.extend(self.offset.to_le_bytes());
-        for number in [self.bytes, self.crc32, self.records, self.runs] {
-            bytes.extend(number.to_le_bytes());
-        }
+        self.span.write(bytes);
+        bytes.extend(self.records.to_le_bytes());
+        bytes.extend(self.runs.to_le_bytes());
         bytes.extend((self.encoding as u64).to_le_bytes());
     }
 
     pub(super) fn parse(input: &[u8]) -> Parsed<'_, Self> {
-        let (at_encoding, (offset, bytes, crc32, records, runs)) = context(
+        let (at_encoding, (span, records, runs)) = context(
             "an index entry of 32 bytes",
-            (le_u64, le_u32, le_u32, le_u32, le_u32),
+            (TileSpan::parse, le_u32, le_u32),
         )
         .parse(input)?;
         let (rest, id) = context("an index entry of 32 bytes", le_u64).parse(at_encoding)?;
@@ -47,26 +48,23 @@ impl IndexEntry {
             nom::Err::Failure(Fault::new(at_encoding, "an encoding of 0 or 1", id))
         })?;
         let entry = Self {
-            offset,
-            bytes,
-            crc32,
+            span,
             records,
             runs,
             encoding,
         };
-        if records == 0 || runs == 0 || bytes == 0 {
-            let expected = || "an untouched tile's entry to be zero".to_owned();
+        if records == 0 || runs == 0 || span.bytes == 0 {
             ensure(
                 input,
-                entry == Self::default(),
-                expected,
+                (span, records, runs) == Default::default(),
+                || "an untouched tile's entry to be zero but for its encoding".to_owned(),
                 format_args!("{entry:?}"),
             )?;
         }
         ensure(
             input,
-            runs <= records && u64::from(records) <= encoding.most_records(bytes),
-            || format!("counts that {bytes} bytes can hold"),
+            runs <= records && u64::from(records) <= encoding.most_records(span.bytes),
+            || format!("counts that {} bytes can hold", span.bytes),
             format_args!("{runs} runs and {records} records"),
         )?;
         Ok((rest, entry))

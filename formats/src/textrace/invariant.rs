@@ -2,20 +2,10 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{Draw, NO_GROUP, QuadRecord, Tile};
+use crate::error::Broken;
 
 /// Quads along an edge of a tile.
 pub const TILE_QUADS: u8 = 8;
-
-/// A rule that a tile breaks.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Broken {
-    /// `run 3` or `record 12`.
-    pub what: String,
-    /// The rule.
-    pub expected: String,
-    /// What breaks it.
-    pub found: String,
-}
 
 /// Position of a quad on the Morton curve of its tile, 0 to 63 (x in the even bits).
 #[must_use]
@@ -32,11 +22,8 @@ pub(super) fn check(draws: &[Draw], tile: &Tile) -> Result<(), Broken> {
     let mut first = 0u32;
     let mut previous: Option<u32> = None;
     for (index, run) in tile.runs.iter().enumerate() {
-        let broken = |expected: String, found: String| Broken {
-            what: format!("run {index}"),
-            expected,
-            found,
-        };
+        let broken =
+            |expected: String, found: String| Broken::new(format!("run {index}"), expected, found);
         let draw = usize::try_from(run.draw)
             .ok()
             .and_then(|draw| draws.get(draw))
@@ -84,11 +71,8 @@ pub(super) fn check(draws: &[Draw], tile: &Tile) -> Result<(), Broken> {
     if records.is_empty() {
         return Ok(());
     }
-    Err(Broken {
-        what: "runs".to_owned(),
-        expected: format!("{} records in all", tile.records.len()),
-        found: first.to_string(),
-    })
+    let expected = format!("{} records in all", tile.records.len());
+    Err(Broken::new("runs", expected, first))
 }
 
 fn check_records(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(), Broken> {
@@ -123,9 +107,5 @@ fn explain(draw: &Draw, number: u64, record: &QuadRecord, previous: u8) -> Broke
         let expected = format!("Morton order: at least position {previous}");
         (expected, quad_morton(record.x, record.y).to_string())
     };
-    Broken {
-        what: format!("record {number}"),
-        expected,
-        found,
-    }
+    Broken::new(format!("record {number}"), expected, found)
 }

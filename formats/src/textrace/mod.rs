@@ -21,6 +21,7 @@ pub use reader::{Textrace, TileStats};
 pub use writer::{EncodedTile, TextraceWriter, encode_tile, encode_tile_as};
 
 use crate::container::ChunkTag;
+use crate::error::{Broken, ensure};
 use crate::texture::{Sampler, Texture};
 use crate::view::{Eye, FrameViews, Hmd};
 use serde::{Deserialize, Serialize};
@@ -88,6 +89,24 @@ pub struct TraceMeta {
     pub hmd: Hmd,
     /// Eye matrices by frame.
     pub frames: Vec<FrameViews>,
+}
+
+impl TraceMeta {
+    /// Checks the display and the frames.
+    pub(crate) fn check(&self) -> Result<(), Broken> {
+        self.hmd.check()?;
+        let numbers: Vec<u32> = self.frames.iter().map(|views| views.frame).collect();
+        ensure(
+            !numbers.is_empty() && numbers.is_sorted_by(|a, b| a < b),
+            || {
+                Broken::new(
+                    "frames",
+                    "at least one, numbers ascending",
+                    format_args!("{numbers:?}"),
+                )
+            },
+        )
+    }
 }
 
 /// What a pass renders.

@@ -7,8 +7,8 @@ use super::{
     tables,
 };
 use crate::container::{Container, Kind};
-use crate::error::{FormatError, Place, Result};
-use crate::parse::parse_all;
+use crate::error::{FormatError, Result};
+use crate::tiles::TileChunk;
 use nom::Parser;
 use nom::multi::count;
 use std::path::Path;
@@ -40,7 +40,7 @@ impl Textrace {
     /// # Errors
     /// When the file cannot be read or is malformed; the error names the place.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::new(Container::open(path)?)
+        Self::from_container(Container::open(path)?)
     }
 
     /// Reads a trace from memory.
@@ -48,10 +48,14 @@ impl Textrace {
     /// # Errors
     /// When the bytes are malformed.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
-        Self::new(Container::from_bytes(bytes)?)
+        Self::from_container(Container::from_bytes(bytes)?)
     }
 
-    fn new(container: Container) -> Result<Self> {
+    /// Reads tables and index of an open container, and checks everything but what the tiles hold.
+    ///
+    /// # Errors
+    /// When it is malformed, or of another kind.
+    pub fn from_container(container: Container) -> Result<Self> {
         container.expect_kind(Kind::Textrace)?;
         let tables = tables::read(&container)?;
         let slots: u64 = tables
@@ -68,7 +72,7 @@ impl Textrace {
         let index: Vec<IndexEntry> = container.parse_chunk(TILE_INDEX, |input| {
             count(IndexEntry::parse, entries).parse(input)
         })?;
-        check_placement(&container, &index)?;
+        tile_chunk(&container).check(index.iter().map(IndexEntry::touched))?;
         let mut next = 0usize;
         let pass_slots = tables
             .passes
@@ -114,7 +118,7 @@ impl Textrace {
             |entry| TileStats {
                 records: entry.records,
                 runs: entry.runs,
-                bytes: entry.bytes,
+                bytes: entry.span.bytes,
             },
         )
     }
@@ -145,33 +149,17 @@ impl Textrace {
     }
 
     fn decode_entry(&self, entry: &IndexEntry, out: &mut Tile) -> Result<()> {
-        let bytes = entry_bytes(self.container.chunk_unchecked(TILES)?, entry);
-        let crc32 = crc32fast::hash(bytes);
-        if crc32 != entry.crc32 {
-            let expected = format!("a tile with CRC-32 {:08x}", entry.crc32);
-            let found = format!("{crc32:08x}");
-            return Err(self
-                .container
-                .malformed(TILES, entry.offset, expected, found));
-        }
-        let start = self.container.entry(TILES)?.offset_bytes;
-        let at = start.saturating_add(entry.offset);
-        let (file, place) = (self.container.file(), Place::Chunk(TILES));
         let IndexEntry { runs, records, .. } = *entry;
         out.runs.reserve(runs as usize);
         out.records.reserve(records as usize);
-        match entry.encoding {
-            Encoding::Raw => parse_all(file, place, at, bytes, |input| {
-                raw::decode(runs, records, input, out)
-            }),
-            Encoding::Delta => parse_all(file, place, at, bytes, |input| {
-                delta::decode(runs, records, input, out)
-            }),
-        }?;
+        tile_chunk(&self.container).parse(&entry.span, |input| match entry.encoding {
+            Encoding::Raw => raw::decode(runs, records, input, out),
+            Encoding::Delta => delta::decode(runs, records, input, out),
+        })?;
         invariant::check(&self.tables.draws, out).map_err(|broken| {
             let expected = format!("{} of the tile: {}", broken.what, broken.expected);
             self.container
-                .malformed(TILES, entry.offset, expected, broken.found)
+                .malformed(TILES, entry.span.offset, expected, broken.found)
         })
     }
 
@@ -196,37 +184,11 @@ impl Textrace {
     }
 }
 
-/// Bytes of a tile; the index was checked against the chunk when the file was opened.
-fn entry_bytes<'a>(chunk: &'a [u8], entry: &IndexEntry) -> &'a [u8] {
-    usize::try_from(entry.offset)
-        .ok()
-        .and_then(|offset| chunk.get(offset..offset.checked_add(entry.bytes as usize)?))
-        .unwrap_or_default()
-}
-
-/// Tiles must fill their chunk in index order, so none overlap and no byte is unaccounted for.
-fn check_placement(container: &Container, index: &[IndexEntry]) -> Result<()> {
-    let chunk_bytes = container.entry(TILES)?.length_bytes;
-    let mut end = 0u64;
-    for (slot, entry) in index
-        .iter()
-        .enumerate()
-        .filter(|(_, entry)| entry.records > 0)
-    {
-        let at = (slot * INDEX_ENTRY_BYTES) as u64;
-        if entry.offset != end {
-            let found = entry.offset;
-            return Err(container.malformed(TILE_INDEX, at, format!("offset {end}"), found));
-        }
-        end = end.saturating_add(u64::from(entry.bytes));
-        if end > chunk_bytes {
-            let expected = format!("a tile that ends by byte {chunk_bytes} of the tile chunk");
-            return Err(container.malformed(TILE_INDEX, at + 8, expected, end));
-        }
+fn tile_chunk(container: &Container) -> TileChunk<'_> {
+    TileChunk {
+        container,
+        tiles: TILES,
+        index: TILE_INDEX,
+        entry_bytes: INDEX_ENTRY_BYTES,
     }
-    if end == chunk_bytes {
-        return Ok(());
-    }
-    let expected = format!("tiles that fill {chunk_bytes} bytes");
-    Err(container.malformed(TILE_INDEX, 0, expected, format!("{end} bytes of tiles")))
 }

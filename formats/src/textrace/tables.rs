@@ -1,10 +1,11 @@
 //! The tables of a trace as chunks: META (JSON), TEXS, SMPS, DRAW, PASS (binary).
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{Draw, Pass, PassKind, Sample, Tables, TraceMeta, UvGroup};
+use super::{Draw, Pass, PassKind, Sample, TILE_INDEX, TILES, Tables, TraceMeta, UvGroup};
 use crate::container::{ChunkTag, Container, ContainerWriter};
-use crate::error::{FormatError, Result};
-use crate::parse::{self, Fault, Parsed, ensure};
+use crate::error::{Broken, FormatError, Result, ensure};
+use crate::json;
+use crate::parse::{self, Fault, Parsed, zero};
 use crate::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
 use crate::view::{Eye, TILE_SIZE_PX};
 use nom::Parser;
@@ -52,12 +53,8 @@ pub(super) fn write<W: Write + Seek>(
     tables: &Tables,
     container: &mut ContainerWriter<W>,
 ) -> Result<()> {
-    check(tables).map_err(|broken| FormatError::Unwritable {
-        what: broken.what,
-        expected: broken.expected,
-        found: broken.found,
-    })?;
-    container.chunk(META, &meta_to_json(&tables.meta)?)?;
+    check(tables).map_err(|(_, broken)| broken.unwritable())?;
+    container.chunk(META, &json::write("trace description", &tables.meta)?)?;
     container.chunk(TEXTURES, &table(&tables.textures, write_texture)?)?;
     container.chunk(SAMPLERS, &table(&tables.samplers, write_sampler)?)?;
     container.chunk(DRAWS, &table(&tables.draws, write_draw)?)?;
@@ -66,13 +63,9 @@ pub(super) fn write<W: Write + Seek>(
 
 /// Reads and checks the table chunks.
 pub(super) fn read(container: &Container) -> Result<Tables> {
-    let json = container.chunk(META)?;
-    let meta = serde_json::from_slice(json).map_err(|error| {
-        let offset = json_offset(json, error.line(), error.column());
-        container.malformed(META, offset, "the JSON of a trace's description", error)
-    })?;
+    container.expect_order(&[META, TEXTURES, SAMPLERS, DRAWS, PASSES, TILES, TILE_INDEX])?;
     let tables = Tables {
-        meta,
+        meta: json::read(container, META, "a trace's description")?,
         textures: container.parse_chunk(TEXTURES, |input| {
             read_table("texture count", TEXTURE_BYTES, read_texture, input)
         })?,
@@ -86,149 +79,152 @@ pub(super) fn read(container: &Container) -> Result<Tables> {
             read_table("pass count", PASS_BYTES, read_pass, input)
         })?,
     };
-    check(&tables).map_err(|broken| {
+    check(&tables).map_err(|(chunk, broken)| {
         let expected = format!("{}: {}", broken.what, broken.expected);
-        container.malformed(broken.chunk, 0, expected, broken.found)
+        container.malformed(chunk, 0, expected, broken.found)
     })?;
     Ok(tables)
 }
 
-fn json_offset(json: &[u8], line: usize, column: usize) -> u64 {
-    let before: usize = json
-        .split_inclusive(|byte| *byte == b'\n')
-        .take(line.saturating_sub(1))
-        .map(<[u8]>::len)
-        .sum();
-    (before + column.saturating_sub(1)) as u64
-}
-
-fn meta_to_json(meta: &TraceMeta) -> Result<Vec<u8>> {
-    let unwritable = |found: String| FormatError::Unwritable {
-        what: "trace description".to_owned(),
-        expected: "finite numbers".to_owned(),
-        found,
-    };
-    let json = serde_json::to_vec(meta).map_err(|error| unwritable(error.to_string()))?;
-    // JSON has no NaN: what does not come back must not be written.
-    match serde_json::from_slice::<TraceMeta>(&json) {
-        Ok(back) if back == *meta => Ok(json),
-        Ok(_) => Err(unwritable("numbers that change in JSON".to_owned())),
-        Err(error) => Err(unwritable(error.to_string())),
-    }
-}
-
-/// A table that breaks a rule of the format.
-struct Broken {
-    chunk: ChunkTag,
-    what: String,
-    expected: String,
-    found: String,
-}
-
-/// Checks what ties the tables together.
-fn check(tables: &Tables) -> std::result::Result<(), Broken> {
-    let broken = |chunk, what: String, expected: String, found: String| Broken {
-        chunk,
-        what,
-        expected,
-        found,
-    };
+/// Checks each table and what ties them together; names the chunk that breaks a rule.
+fn check(tables: &Tables) -> std::result::Result<(), (ChunkTag, Broken)> {
+    let located = |chunk: ChunkTag| move |broken: Broken| (chunk, broken);
+    tables.meta.check().map_err(located(META))?;
     for (index, texture) in tables.textures.iter().enumerate() {
-        let what = || format!("texture {index} ({})", texture.name);
-        let [width, height] = texture.size;
-        if !(1..=MAX_TEXTURE_SIZE).contains(&width) || !(1..=MAX_TEXTURE_SIZE).contains(&height) {
-            let expected = format!("a size of 1 to {MAX_TEXTURE_SIZE} texels");
-            return Err(broken(
-                TEXTURES,
-                what(),
-                expected,
-                format!("{width}x{height}"),
-            ));
-        }
-        let most = width.max(height).ilog2() + 1;
-        if !(1..=most).contains(&texture.levels) {
-            let expected = format!("1 to {most} mip levels");
-            return Err(broken(
-                TEXTURES,
-                what(),
-                expected,
-                texture.levels.to_string(),
-            ));
-        }
-        if !(1..=MAX_LAYERS).contains(&texture.layers) {
-            let expected = format!("1 to {MAX_LAYERS} layers");
-            return Err(broken(
-                TEXTURES,
-                what(),
-                expected,
-                texture.layers.to_string(),
-            ));
-        }
+        check_texture(index, texture).map_err(located(TEXTURES))?;
     }
     for (index, draw) in tables.draws.iter().enumerate() {
-        let what = || format!("draw {index} ({})", draw.material);
-        if draw.first_primitive.checked_add(draw.primitives).is_none() {
-            let expected = "primitive numbers below 2^32".to_owned();
-            let found = format!("{} + {}", draw.first_primitive, draw.primitives);
-            return Err(broken(DRAWS, what(), expected, found));
-        }
-        if draw.groups.len() > MAX_GROUPS {
-            let expected = format!("at most {MAX_GROUPS} uv groups");
-            return Err(broken(
-                DRAWS,
-                what(),
-                expected,
-                draw.groups.len().to_string(),
-            ));
-        }
-        for (number, group) in draw.groups.iter().enumerate() {
-            let what = || format!("{} group {number}", what());
-            if group.extent.contains(&0) || group.extent.iter().any(|e| *e > MAX_TEXTURE_SIZE) {
-                let expected = format!("an extent of 1 to {MAX_TEXTURE_SIZE} texels");
-                return Err(broken(
-                    DRAWS,
-                    what(),
-                    expected,
-                    format!("{:?}", group.extent),
-                ));
-            }
-            for sample in &group.samples {
-                check_sample(tables, sample)
-                    .map_err(|(expected, found)| broken(DRAWS, what(), expected, found))?;
-            }
-        }
+        check_draw(tables, index, draw).map_err(located(DRAWS))?;
     }
     for (index, pass) in tables.passes.iter().enumerate() {
-        let tiles = pass.size_px.map(|size| size.div_ceil(TILE_SIZE_PX));
-        if pass.tiles != tiles || pass.tiles.contains(&0) {
-            let expected = format!(
-                "{tiles:?} tiles of {TILE_SIZE_PX} px for {:?} px",
-                pass.size_px
-            );
-            let found = format!("{:?}", pass.tiles);
-            return Err(broken(PASSES, format!("pass {index}"), expected, found));
+        check_pass(&tables.meta, index, pass).map_err(located(PASSES))?;
+    }
+    Ok(())
+}
+
+fn check_texture(index: usize, texture: &Texture) -> std::result::Result<(), Broken> {
+    let what = || format!("texture {index} ({})", texture.name);
+    let [width, height] = texture.size;
+    ensure(
+        texture
+            .size
+            .iter()
+            .all(|size| (1..=MAX_TEXTURE_SIZE).contains(size)),
+        || {
+            Broken::new(
+                what(),
+                format!("a size of 1 to {MAX_TEXTURE_SIZE} texels"),
+                format_args!("{width}x{height}"),
+            )
+        },
+    )?;
+    let most = width.max(height).ilog2() + 1;
+    ensure((1..=most).contains(&texture.levels), || {
+        Broken::new(what(), format!("1 to {most} mip levels"), texture.levels)
+    })?;
+    ensure((1..=MAX_LAYERS).contains(&texture.layers), || {
+        Broken::new(what(), format!("1 to {MAX_LAYERS} layers"), texture.layers)
+    })
+}
+
+fn check_draw(tables: &Tables, index: usize, draw: &Draw) -> std::result::Result<(), Broken> {
+    let what = || format!("draw {index} ({})", draw.material);
+    ensure(
+        draw.first_primitive.checked_add(draw.primitives).is_some(),
+        || {
+            Broken::new(
+                what(),
+                "primitive numbers below 2^32",
+                format_args!("{} + {}", draw.first_primitive, draw.primitives),
+            )
+        },
+    )?;
+    ensure(draw.groups.len() <= MAX_GROUPS, || {
+        Broken::new(
+            what(),
+            format!("at most {MAX_GROUPS} uv groups"),
+            draw.groups.len(),
+        )
+    })?;
+    for (number, group) in draw.groups.iter().enumerate() {
+        let what = || format!("{} group {number}", what());
+        ensure(
+            group
+                .extent
+                .iter()
+                .all(|extent| (1..=MAX_TEXTURE_SIZE).contains(extent)),
+            || {
+                Broken::new(
+                    what(),
+                    format!("an extent of 1 to {MAX_TEXTURE_SIZE} texels"),
+                    format_args!("{:?}", group.extent),
+                )
+            },
+        )?;
+        for sample in &group.samples {
+            check_sample(tables, &what, sample)?;
         }
     }
     Ok(())
 }
 
-fn check_sample(tables: &Tables, sample: &Sample) -> std::result::Result<(), (String, String)> {
+fn check_pass(meta: &TraceMeta, index: usize, pass: &Pass) -> std::result::Result<(), Broken> {
+    let what = || format!("pass {index}");
+    let tiles = pass.size_px.map(|size| size.div_ceil(TILE_SIZE_PX));
+    ensure(pass.tiles == tiles && !pass.tiles.contains(&0), || {
+        Broken::new(
+            what(),
+            format!(
+                "{tiles:?} tiles of {TILE_SIZE_PX} px for {:?} px, at least one",
+                pass.size_px
+            ),
+            format_args!("{:?}", pass.tiles),
+        )
+    })?;
+    ensure(
+        meta.frames.iter().any(|views| views.frame == pass.frame),
+        || Broken::new(what(), "a frame of the description", pass.frame),
+    )?;
+    let eye_size_px = meta.hmd.eye_size_px;
+    ensure(
+        pass.kind != PassKind::Main || pass.eye.is_none() || pass.size_px == eye_size_px,
+        || {
+            Broken::new(
+                what(),
+                format!("the size of an eye's image, {eye_size_px:?} px"),
+                format_args!("{:?}", pass.size_px),
+            )
+        },
+    )
+}
+
+fn check_sample(
+    tables: &Tables,
+    what: &dyn Fn() -> String,
+    sample: &Sample,
+) -> std::result::Result<(), Broken> {
     let texture = usize::try_from(sample.texture)
         .ok()
         .and_then(|index| tables.textures.get(index))
         .ok_or_else(|| {
             let expected = format!("a texture below {}", tables.textures.len());
-            (expected, sample.texture.to_string())
+            Broken::new(what(), expected, sample.texture)
         })?;
-    if usize::from(sample.sampler) >= tables.samplers.len() {
-        let expected = format!("a sampler below {}", tables.samplers.len());
-        return Err((expected, sample.sampler.to_string()));
-    }
-    if u32::from(sample.layer) >= texture.layers {
-        let expected = format!("a layer below {}", texture.layers);
-        return Err((expected, sample.layer.to_string()));
-    }
-    Ok(())
+    let samplers = tables.samplers.len();
+    ensure(usize::from(sample.sampler) < samplers, || {
+        Broken::new(
+            what(),
+            format!("a sampler below {samplers}"),
+            sample.sampler,
+        )
+    })?;
+    ensure(u32::from(sample.layer) < texture.layers, || {
+        Broken::new(
+            what(),
+            format!("a layer below {}", texture.layers),
+            sample.layer,
+        )
+    })
 }
 
 fn length_u32(what: &str, length: usize) -> Result<u32> {
@@ -464,17 +460,4 @@ fn read_pass(input: &[u8]) -> Parsed<'_, Pass> {
         tiles: [columns, rows],
     };
     Ok((rest, pass))
-}
-
-/// Reserved bytes, which must be zero so that a later version can give them a meaning.
-fn zero(input: &[u8], bytes: usize) -> Parsed<'_, ()> {
-    let (rest, reserved) = context("reserved bytes", take(bytes)).parse(input)?;
-    let all_zero = reserved.iter().all(|byte| *byte == 0);
-    ensure(
-        input,
-        all_zero,
-        || "zero in reserved bytes".to_owned(),
-        format_args!("{reserved:02x?}"),
-    )?;
-    Ok((rest, ()))
 }

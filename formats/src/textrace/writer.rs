@@ -3,7 +3,8 @@
 use super::index::IndexEntry;
 use super::{Encoding, Pass, Tables, Tile, delta, invariant, raw, tables};
 use crate::container::{AtomicFile, ContainerWriter, Kind};
-use crate::error::{FormatError, Result};
+use crate::error::{Broken, FormatError, Result};
+use crate::tiles::TileSpan;
 use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 
@@ -44,11 +45,7 @@ pub fn encode_tile(tables: &Tables, tile: &Tile) -> Result<EncodedTile> {
 /// # Errors
 /// When the tile breaks an invariant of the format.
 pub fn encode_tile_as(encoding: Encoding, tables: &Tables, tile: &Tile) -> Result<EncodedTile> {
-    invariant::check(&tables.draws, tile).map_err(|broken| FormatError::Unwritable {
-        what: format!("tile {}", broken.what),
-        expected: broken.expected,
-        found: broken.found,
-    })?;
+    invariant::check(&tables.draws, tile).map_err(Broken::unwritable)?;
     if tile.records.is_empty() {
         return Ok(EncodedTile::default());
     }
@@ -172,9 +169,11 @@ impl<W: Write + Seek> TextraceWriter<W> {
             return Ok(());
         }
         self.index[slot] = IndexEntry {
-            offset: self.tile_bytes,
-            bytes: tile.bytes.len() as u32,
-            crc32: tile.crc32,
+            span: TileSpan {
+                offset: self.tile_bytes,
+                bytes: tile.bytes.len() as u32,
+                crc32: tile.crc32,
+            },
             records: tile.records,
             runs: tile.runs,
             encoding: tile.encoding,

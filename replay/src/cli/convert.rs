@@ -1,18 +1,22 @@
 //! `replay convert`: a trace in another encoding, or as plain accesses for other simulators.
 
 use super::ConfigArgs;
-use super::trace_file::tiles;
+use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
 use crate::order;
 use crate::stream::Feed;
 use anyhow::{Context, Result, bail};
-use formats::container::AtomicFile;
+use formats::Trace;
+use formats::container::{AtomicFile, is_stdout};
 use formats::interop::{
-    AccessSink, CsvWriter, DinWriter, Expander, Granularity, JsonlWriter, Origin,
+    AccessSink, CsvWriter, DinWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess,
+    ray_samples,
 };
 use formats::layout::Layout;
+use formats::raytrace::{RayTile, Raytrace, RaytraceWriter, encode_ray_tile};
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
-use std::io::{self, BufWriter, IsTerminal, Write};
+use shell::Output;
+use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -21,12 +25,20 @@ use std::process::ExitCode;
 pub enum Target {
     /// Dinero's text: `0 HEXADDR` a line
     Din,
-    /// Comma-separated accesses with texture, level and texel
+    /// Comma-separated accesses with texture, level and texel, or ray and node
     Csv,
     /// The same as one JSON object a line
     Jsonl,
-    /// A trace, its tiles encoded anew
+    /// A texture trace, its tiles encoded anew
     Textrace,
+    /// A ray trace, its tiles encoded anew
+    Raytrace,
+}
+
+impl Target {
+    fn is_text(self) -> bool {
+        matches!(self, Self::Din | Self::Csv | Self::Jsonl)
+    }
 }
 
 /// Tile encodings by name.
@@ -42,9 +54,11 @@ pub enum EncodingName {
 /// Access granularities by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum GranularityName {
-    /// Every distinct texel of a footprint, at the address of its block
+    /// Every distinct texel of a footprint, at the address of its block; every node or triangle
+    /// that a ray visits, at its first byte
     Texel,
-    /// Every distinct cache line of a footprint: what `replay run` counts as look-ups
+    /// Every distinct cache line of a footprint, which `replay run` counts as look-ups, or of a
+    /// visit
     #[default]
     Line,
 }
@@ -54,9 +68,12 @@ pub enum GranularityName {
 #[command(after_help = "Examples:
   replay convert c.textrace --to din --order z2-sta | dineroIV -informat d ...
   replay convert c.textrace --to csv --granularity texel -o c.csv
-  replay convert c.textrace --to textrace --encoding raw -o raw.textrace")]
+  replay convert c.textrace --to textrace --encoding raw -o raw.textrace
+  replay convert r.raytrace --to csv | head
+Rays come tile by tile, left eye first; their accesses need a trace with visits
+(tracegen rays --visits).")]
 pub struct ConvertArgs {
-    /// Texture trace
+    /// Trace, .textrace or .raytrace
     pub trace: PathBuf,
     /// What to write
     #[arg(long)]
@@ -81,34 +98,45 @@ pub struct ConvertArgs {
 /// The trace cannot be read, the configuration is impossible, or the output cannot be written.
 pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     let config = args.machine.resolve()?;
-    let trace = Textrace::open(&args.trace)?;
-    if args.to == Target::Textrace {
-        return reencode(&trace, args);
-    }
-    if args.output.as_os_str() == "-" {
+    let output = if args.to.is_text() {
+        Output::text("--output", &args.output)
+    } else {
+        Output::binary("--output", &args.output)
+    };
+    let inputs = [Some(args.trace.as_path()), args.machine.file()];
+    shell::check_outputs(&[output], inputs.into_iter().flatten())?;
+    let trace = Trace::open(&args.trace)?;
+    if matches!(args.to, Target::Textrace | Target::Raytrace) {
+        reencode(&trace, args)?;
+    } else if is_stdout(&args.output) {
         let mut out = BufWriter::new(io::stdout().lock());
         write_accesses(&trace, &config, args, &mut out)?;
         out.flush()?;
     } else {
-        let name = || args.output.display().to_string();
+        let name = || format!("cannot write {}", args.output.display());
         let mut out = AtomicFile::create(&args.output).with_context(name)?;
-        write_accesses(&trace, &config, args, &mut out)?;
+        write_accesses(&trace, &config, args, &mut out).with_context(name)?;
         out.persist().with_context(name)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
 fn write_accesses(
-    trace: &Textrace,
+    trace: &Trace,
     config: &RunConfig,
     args: &ConvertArgs,
     out: &mut impl Write,
 ) -> Result<()> {
-    match args.to {
-        Target::Din => accesses(trace, config, args.granularity, &mut DinWriter(out)),
-        Target::Csv => accesses(trace, config, args.granularity, &mut CsvWriter::new(out)?),
-        Target::Jsonl => accesses(trace, config, args.granularity, &mut JsonlWriter(out)),
-        Target::Textrace => bail!("a trace is not a list of accesses"),
+    match trace {
+        Trace::Texture(trace) => {
+            let granularity = args.granularity;
+            match args.to {
+                Target::Csv => accesses(trace, config, granularity, &mut CsvWriter::new(out)?),
+                Target::Jsonl => accesses(trace, config, granularity, &mut JsonlWriter(out)),
+                _ => accesses(trace, config, granularity, &mut DinWriter(out)),
+            }
+        }
+        Trace::Ray(trace) => ray_accesses(trace, config, args, out),
     }
 }
 
@@ -150,38 +178,87 @@ fn accesses(
     Ok(())
 }
 
-fn reencode(trace: &Textrace, args: &ConvertArgs) -> Result<ExitCode> {
-    let encoding = match args.encoding {
-        EncodingName::Raw => Encoding::Raw,
-        EncodingName::Delta => Encoding::Delta,
-    };
-    if args.output.as_os_str() == "-" {
-        let mut out = io::stdout().lock();
-        if out.is_terminal() {
-            bail!("a trace is binary: name a file with --output, or redirect standard output");
-        }
-        let mut writer = TextraceWriter::in_memory(trace.tables())?;
-        append_tiles(trace, encoding, &mut writer)?;
-        out.write_all(&writer.into_bytes()?)?;
-        out.flush()?;
-    } else {
-        let mut writer = TextraceWriter::create(&args.output, trace.tables())?;
-        append_tiles(trace, encoding, &mut writer)?;
-        writer.finish()?;
+/// Writes what the rays read of the hierarchy, in file order.
+fn ray_accesses(
+    trace: &Raytrace,
+    config: &RunConfig,
+    args: &ConvertArgs,
+    out: &mut impl Write,
+) -> Result<()> {
+    let tables = trace.tables();
+    if !tables.meta.has_visits {
+        bail!(
+            "{}: the trace lists no visits, so it has no addresses; `tracegen rays --visits` lists them",
+            trace.container().file()
+        );
     }
-    Ok(ExitCode::SUCCESS)
+    if args.to == Target::Csv {
+        writeln!(out, "{}", RayAccess::CSV_HEADER)?;
+    }
+    let by_line = args.granularity == GranularityName::Line;
+    let mut tile = RayTile::default();
+    for (eye, index) in ray_tiles(tables) {
+        trace.decode_tile(eye, index, &mut tile)?;
+        for sample in ray_samples(tables, eye, index, &tile) {
+            sample.accesses(&tables.bvh, |access| {
+                if !by_line {
+                    return write_access(args.to, access, out);
+                }
+                let bytes = config.line_bytes;
+                access.lines(bytes).try_for_each(|address| {
+                    let line = RayAccess {
+                        address,
+                        bytes,
+                        ..*access
+                    };
+                    write_access(args.to, &line, out)
+                })
+            })?;
+        }
+    }
+    Ok(())
 }
 
-fn append_tiles<W: Write + io::Seek>(
-    trace: &Textrace,
-    encoding: Encoding,
-    writer: &mut TextraceWriter<W>,
-) -> Result<()> {
-    let mut tile = Tile::default();
-    for (pass, index) in tiles(&trace.tables().passes) {
-        trace.decode_tile(pass, index, &mut tile)?;
-        let encoded = encode_tile_as(encoding, trace.tables(), &tile)?;
-        writer.append(pass, index, encoded)?;
+fn write_access(to: Target, access: &RayAccess, out: &mut impl Write) -> io::Result<()> {
+    match to {
+        Target::Csv => access.write_csv(out),
+        Target::Jsonl => writeln!(out, "{}", serde_json::to_string(access)?),
+        _ => writeln!(out, "0 {:x}", access.address),
+    }
+}
+
+/// Writes the trace itself.
+fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
+    match (trace, args.to) {
+        (Trace::Texture(trace), Target::Textrace) => {
+            let encoding = match args.encoding {
+                EncodingName::Raw => Encoding::Raw,
+                EncodingName::Delta => Encoding::Delta,
+            };
+            let tables = trace.tables();
+            let mut writer = TextraceWriter::create(&args.output, tables)?;
+            let mut tile = Tile::default();
+            for (pass, index) in tiles(&tables.passes) {
+                trace.decode_tile(pass, index, &mut tile)?;
+                writer.append(pass, index, encode_tile_as(encoding, tables, &tile)?)?;
+            }
+            writer.finish()?;
+        }
+        (Trace::Ray(trace), Target::Raytrace) => {
+            let tables = trace.tables();
+            let mut writer = RaytraceWriter::create(&args.output)?;
+            let mut tile = RayTile::default();
+            for (eye, index) in ray_tiles(tables) {
+                trace.decode_tile(eye, index, &mut tile)?;
+                writer.tile(&encode_ray_tile(&tile, tables.meta.has_visits)?)?;
+            }
+            writer.finish(tables)?;
+        }
+        _ => bail!(
+            "{}: a {} cannot become a trace of the other kind",
+            trace.container().file(),
+            trace.container().kind()
+        ),
     }
     Ok(())
 }

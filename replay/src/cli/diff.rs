@@ -1,9 +1,13 @@
-//! `replay diff`: the first difference between two texture traces.
+//! `replay diff`: the first difference between two traces.
 
-use super::trace_file::tiles;
+use super::dump::record_lines;
+use super::tiles::{ray_tiles, tiles};
 use anyhow::Result;
-use formats::interop::{Origin, record_to_json};
-use formats::textrace::{Tables, Textrace, Tile};
+use formats::Trace;
+use formats::interop::ray_samples;
+use formats::raytrace::{RayTile, Raytrace};
+use formats::textrace::{Textrace, Tile};
+use serde_json::Value;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -14,7 +18,7 @@ How tiles are encoded makes no difference.
 
 Example: replay diff a.textrace b.textrace")]
 pub struct DiffArgs {
-    /// One texture trace
+    /// One trace
     pub left: PathBuf,
     /// The other
     pub right: PathBuf,
@@ -28,8 +32,8 @@ pub struct DiffArgs {
 /// # Errors
 /// A trace cannot be read.
 pub fn run(args: &DiffArgs) -> Result<ExitCode> {
-    let left = Textrace::open(&args.left)?;
-    let right = Textrace::open(&args.right)?;
+    let left = Trace::open(&args.left)?;
+    let right = Trace::open(&args.right)?;
     match first_difference(&left, &right, args.ignore_meta)? {
         None => Ok(ExitCode::SUCCESS),
         Some(difference) => {
@@ -40,20 +44,75 @@ pub fn run(args: &DiffArgs) -> Result<ExitCode> {
 }
 
 /// Describes the first difference, if there is one.
-fn first_difference(
-    left: &Textrace,
-    right: &Textrace,
-    ignore_meta: bool,
-) -> Result<Option<String>> {
-    if let Some(text) = tables(left.tables(), right.tables(), ignore_meta)? {
-        return Ok(Some(text));
+fn first_difference(left: &Trace, right: &Trace, ignore_meta: bool) -> Result<Option<String>> {
+    match (left, right) {
+        (Trace::Texture(left), Trace::Texture(right)) => textures(left, right, ignore_meta),
+        (Trace::Ray(left), Trace::Ray(right)) => rays(left, right, ignore_meta),
+        _ => {
+            let kind = |trace: &Trace| trace.container().kind();
+            Ok(Some(differ("kind", kind(left), kind(right))))
+        }
+    }
+}
+
+fn textures(left: &Textrace, right: &Textrace, ignore_meta: bool) -> Result<Option<String>> {
+    let (a, b) = (left.tables(), right.tables());
+    let meta = (!ignore_meta).then(|| keys("meta", &a.meta, &b.meta));
+    let tables = meta
+        .transpose()?
+        .flatten()
+        .or(entries("texture", &a.textures, &b.textures)?)
+        .or(entries("sampler", &a.samplers, &b.samplers)?)
+        .or(entries("draw", &a.draws, &b.draws)?)
+        .or(entries("pass", &a.passes, &b.passes)?);
+    if tables.is_some() {
+        return Ok(tables);
     }
     let (mut a, mut b) = (Tile::default(), Tile::default());
     for (pass, index) in tiles(&left.tables().passes) {
         left.decode_tile(pass, index, &mut a)?;
         right.decode_tile(pass, index, &mut b)?;
         if a != b {
-            return Ok(Some(tile(pass as u32, index as u32, &a, &b)));
+            let [a, b] = [&a, &b].map(|tile| record_lines(pass, index, tile).collect());
+            let place = format!("pass {pass} tile {index} record");
+            return Ok(lines(&place, a, b));
+        }
+    }
+    Ok(None)
+}
+
+fn rays(left: &Raytrace, right: &Raytrace, ignore_meta: bool) -> Result<Option<String>> {
+    let (mut a, mut b) = (left.tables().clone(), right.tables().clone());
+    if ignore_meta {
+        a.meta.trace = b.meta.trace.clone();
+    }
+    let tables = keys("meta", &a.meta, &b.meta)?
+        .or(keys("hierarchy", &a.bvh, &b.bvh)?)
+        .or(entries("material", &a.materials, &b.materials)?)
+        .or(entries("light", &a.lights, &b.lights)?)
+        .or(entries("triangle", &a.triangles, &b.triangles)?);
+    if tables.is_some() {
+        return Ok(tables);
+    }
+    b.meta.trace = std::mem::take(&mut a.meta.trace);
+    let (mut tile_a, mut tile_b) = (RayTile::default(), RayTile::default());
+    for (eye, index) in ray_tiles(&a) {
+        left.decode_tile(eye, index, &mut tile_a)?;
+        right.decode_tile(eye, index, &mut tile_b)?;
+        if tile_a == tile_b {
+            continue;
+        }
+        let of = |tile: &RayTile| -> Result<Vec<String>> {
+            let samples = ray_samples(&b, eye, index, tile);
+            Ok(samples
+                .map(|s| s.to_json(&b.bvh))
+                .collect::<Result<_, _>>()?)
+        };
+        let place = format!("{eye:?} eye tile {index} sample").to_lowercase();
+        // Texture coordinates may be NaN, which differs from itself but not in print.
+        let found = lines(&place, of(&tile_a)?, of(&tile_b)?);
+        if found.is_some() {
+            return Ok(found);
         }
     }
     Ok(None)
@@ -63,24 +122,22 @@ fn differ(what: &str, left: impl std::fmt::Display, right: impl std::fmt::Displa
     format!("{what} differs\n< {left}\n> {right}")
 }
 
-/// First different entry of the tables.
-fn tables(left: &Tables, right: &Tables, ignore_meta: bool) -> Result<Option<String>> {
-    if !ignore_meta && left.meta != right.meta {
-        let (a, b) = (
-            serde_json::to_value(&left.meta)?,
-            serde_json::to_value(&right.meta)?,
-        );
-        let mut keys = a.as_object().into_iter().flat_map(serde_json::Map::keys);
-        if let Some(key) = keys.find(|key| a[*key] != b[*key]) {
-            return Ok(Some(differ(&format!("meta.{key}"), &a[key], &b[key])));
+/// First different key of two descriptions.
+fn keys<T: serde::Serialize>(what: &str, left: &T, right: &T) -> Result<Option<String>> {
+    fn first(path: &str, a: &Value, b: &Value) -> Option<String> {
+        match (a, b) {
+            (Value::Object(a), Value::Object(b)) => a.iter().find_map(|(key, value)| {
+                let other = b.get(key).unwrap_or(&Value::Null);
+                first(&format!("{path}.{key}"), value, other)
+            }),
+            _ => (a != b).then(|| differ(path, a, b)),
         }
     }
-    Ok(entries("texture", &left.textures, &right.textures)?
-        .or(entries("sampler", &left.samplers, &right.samplers)?)
-        .or(entries("draw", &left.draws, &right.draws)?)
-        .or(entries("pass", &left.passes, &right.passes)?))
+    let (a, b) = (serde_json::to_value(left)?, serde_json::to_value(right)?);
+    Ok(first(what, &a, &b))
 }
 
+/// First different entry of two tables.
 fn entries<T: PartialEq + serde::Serialize>(
     what: &str,
     left: &[T],
@@ -93,44 +150,21 @@ fn entries<T: PartialEq + serde::Serialize>(
         }
     }
     let counts = (left.len() != right.len()).then(|| {
-        differ(
-            &format!("number of {what} entries"),
-            left.len(),
-            right.len(),
-        )
+        let what = format!("number of {what} entries");
+        differ(&what, left.len(), right.len())
     });
     Ok(counts)
 }
 
-/// First different record of two tiles that are known to differ.
-fn tile(pass: u32, index: u32, left: &Tile, right: &Tile) -> String {
-    let (a, b) = (located(pass, index, left), located(pass, index, right));
-    let at = a.iter().zip(&b).position(|(a, b)| a != b);
-    let at = at.unwrap_or(a.len().min(b.len()));
-    let end = || "no more records".to_owned();
-    differ(
-        &format!("pass {pass} tile {index} record {at}"),
-        a.get(at).cloned().unwrap_or_else(end),
-        b.get(at).cloned().unwrap_or_else(end),
-    )
-}
-
-fn located(pass: u32, index: u32, tile: &Tile) -> Vec<String> {
-    let of_run = |run: &formats::textrace::PrimitiveRun| {
-        let origin = Origin {
-            pass,
-            tile: index,
-            draw: run.draw,
-            primitive: run.primitive,
-        };
-        let records = tile
-            .records
-            .iter()
-            .skip(run.first as usize)
-            .take(run.count as usize);
-        records.map(move |record| record_to_json(origin, record).to_string())
+/// First different line of two lists, if there is one.
+fn lines(place: &str, left: Vec<String>, right: Vec<String>) -> Option<String> {
+    let count = left.len().max(right.len());
+    let at = (0..count).find(|at| left.get(*at) != right.get(*at))?;
+    let of = |lines: &[String]| {
+        let end = || "no more records".to_owned();
+        lines.get(at).cloned().unwrap_or_else(end)
     };
-    tile.runs.iter().flat_map(of_run).collect()
+    Some(differ(&format!("{place} {at}"), of(&left), of(&right)))
 }
 
 #[cfg(test)]
@@ -144,7 +178,7 @@ mod tests {
         let left = file_of(&memory);
         change(&mut memory);
         let right = file_of(&memory);
-        let open = |file: &tempfile::NamedTempFile| Textrace::open(file.path()).unwrap();
+        let open = |file: &tempfile::NamedTempFile| Trace::open(file.path()).unwrap();
         first_difference(&open(&left), &open(&right), false).unwrap()
     }
 

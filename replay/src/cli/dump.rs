@@ -1,8 +1,10 @@
 //! `replay dump`: decoded records as JSON Lines.
 
-use super::trace_file::{NumberRange, tiles};
+use super::tiles::{NumberRange, ray_tiles, tiles};
 use anyhow::{Result, bail};
-use formats::interop::{Origin, record_to_json};
+use formats::Trace;
+use formats::interop::{Origin, ray_samples, record_to_json};
+use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
 use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
@@ -10,13 +12,19 @@ use std::process::ExitCode;
 
 /// Arguments of `replay dump`.
 #[derive(Clone, Debug, clap::Args)]
-#[command(after_help = "Examples:
+#[command(
+    after_help = "A texture trace has a line a record, a ray trace a line a sample of a pixel,
+with its rays and, where the trace lists them, their visits.
+
+Examples:
   replay dump c.textrace --pass 0 --tile 1200
-  replay dump c.textrace --tile 40..48 | jq .primitive")]
+  replay dump c.textrace --tile 40..48 | jq .primitive
+  replay dump r.raytrace --pass 1 --tile 7 | jq '.rays[].steps'"
+)]
 pub struct DumpArgs {
-    /// Texture trace
+    /// Trace, .textrace or .raytrace
     pub trace: PathBuf,
-    /// Passes, a number or a range such as 0..2
+    /// Passes, a number or a range such as 0..2; of a ray trace 0 is the left eye, 1 the right
     #[arg(long, value_name = "RANGE")]
     pub pass: Option<NumberRange>,
     /// Tiles of each pass, a number or a range such as 40..48
@@ -29,54 +37,92 @@ pub struct DumpArgs {
 /// # Errors
 /// The trace cannot be read, has no such pass or tile, or the output cannot be written.
 pub fn run(args: &DumpArgs) -> Result<ExitCode> {
-    let trace = Textrace::open(&args.trace)?;
+    let trace = Trace::open(&args.trace)?;
     let mut out = BufWriter::new(io::stdout().lock());
     dump(&trace, args, &mut out)?;
     out.flush()?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn dump(trace: &Textrace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
-    let passes = &trace.tables().passes;
-    let chosen = |range: Option<NumberRange>, number| range.is_none_or(|r| r.contains(number));
-    let mut tile = Tile::default();
-    let mut any = false;
-    for (pass, index) in tiles(passes) {
-        if !chosen(args.pass, pass) || !chosen(args.tile, index) {
-            continue;
+fn dump(trace: &Trace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
+    let chosen = |pass, tile| {
+        args.pass.is_none_or(|range| range.contains(pass))
+            && args.tile.is_none_or(|range| range.contains(tile))
+    };
+    let (any, passes, most) = match trace {
+        Trace::Texture(trace) => {
+            let passes = &trace.tables().passes;
+            let most = passes.iter().map(formats::textrace::Pass::tile_count).max();
+            (
+                records(trace, chosen, out)?,
+                passes.len(),
+                most.unwrap_or(0),
+            )
         }
-        any = true;
-        trace.decode_tile(pass, index, &mut tile)?;
-        for run in &tile.runs {
-            let origin = Origin {
-                pass: pass as u32,
-                tile: index as u32,
-                draw: run.draw,
-                primitive: run.primitive,
-            };
-            for record in tile
-                .records
-                .iter()
-                .skip(run.first as usize)
-                .take(run.count as usize)
-            {
-                writeln!(out, "{}", record_to_json(origin, record))?;
-            }
-        }
-    }
+        Trace::Ray(trace) => (samples(trace, chosen, out)?, 2, trace.tables().tile_count()),
+    };
     if any {
         return Ok(());
     }
     let first = |range: Option<NumberRange>| range.map_or(0, NumberRange::first);
-    let most = passes.iter().map(formats::textrace::Pass::tile_count).max();
     bail!(
-        "{}: no pass {} tile {}; the trace has {} passes of at most {} tiles",
+        "{}: no pass {} tile {}; the trace has {passes} passes of at most {most} tiles",
         trace.container().file(),
         first(args.pass),
         first(args.tile),
-        passes.len(),
-        most.unwrap_or(0)
     )
+}
+
+/// Prints the records of the chosen tiles; true if there is a chosen tile.
+fn records(
+    trace: &Textrace,
+    chosen: impl Fn(usize, usize) -> bool,
+    out: &mut impl Write,
+) -> Result<bool> {
+    let mut tile = Tile::default();
+    let mut any = false;
+    for (pass, index) in tiles(&trace.tables().passes).filter(|at| chosen(at.0, at.1)) {
+        any = true;
+        trace.decode_tile(pass, index, &mut tile)?;
+        for line in record_lines(pass, index, &tile) {
+            writeln!(out, "{line}")?;
+        }
+    }
+    Ok(any)
+}
+
+/// The records of a tile as lines of JSON.
+pub fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Iterator<Item = String> {
+    tile.runs.iter().flat_map(move |run| {
+        let origin = Origin {
+            pass: pass as u32,
+            tile: index as u32,
+            draw: run.draw,
+            primitive: run.primitive,
+        };
+        let records = tile.records.iter().skip(run.first as usize);
+        let records = records.take(run.count as usize);
+        records.map(move |record| record_to_json(origin, record).to_string())
+    })
+}
+
+/// Prints the samples of the chosen tiles; true if there is a chosen tile.
+fn samples(
+    trace: &Raytrace,
+    chosen: impl Fn(usize, usize) -> bool,
+    out: &mut impl Write,
+) -> Result<bool> {
+    let tables = trace.tables();
+    let mut tile = RayTile::default();
+    let mut any = false;
+    for (eye, index) in ray_tiles(tables).filter(|at| chosen(at.0 as usize, at.1 as usize)) {
+        any = true;
+        trace.decode_tile(eye, index, &mut tile)?;
+        for sample in ray_samples(tables, eye, index, &tile) {
+            writeln!(out, "{}", sample.to_json(&tables.bvh)?)?;
+        }
+    }
+    Ok(any)
 }
 
 #[cfg(test)]
@@ -89,7 +135,7 @@ mod tests {
     fn a_dump_holds_every_record_of_the_chosen_tiles() {
         let memory = Synthetic::default().generate();
         let file = file_of(&memory);
-        let trace = Textrace::open(file.path()).unwrap();
+        let trace = Trace::open(file.path()).unwrap();
         let args = DumpArgs {
             trace: file.path().to_owned(),
             pass: Some("1".parse().unwrap()),
@@ -108,7 +154,7 @@ mod tests {
     #[test]
     fn a_pass_that_is_not_there_is_an_error() {
         let file = file_of(&Synthetic::default().generate());
-        let trace = Textrace::open(file.path()).unwrap();
+        let trace = Trace::open(file.path()).unwrap();
         let args = DumpArgs {
             trace: file.path().to_owned(),
             pass: Some("9".parse().unwrap()),

@@ -6,7 +6,7 @@ use crate::config::{Order, RunConfig};
 use crate::experiment::{self, Plan, Subject};
 use crate::files::{self, write_atomically};
 use crate::paper::{self, z2};
-use crate::report::picture::Picture;
+use crate::report::picture::EmbeddedPicture;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::page;
 use anyhow::{Context, Result, bail, ensure};
@@ -35,7 +35,7 @@ pub struct ExperimentArgs {
     /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
     #[arg(long = "as", value_name = "SCENE")]
     stand_ins: Vec<String>,
-    /// Picture of both eyes for the page, LABEL=FILE (or FILE for a single trace)
+    /// EmbeddedPicture of both eyes for the page, LABEL=FILE (or FILE for a single trace)
     #[arg(long = "image", value_name = "LABEL=FILE")]
     images: Vec<String>,
     #[command(flatten)]
@@ -113,11 +113,17 @@ impl ExperimentArgs {
         Ok(())
     }
 
+    /// True where the page is to show pictures.
+    #[must_use]
+    pub fn has_pictures(&self) -> bool {
+        !self.images.is_empty()
+    }
+
     /// The pictures that were asked for, each with its trace's label.
     ///
     /// # Errors
     /// A label that no trace has, a file that is no picture.
-    pub fn pictures(&self, report: &PaperReport) -> Result<Vec<Picture>> {
+    pub fn pictures(&self, report: &PaperReport) -> Result<Vec<EmbeddedPicture>> {
         let known: Vec<&str> = report.traces.iter().map(|t| t.label.as_str()).collect();
         self.images
             .iter()
@@ -135,7 +141,7 @@ impl ExperimentArgs {
                     "--image {image}: expected one of {}, found {label}",
                     known.join(", ")
                 );
-                Picture::open(label, Path::new(path))
+                EmbeddedPicture::open(label, Path::new(path))
             })
             .collect()
     }
@@ -156,7 +162,7 @@ pub fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
 ///
 /// # Errors
 /// A plot that cannot be drawn, a file that cannot be written.
-pub fn write_page(report: &PaperReport, pictures: &[Picture], path: &Path) -> Result<()> {
+pub fn write_page(report: &PaperReport, pictures: &[EmbeddedPicture], path: &Path) -> Result<()> {
     let html = page::page(report, pictures)?;
     if !is_stdout(path) {
         let json = report.json()? + "\n";

@@ -1,13 +1,15 @@
 //! `replay info`: what a trace holds.
 
 use super::run::plain;
-use super::trace_file::{TraceFile, tiles};
-use crate::size::format_bytes;
+use super::tiles::{ray_tiles, tiles};
 use anyhow::Result;
+use formats::Trace;
 use formats::container::Container;
-use formats::raytrace::Raytrace;
-use formats::textrace::{Encoding, Textrace};
+use formats::raytrace::{RayKind, RayTile, Raytrace, RaytraceTables};
+use formats::textrace::{Encoding, Textrace, TraceMeta};
 use formats::texture::Texture;
+use formats::view::Eye;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -33,39 +35,56 @@ pub struct InfoArgs {
 /// # Errors
 /// The trace cannot be read.
 pub fn run(args: &InfoArgs) -> Result<ExitCode> {
-    let trace = TraceFile::open(&args.trace)?;
+    let trace = Trace::open(&args.trace)?;
     let value = to_json(&trace)?;
     super::print(&if args.json {
         serde_json::to_string_pretty(&value)?
     } else {
         match &trace {
-            TraceFile::Texture(trace) => texture_text(trace, &value),
-            TraceFile::Ray(trace) => ray_text(trace),
+            Trace::Texture(trace) => texture_text(trace, &value),
+            Trace::Ray(trace) => ray_text(trace)?,
         }
     })?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn to_json(trace: &TraceFile) -> Result<Value> {
+fn to_json(trace: &Trace) -> Result<Value> {
     let container = trace.container();
     let mut value = json!({
         "schema": SCHEMA,
         "kind": container.kind().to_string(),
-        "version": format!("{}.{}", container.version().0, container.version().1),
+        "version": version(container),
         "checksum": format!("{:08x}", container.file_checksum()),
         "file_bytes": container.file_bytes(),
         "chunks": chunks(container),
     });
-    if let TraceFile::Texture(trace) = trace {
-        let tables = trace.tables();
-        value["meta"] = serde_json::to_value(&tables.meta)?;
-        value["totals"] = totals(trace)?;
-        value["passes"] = passes(trace)?;
-        value["textures"] = serde_json::to_value(&tables.textures)?;
-        value["samplers"] = serde_json::to_value(&tables.samplers)?;
-        value["draws"] = serde_json::to_value(&tables.draws)?;
+    match trace {
+        Trace::Texture(trace) => {
+            let tables = trace.tables();
+            value["meta"] = serde_json::to_value(&tables.meta)?;
+            value["totals"] = totals(trace)?;
+            value["passes"] = passes(trace)?;
+            value["textures"] = serde_json::to_value(&tables.textures)?;
+            value["samplers"] = serde_json::to_value(&tables.samplers)?;
+            value["draws"] = serde_json::to_value(&tables.draws)?;
+        }
+        Trace::Ray(trace) => {
+            let tables = trace.tables();
+            let [left, right] = ray_counts(trace)?;
+            value["meta"] = serde_json::to_value(&tables.meta)?;
+            value["totals"] = json!({ "left": left.to_json(), "right": right.to_json() });
+            value["hierarchy"] = serde_json::to_value(&tables.bvh)?;
+            value["materials"] = serde_json::to_value(&tables.materials)?;
+            value["lights"] = serde_json::to_value(&tables.lights)?;
+            value["triangles"] = serde_json::to_value(&tables.triangles)?;
+        }
     }
     Ok(value)
+}
+
+fn version(container: &Container) -> String {
+    let (major, minor) = container.version();
+    format!("{major}.{minor}")
 }
 
 fn chunks(container: &Container) -> Vec<Value> {
@@ -142,17 +161,15 @@ fn passes(trace: &Textrace) -> Result<Value> {
     Ok(all.into())
 }
 
-fn texture_text(trace: &Textrace, value: &Value) -> String {
-    let meta = &trace.tables().meta;
-    let container = trace.container();
-    let totals = &value["totals"];
-    let mut text = format!(
-        "{}: {} {} ({}), {} bytes\nscene {}, {} triangles, camera {}, {} frame(s)\n\
+/// What the text says first, whatever the trace holds.
+fn heading(container: &Container, meta: &TraceMeta) -> String {
+    format!(
+        "{}: {} {} ({:08x}), {} bytes\nscene {}, {} triangles, camera {}, {} frame(s)\n\
          written by {} through {} ({})\ncommand {}\ndisplay {} ({}), {}x{} px an eye, IPD {} mm\n\n",
         container.file(),
         container.kind(),
-        value["version"].as_str().unwrap_or_default(),
-        value["checksum"].as_str().unwrap_or_default(),
+        version(container),
+        container.file_checksum(),
         container.file_bytes(),
         meta.scene,
         meta.scene_triangles,
@@ -167,7 +184,12 @@ fn texture_text(trace: &Textrace, value: &Value) -> String {
         meta.hmd.eye_size_px[0],
         meta.hmd.eye_size_px[1],
         meta.hmd.ipd_m * 1000.0,
-    );
+    )
+}
+
+fn texture_text(trace: &Textrace, value: &Value) -> String {
+    let totals = &value["totals"];
+    let mut text = heading(trace.container(), &trace.tables().meta);
     text += &pass_table(trace);
     text += "\n\n";
     text += &texture_table(&trace.tables().textures);
@@ -220,29 +242,144 @@ fn texture_table(textures: &[Texture]) -> String {
     table.to_string()
 }
 
-fn ray_text(trace: &Raytrace) -> String {
-    let container = trace.container();
-    let mut table = plain(&["chunk", "offset", "bytes"]);
-    for entry in container.directory() {
-        table.add_row([
-            entry.tag.to_string(),
-            entry.offset_bytes.to_string(),
-            entry.length_bytes.to_string(),
-        ]);
+/// Rays of one eye and what they cost.
+#[derive(Clone, Copy, Default)]
+struct RayCounts {
+    samples: u64,
+    hits: u64,
+    /// By [`RayKind`].
+    rays: [u64; 4],
+    steps: u64,
+    triangle_tests: u64,
+    alpha_tests: u64,
+    visits: u64,
+}
+
+const RAY_KINDS: [RayKind; 4] = [
+    RayKind::Primary,
+    RayKind::Shadow,
+    RayKind::Reflection,
+    RayKind::Refraction,
+];
+
+impl RayCounts {
+    fn of(tile: &RayTile) -> Self {
+        let mut counts = Self {
+            samples: tile.pixels.len() as u64,
+            hits: tile.pixels.iter().filter(|p| p.hit.is_some()).count() as u64,
+            visits: tile.visits.len() as u64,
+            ..Self::default()
+        };
+        for ray in &tile.rays {
+            counts.rays[ray.kind as usize] += 1;
+            counts.steps += u64::from(ray.steps);
+            counts.triangle_tests += u64::from(ray.triangle_tests);
+            counts.alpha_tests += u64::from(ray.alpha_tests);
+        }
+        counts
     }
-    let [columns, rows] = trace.tables().tiles();
-    format!(
-        "{}: {} {}.{} ({:08x}), {}\n2 x {columns}x{rows} tiles, {} materials, {} lights, {} triangles hit\n\n{table}\n",
-        container.file(),
-        container.kind(),
-        container.version().0,
-        container.version().1,
-        container.file_checksum(),
-        format_bytes(container.file_bytes()),
-        trace.tables().materials.len(),
-        trace.tables().lights.len(),
-        trace.tables().triangles.len(),
-    )
+
+    fn add(mut self, other: Self) -> Self {
+        self.samples += other.samples;
+        self.hits += other.hits;
+        self.rays = std::array::from_fn(|kind| self.rays[kind] + other.rays[kind]);
+        self.steps += other.steps;
+        self.triangle_tests += other.triangle_tests;
+        self.alpha_tests += other.alpha_tests;
+        self.visits += other.visits;
+        self
+    }
+
+    fn to_json(self) -> Value {
+        let by_kind = RAY_KINDS.map(|kind| (kind_name(kind), self.rays[kind as usize].into()));
+        json!({
+            "samples": self.samples,
+            "hits": self.hits,
+            "rays": serde_json::Map::from_iter(by_kind),
+            "steps": self.steps,
+            "triangle_tests": self.triangle_tests,
+            "alpha_tests": self.alpha_tests,
+            "visits": self.visits,
+        })
+    }
+}
+
+fn kind_name(kind: RayKind) -> String {
+    format!("{kind:?}").to_lowercase()
+}
+
+/// Counts of the left and of the right eye; every tile is decoded.
+fn ray_counts(trace: &Raytrace) -> Result<[RayCounts; 2]> {
+    let tiles: Vec<(Eye, u32)> = ray_tiles(trace.tables()).collect();
+    let of_tiles: Vec<RayCounts> = tiles
+        .par_iter()
+        .map_init(RayTile::default, |tile, (eye, index)| {
+            trace.decode_tile(*eye, *index, tile)?;
+            Ok(RayCounts::of(tile))
+        })
+        .collect::<formats::Result<_>>()?;
+    let of_eye = |wanted| {
+        let own = tiles
+            .iter()
+            .zip(&of_tiles)
+            .filter(|((eye, _), _)| *eye == wanted);
+        own.fold(RayCounts::default(), |sum, (_, counts)| sum.add(*counts))
+    };
+    Ok([Eye::Left, Eye::Right].map(of_eye))
+}
+
+fn ray_text(trace: &Raytrace) -> Result<String> {
+    let RaytraceTables {
+        meta,
+        bvh,
+        materials,
+        lights,
+        triangles,
+    } = trace.tables();
+    let mut text = heading(trace.container(), &meta.trace);
+    text += &format!(
+        "hierarchy by {}, walked as {}: {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}, \
+         {} bytes a node, {} a triangle\n{} sample(s) a pixel, reflections {} deep, visits {}\n\n",
+        bvh.builder,
+        format!("{:?}", bvh.traversal).to_lowercase(),
+        bvh.triangles,
+        bvh.nodes,
+        bvh.leaves,
+        bvh.depth,
+        bvh.sah_cost,
+        bvh.bytes_per_node,
+        bvh.bytes_per_triangle,
+        meta.samples_per_px,
+        meta.max_depth,
+        if meta.has_visits {
+            "listed"
+        } else {
+            "not listed"
+        },
+    );
+    let mut headings = vec!["eye".to_owned(), "samples".to_owned(), "hits".to_owned()];
+    headings.extend(RAY_KINDS.map(kind_name));
+    headings.extend(["steps a ray".to_owned(), "tests a ray".to_owned()]);
+    let mut table = plain(&headings.iter().map(String::as_str).collect::<Vec<_>>());
+    for (eye, counts) in ["left", "right"].into_iter().zip(ray_counts(trace)?) {
+        let rays = counts.rays.iter().sum::<u64>().max(1) as f64;
+        let mut row = vec![
+            eye.to_owned(),
+            counts.samples.to_string(),
+            counts.hits.to_string(),
+        ];
+        row.extend(counts.rays.map(|n| n.to_string()));
+        row.push(format!("{:.2}", counts.steps as f64 / rays));
+        row.push(format!("{:.2}", counts.triangle_tests as f64 / rays));
+        table.add_row(row);
+    }
+    text += &format!(
+        "{table}\n\n{} materials, {} lights, {} triangles hit\n",
+        materials.len(),
+        lights.len(),
+        triangles.len(),
+    );
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -255,7 +392,7 @@ mod tests {
     fn totals_are_the_sums_over_the_trace() {
         let memory = Synthetic::default().generate();
         let file = file_of(&memory);
-        let value = to_json(&TraceFile::open(file.path()).unwrap()).unwrap();
+        let value = to_json(&Trace::open(file.path()).unwrap()).unwrap();
         let records: usize = memory.tiles.iter().flatten().map(|t| t.records.len()).sum();
         assert_eq!(value["totals"]["records"], records);
         let by_pass = value["passes"].as_array().unwrap();
@@ -271,8 +408,8 @@ mod tests {
     fn the_text_names_every_texture() {
         let memory = Synthetic::default().generate();
         let file = file_of(&memory);
-        let trace = TraceFile::open(file.path()).unwrap();
-        let TraceFile::Texture(textures) = &trace else {
+        let trace = Trace::open(file.path()).unwrap();
+        let Trace::Texture(textures) = &trace else {
             panic!("a texture trace");
         };
         let text = texture_text(textures, &to_json(&trace).unwrap());

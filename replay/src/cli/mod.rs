@@ -14,7 +14,7 @@ mod subjects;
 mod sweep;
 #[cfg(test)]
 mod testing;
-mod trace_file;
+mod tiles;
 pub mod validate;
 
 pub use config_args::ConfigArgs;
@@ -55,7 +55,7 @@ enum Command {
     Info(info::InfoArgs),
     /// Check every checksum and invariant of a trace.
     Validate(validate::ValidateArgs),
-    /// Print decoded quad records as JSON Lines.
+    /// Print decoded records, quads or rays, as JSON Lines.
     Dump(dump::DumpArgs),
     /// Print the first difference between two traces.
     Diff(diff::DiffArgs),

@@ -4,8 +4,8 @@ use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
 use crate::files::write_atomically;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::tables;
-use anyhow::Result;
-use shell::Output;
+use anyhow::{Result, ensure};
+use shell::{Output, is_stdout};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -26,7 +26,7 @@ pub struct Args {
     /// Print one JSON object (schema replay.paper/1)
     #[arg(long)]
     json: bool,
-    /// Also write the rows as CSV
+    /// Also write the rows as CSV; - writes them to standard output in place of the table
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Also write the report page, with JSON and CSV beside it
@@ -40,6 +40,10 @@ pub struct Args {
 /// Wrong arguments, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let page = args.html.is_some();
+    ensure!(
+        page || !args.experiment.has_pictures(),
+        "--image: the page shows it; add --html"
+    );
     let mut outputs: Vec<Output> = Vec::new();
     outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
     outputs.extend(
@@ -47,6 +51,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .iter()
             .flat_map(|path| page_outputs("--html", path)),
     );
+    outputs.extend(args.json.then(|| Output::result("--json")));
+    let prints = !args
+        .csv
+        .iter()
+        .chain(&args.html)
+        .any(|path| is_stdout(path));
     let functional = args.functional || page;
     args.experiment.run(&outputs, functional, page, |report| {
         if let Some(path) = &args.csv {
@@ -55,11 +65,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         if let Some(path) = &args.html {
             write_page(report, &args.experiment.pictures(report)?, path)?;
         }
-        super::print(&if args.json {
-            report.json()?
-        } else {
-            text(report)
-        })
+        if prints {
+            super::print(&if args.json {
+                report.json()?
+            } else {
+                text(report)
+            })?;
+        }
+        Ok(())
     })
 }
 

@@ -26,13 +26,13 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     /// Also count by tile (in the JSON)
-    #[arg(long)]
+    #[arg(long, requires = "json")]
     tiles: bool,
     /// Replay in both modes and print the difference
     #[arg(long, conflicts_with = "mode")]
     compare_modes: bool,
     /// Print the whole configuration as TOML and stop
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["json", "compare_modes"])]
     print_config: bool,
     #[command(flatten)]
     threads: shell::Threads,

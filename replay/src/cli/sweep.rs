@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     /// Print the points and stop
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["json", "out"])]
     plan: bool,
     #[command(flatten)]
     threads: shell::Threads,

@@ -1,11 +1,10 @@
 //! `replay validate`: every checksum and invariant of a trace.
 
-use super::trace_file::{TraceFile, tiles};
+use super::tiles::{ray_tiles, tiles};
 use anyhow::Result;
-use formats::FormatError;
 use formats::raytrace::RayTile;
 use formats::textrace::Tile;
-use formats::view::Eye;
+use formats::{FormatError, Trace};
 use rayon::prelude::*;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -44,42 +43,36 @@ pub fn run(args: &ValidateArgs) -> Result<ExitCode> {
     }
 }
 
+/// Opening checks everything but what the tiles hold, and decoding the rest: whoever reads a
+/// trace does both.
 fn validate(path: &std::path::Path) -> formats::Result<String> {
-    let trace = TraceFile::open(path)?;
+    let trace = Trace::open(path)?;
     let container = trace.container();
-    let (tile_count, items, what) = match &trace {
-        TraceFile::Texture(trace) => {
+    // Tiles are decoded in parallel, but the first bad one is the first in the file.
+    let (counts, what): (Vec<formats::Result<u64>>, _) = match &trace {
+        Trace::Texture(trace) => {
             let tiles: Vec<_> = tiles(&trace.tables().passes).collect();
-            // In parallel, but the first bad tile is the first in the file.
             let records = tiles
                 .par_iter()
                 .map_init(Tile::default, |tile, (pass, index)| {
                     trace.decode_tile(*pass, *index, tile)?;
                     Ok(tile.records.len() as u64)
                 });
-            let records = records.collect::<Vec<formats::Result<u64>>>();
-            (tiles.len(), total(records)?, "records")
+            (records.collect(), "records")
         }
-        TraceFile::Ray(trace) => {
-            let count = trace.tables().tile_count();
-            let tiles: Vec<_> = [Eye::Left, Eye::Right]
-                .into_iter()
-                .flat_map(|eye| (0..count).map(move |tile| (eye, tile)))
-                .collect();
+        Trace::Ray(trace) => {
+            let tiles: Vec<_> = ray_tiles(trace.tables()).collect();
             let rays = tiles
                 .par_iter()
                 .map_init(RayTile::default, |tile, (eye, index)| {
                     trace.decode_tile(*eye, *index, tile)?;
                     Ok(tile.rays.len() as u64)
                 });
-            let rays = rays.collect::<Vec<formats::Result<u64>>>();
-            (tiles.len(), total(rays)?, "rays")
+            (rays.collect(), "rays")
         }
     };
-    // Last, since a tile's own checksum says more closely where the damage is.
-    for entry in container.directory() {
-        container.chunk(entry.tag)?;
-    }
+    let tile_count = counts.len();
+    let items: u64 = counts.into_iter().sum::<formats::Result<_>>()?;
     Ok(format!(
         "{}: valid {} {}.{}, {} chunks, {tile_count} tiles, {items} {what}, {} bytes",
         container.file(),
@@ -89,8 +82,4 @@ fn validate(path: &std::path::Path) -> formats::Result<String> {
         container.directory().len(),
         container.file_bytes(),
     ))
-}
-
-fn total(counts: Vec<formats::Result<u64>>) -> formats::Result<u64> {
-    counts.into_iter().sum()
 }

@@ -32,7 +32,7 @@ pub fn summary(
     };
     let all = sums(vec![String::new()], |_| 0).remove(0);
     let deepest = tables.textures.iter().map(|t| t.levels as usize).max();
-    let level_names = (0..deepest.unwrap_or(0).min(Bins::LEVELS)).map(|l| format!("level {l}"));
+    let level_names = (0..deepest.unwrap_or(0)).map(|l| format!("level {l}"));
     let mut by_view = sums(bins.view_names().map(str::to_owned).to_vec(), |c| c.view);
     let mut shown = (0..).map(|view| bins.has_view(view));
     by_view.retain(|_| shown.next() == Some(true));

@@ -49,12 +49,12 @@ impl ExperimentFile {
         let line_at = |offset: usize| 1 + text.bytes().take(offset).filter(|b| *b == b'\n').count();
         let document = DeTable::parse(text).map_err(|e| PlanError::Syntax {
             line: line_at(e.span().map_or(0, |s| s.start)),
-            message: e.message().to_owned(),
+            message: brief(e.message()),
         })?;
         Self::read(document.get_ref()).map_err(|fault| PlanError::Key {
             line: line_at(fault.offset),
-            key: fault.key,
-            message: fault.message,
+            key: brief(&fault.key),
+            message: brief(&fault.message),
         })
     }
 
@@ -128,6 +128,15 @@ impl ExperimentFile {
     }
 }
 
+/// The beginning of a text that may repeat a whole file.
+fn brief(text: &str) -> String {
+    const LONGEST_CHARS: usize = 500;
+    match text.char_indices().nth(LONGEST_CHARS) {
+        Some((end, _)) => format!("{}\u{2026}", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
 /// The axes of a section, in the order of the file, every value checked against the base.
 fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
     let axis = |key: &str, value: &DeValue| {
@@ -139,10 +148,7 @@ fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
                 ));
             }
             Value::Array(values) if !values.is_empty() => values,
-            other => {
-                let found = other.to_string();
-                return Err(format!("expected a list of values, found {found:.60}"));
-            }
+            other => return Err(format!("expected a list of values, found {other}")),
         };
         let mut table = base.clone();
         for value in &values {

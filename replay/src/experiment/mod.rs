@@ -19,4 +19,6 @@ pub use store::{POINT_SCHEMA, Store, StoredPoint, point_key};
 pub use subject::{Subject, frame_count, has_shadow_maps, labels};
 
 #[cfg(test)]
+mod mutations;
+#[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Rendered pictures that a page carries with it.
 
-use super::plots::data_uri::base64;
+use super::plots::data_uri;
 use anyhow::Context;
 use image::ImageReader;
 use image::codecs::jpeg::JpegEncoder;
@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// A picture of both eyes, re-encoded small enough for a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct EmbeddedPicture {
     /// Label of the trace that it belongs to.
     pub label: String,
     /// Width and height in pixels.
@@ -20,7 +20,7 @@ pub struct Picture {
 const WIDEST_PX: u32 = 1200;
 const JPEG_QUALITY: u8 = 85;
 
-impl Picture {
+impl EmbeddedPicture {
     /// Reads a PNG or JPEG file.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ impl Picture {
     /// The picture as a `data:` address.
     #[must_use]
     pub fn data_uri(&self) -> String {
-        format!("data:image/jpeg;base64,{}", base64(&self.jpeg))
+        data_uri::jpeg(&self.jpeg)
     }
 }
 
@@ -77,7 +77,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("both.png");
         image::RgbImage::new(1920, 1080).save(&path).unwrap();
-        let picture = Picture::open("atrium", &path).unwrap();
+        let picture = EmbeddedPicture::open("atrium", &path).unwrap();
         assert_eq!(picture.size_px, [1200, 675]);
         assert!(
             picture
@@ -92,7 +92,7 @@ mod tests {
         let path = folder.path().join("x.png");
         std::fs::write(&path, "no").unwrap();
         assert!(
-            Picture::open("x", &path)
+            EmbeddedPicture::open("x", &path)
                 .unwrap_err()
                 .to_string()
                 .contains("x.png: not a picture")

@@ -3,6 +3,7 @@
 use super::Accesses;
 use crate::order::TileRef;
 use formats::textrace::Tables;
+use formats::textrace::tables::MAX_TEXTURE_SIZE;
 use formats::view::Eye;
 
 /// Left, right, and passes that belong to no eye.
@@ -39,8 +40,8 @@ pub struct Cell {
 }
 
 impl Bins {
-    /// Levels kept apart; a texture of 32768 texels has 16.
-    pub const LEVELS: usize = 16;
+    /// Levels of the largest texture that a trace can have.
+    pub const LEVELS: usize = MAX_TEXTURE_SIZE.ilog2() as usize + 1;
 
     /// Bins for the textures and passes of a trace.
     #[must_use]
@@ -119,9 +120,7 @@ impl Bins {
 
     #[inline(always)]
     pub(super) fn cell(&self, place: Place, texture: u32, level: u8) -> usize {
-        place.first_cell
-            + texture as usize * Self::LEVELS
-            + usize::from(level).min(Self::LEVELS - 1)
+        place.first_cell + texture as usize * Self::LEVELS + usize::from(level)
     }
 }
 

@@ -7,7 +7,7 @@ use formats::textrace::{
     UvGroup,
 };
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
-use formats::view::{Eye, FovTangents, Hmd, TILE_SIZE_PX};
+use formats::view::{Eye, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
 
 /// What to generate.
 #[derive(Clone, Copy, Debug)]
@@ -139,7 +139,7 @@ impl Synthetic {
                     ipd_m: 0.064,
                     cant_deg: 0.0,
                 },
-                frames: Vec::new(),
+                frames: vec![FrameViews::default()],
             },
             textures: (0..self.materials * self.textures)
                 .map(|i| {

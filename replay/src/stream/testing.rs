@@ -41,7 +41,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
                 ipd_m: 0.064,
                 cant_deg: 0.0,
             },
-            frames: Vec::new(),
+            frames: vec![formats::view::FrameViews::default()],
         },
         textures: sizes
             .iter()

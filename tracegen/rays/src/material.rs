@@ -3,7 +3,7 @@
 use super::soup::{Attributes, Soup};
 use super::texture::{Pyramid, fast_log2};
 use formats::raytrace::RayMaterial;
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
 
@@ -11,6 +11,9 @@ use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
 const GLOSSY_ROUGHNESS: f32 = 0.7;
 /// Smoother metals mirror their surroundings.
 const MIRROR_ROUGHNESS: f32 = 0.35;
+
+/// Alpha from which a blended surface stops a ray that looks for its closest hit.
+const BLEND_STOPS_FROM: f32 = 1.0 / 255.0;
 
 /// Smoother dielectrics do, as far as Fresnel's law goes.
 const POLISHED_ROUGHNESS: f32 = 0.15;
@@ -41,6 +44,9 @@ pub struct Surface {
     /// Emitted radiance.
     pub emissive: Vec3,
 }
+
+/// A primitive and the weights of its second and third vertex.
+type Hit = (u32, [f32; 2]);
 
 /// Materials and their textures.
 pub struct Materials {
@@ -84,7 +90,7 @@ impl Materials {
     pub fn surface(&self, material: usize, at: &Attributes, footprint_m: f32) -> Surface {
         let m = &self.materials[material];
         let sample = |t: &Option<TextureRef>| self.sample(t.as_ref(), at, footprint_m);
-        let base = m.base_color * sample(&m.base_color_texture).unwrap_or(Vec4::ONE);
+        let base = m.base_color * at.color * sample(&m.base_color_texture).unwrap_or(Vec4::ONE);
         let rough_metal = sample(&m.metallic_roughness_texture).unwrap_or(Vec4::ONE);
         let roughness = (m.roughness * rough_metal.y).clamp(0.0, 1.0);
         let metallic = (m.metallic * rough_metal.z).clamp(0.0, 1.0);
@@ -117,23 +123,32 @@ impl Materials {
     }
 
     /// Alpha of a masked or blended material at full resolution.
-    fn alpha(&self, material: &Material, uv: impl Fn(u32) -> Vec2) -> f32 {
+    fn alpha(&self, material: &Material, scene: &Scene, soup: &Soup, hit: Hit) -> f32 {
+        let (primitive, bary) = hit;
         let texel = material.base_color_texture.as_ref().and_then(|t| {
             let pyramid = self.pyramids.get(t.image)?.as_ref()?;
-            Some(pyramid.sample(t, uv(t.uv_set), 0.0, self.srgb).w)
+            let uv = soup.uv(scene, primitive, bary, t.uv_set);
+            Some(pyramid.sample(t, uv, 0.0, self.srgb).w)
         });
-        material.base_color.w * texel.unwrap_or(1.0)
+        // As in the raster capture, where a mask without a texture is decided once for a draw.
+        let constant = texel.is_none() && material.alpha != AlphaMode::Blend;
+        let vertex = if constant {
+            1.0
+        } else {
+            soup.vertex_alpha(scene, primitive, bary)
+        };
+        material.base_color.w * vertex * texel.unwrap_or(1.0)
     }
 
     /// True where the surface stops a ray that looks for its closest hit.
     #[must_use]
     pub fn stops(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
         let material = &self.materials[soup.material(scene, primitive)];
-        let uv = |set| soup.uv(scene, primitive, bary, set);
+        let alpha = || self.alpha(material, scene, soup, (primitive, bary));
         match material.alpha {
             AlphaMode::Opaque => true,
-            AlphaMode::Mask(cutoff) => self.alpha(material, uv) >= cutoff,
-            AlphaMode::Blend => self.alpha(material, uv) >= 1.0 / 255.0,
+            AlphaMode::Mask(cutoff) => alpha() >= cutoff,
+            AlphaMode::Blend => alpha() >= BLEND_STOPS_FROM,
         }
     }
 
@@ -141,12 +156,12 @@ impl Materials {
     #[must_use]
     pub fn shades(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
         let material = &self.materials[soup.material(scene, primitive)];
-        let uv = |set| soup.uv(scene, primitive, bary, set);
+        let alpha = || self.alpha(material, scene, soup, (primitive, bary));
         match material.alpha {
             _ if material.transmission > 0.5 => false,
             AlphaMode::Opaque => true,
-            AlphaMode::Mask(cutoff) => self.alpha(material, uv) >= cutoff,
-            AlphaMode::Blend => self.alpha(material, uv) >= 0.5,
+            AlphaMode::Mask(cutoff) => alpha() >= cutoff,
+            AlphaMode::Blend => alpha() >= 0.5,
         }
     }
 
@@ -213,6 +228,34 @@ fn describe(m: &Material) -> RayMaterial {
         mirror: m.mirror > 0.0 || metal || polished,
         glass,
         glossy,
-        alpha_masked: matches!(m.alpha, AlphaMode::Mask(_)),
+        alpha_masked: match m.alpha {
+            AlphaMode::Opaque => false,
+            AlphaMode::Mask(_) => true,
+            AlphaMode::Blend => m.base_color_texture.is_some() || m.base_color.w < BLEND_STOPS_FROM,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_blended_texture_may_let_a_ray_pass_as_a_mask_may() {
+        let masked = |alpha, alpha_factor: f32, textured: bool| {
+            let material = Material {
+                alpha,
+                base_color: Vec4::new(1.0, 1.0, 1.0, alpha_factor),
+                base_color_texture: textured.then(|| TextureRef::new(0)),
+                ..Material::default()
+            };
+            describe(&material).alpha_masked
+        };
+        assert!(masked(AlphaMode::Blend, 1.0, true));
+        assert!(masked(AlphaMode::Blend, 0.001, false));
+        assert!(masked(AlphaMode::Mask(0.5), 1.0, true));
+        // An even veil stops every ray.
+        assert!(!masked(AlphaMode::Blend, 0.5, false));
+        assert!(!masked(AlphaMode::Opaque, 1.0, true));
     }
 }

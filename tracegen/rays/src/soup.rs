@@ -1,6 +1,6 @@
 //! A scene as one list of world-space triangles, with a way back to the mesh of each.
 
-use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3};
+use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
 use scene::{Mesh, Scene};
 
 /// All triangles of all instances, in submission order, relative to `origin`.
@@ -29,6 +29,8 @@ pub struct Attributes {
     pub shading_normal: Vec3,
     /// Texture coordinates of both sets.
     pub uv: [Vec2; 2],
+    /// Linear vertex colour with alpha; white where the mesh has none.
+    pub color: Vec4,
     /// Areas of the triangle in each texture set per area in the world.
     pub uv_density: [f32; 2],
 }
@@ -121,6 +123,7 @@ impl Soup {
             geometric_normal,
             shading_normal,
             uv: [uv0, uv1],
+            color: color(mesh, corners, weights),
             uv_density: [density0, density1],
         }
     }
@@ -135,6 +138,19 @@ impl Soup {
         let [p, q, r] = corners(mesh, triangle, self.mirrored[object])
             .map(|v| uvs.get(v).copied().unwrap_or_default());
         p * (1.0 - bary[0] - bary[1]) + q * bary[0] + r * bary[1]
+    }
+
+    /// Alpha of the vertex colour; 1 where the mesh has none.
+    #[must_use]
+    pub fn vertex_alpha(&self, scene: &Scene, primitive: u32, bary: [f32; 2]) -> f32 {
+        let object = self.objects[primitive as usize] as usize;
+        let mesh = &scene.meshes[scene.instances[object].mesh];
+        if mesh.colors.is_empty() {
+            return 1.0;
+        }
+        let triangle = (primitive - self.first_of_object[object]) as usize;
+        let corners = corners(mesh, triangle, self.mirrored[object]);
+        color(mesh, corners, [1.0 - bary[0] - bary[1], bary[0], bary[1]]).w
     }
 
     /// Material of a primitive.
@@ -153,4 +169,14 @@ fn corners(mesh: &Mesh, triangle: usize, mirrored: bool) -> [usize; 3] {
     } else {
         [at(0), at(1), at(2)]
     }
+}
+
+/// The vertex colours of three corners, weighted.
+fn color(mesh: &Mesh, corners: [usize; 3], weights: [f32; 3]) -> Vec4 {
+    if mesh.colors.is_empty() {
+        return Vec4::ONE;
+    }
+    (corners.into_iter().zip(weights))
+        .map(|(v, weight)| mesh.colors.get(v).copied().unwrap_or(Vec4::ONE) * weight)
+        .sum()
 }

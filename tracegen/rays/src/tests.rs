@@ -1,7 +1,9 @@
 //! The tracer on a small scene with every kind of material.
 
 use super::frame::{Frame, trace_frame};
+use super::material::Materials;
 use super::scene::TraceScene;
+use super::soup::Soup;
 use super::tracer::{TraceSettings, Tracer};
 use crate::reference::TestMesh;
 use formats::raytrace::{
@@ -313,4 +315,41 @@ fn a_white_room_without_lights_is_as_bright_as_its_sky() {
     for pixel in frame.images[0].pixels.iter().skip(72 * 40) {
         assert!((*pixel - Vec3::ONE).abs().max_element() < 2e-3, "{pixel}");
     }
+}
+
+#[test]
+fn vertex_colours_multiply_the_base_colour_at_the_hit() {
+    let mut mesh = floor(0);
+    let (red, clear) = (Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 0.0, 1.0, 0.0));
+    mesh.colors = vec![red, Vec4::ONE, clear, Vec4::ONE];
+    let plain = floor(0);
+    let veil = Material {
+        base_color: Vec4::new(0.5, 1.0, 0.5, 1.0),
+        alpha: AlphaMode::Blend,
+        ..material("veil")
+    };
+    let scene = Scene {
+        meshes: vec![mesh, plain],
+        instances: [0, 1]
+            .map(|mesh| Instance {
+                mesh,
+                transform: Affine3A::IDENTITY,
+            })
+            .to_vec(),
+        materials: vec![veil],
+        ..Scene::default()
+    };
+    let (soup, materials) = (Soup::new(&scene), Materials::new(&scene).unwrap());
+    let albedo = |primitive, bary| {
+        let at = soup.attributes(&scene, primitive, bary);
+        let surface = materials.surface(0, &at, 0.0);
+        surface.albedo.extend(surface.alpha)
+    };
+    // Corners of the first triangle: red, white, blue and clear.
+    assert_eq!(albedo(0, [0.0, 0.0]), Vec4::new(0.5, 0.0, 0.0, 1.0));
+    assert_eq!(albedo(0, [0.0, 1.0]), Vec4::new(0.0, 0.0, 0.5, 0.0));
+    assert_eq!(albedo(0, [0.0, 0.5]), Vec4::new(0.25, 0.0, 0.25, 0.5));
+    assert_eq!(albedo(2, [0.0, 0.5]), Vec4::new(0.5, 1.0, 0.5, 1.0));
+    let stops = |primitive, bary| materials.stops(&scene, &soup, primitive, bary);
+    assert!(stops(0, [0.0, 0.0]) && !stops(0, [0.0, 1.0]) && stops(2, [0.0, 1.0]));
 }

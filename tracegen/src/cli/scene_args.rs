@@ -45,7 +45,8 @@ impl SceneArgs {
         outputs.extend(image.map(|image| Output::binary("--image", image)));
         // The names of built-in scenes have no extension and name no file.
         let scene = Path::new(&self.scene);
-        shell::check_outputs(&outputs, scene.extension().map(|_| scene))
+        shell::check_outputs(&outputs, scene.extension().map(|_| scene))?;
+        Ok(())
     }
 
     /// Loads the scene (its warnings go to stderr) and works out the views.
@@ -98,8 +99,8 @@ pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
 pub fn warn_of_nothing_seen(camera: &Camera, (low, high): (Vec3, Vec3)) {
     let Camera { eye, target, .. } = camera;
     shell::warn(&format!(
-        "nothing of the scene is seen from {eye} towards {target} (camera {}); the scene reaches \
-         from {low} to {high} m: choose another --camera, or --eye and --target",
+        "nothing of the scene is seen from {eye:.2} towards {target:.2} (camera {}); it reaches \
+         from {low:.2} to {high:.2} m: choose another --camera, or --eye and --target",
         camera.name
     ));
 }

@@ -66,6 +66,16 @@ impl<'a> BitReader<'a> {
         self.bit += count as usize;
     }
 
+    /// The bits between the last one read and the end of its byte.
+    pub(super) fn left_in_byte(&self) -> u8 {
+        let byte = self.bytes.get(self.bit >> 3).copied().unwrap_or_default();
+        if self.bit & 7 == 0 {
+            0
+        } else {
+            byte >> (self.bit & 7)
+        }
+    }
+
     /// The bytes that no read bit lies in.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.bit.div_ceil(8)..).unwrap_or_default()

@@ -54,6 +54,12 @@ pub(super) fn decode<'a>(
     let rest = bits.rest();
     ensure(
         rest,
+        bits.left_in_byte() == 0,
+        || "zero bits after the last record".to_owned(),
+        format_args!("{:#b}", bits.left_in_byte()),
+    )?;
+    ensure(
+        rest,
         rest.len() == PADDING_BYTES && rest.iter().all(|byte| *byte == 0),
         || format!("{PADDING_BYTES} zero bytes after the last record"),
         format_args!("{} bytes", rest.len()),

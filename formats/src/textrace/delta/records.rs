@@ -15,6 +15,7 @@
 use super::bits::{BitReader, BitWriter, PEEK_BITS};
 use super::predict::{Context, Derivatives, Pair, split};
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile, quad_morton};
+use crate::varint::{low_u32, unzigzag, zigzag};
 use std::num::Wrapping;
 
 /// Bits of the control word.
@@ -222,26 +223,16 @@ fn take(bits: &mut BitReader<'_>, width: u32, guess: Pair) -> Option<Pair> {
     Some([guess_u + unfold(low_u32(u)), guess_v + unfold(low_u32(v))])
 }
 
-/// Zigzag: small numbers of either sign become small unsigned ones.
+/// What the prediction leaves over, as it is stored.
 fn residual(actual: Pair, guess: Pair) -> [u32; 2] {
-    let fold = |number: i32| ((number << 1) ^ (number >> 31)).cast_unsigned();
+    let fold = |number: Wrapping<i32>| low_u32(zigzag(number.0.into()));
     let ([a, b], [c, d]) = (actual, guess);
-    [fold((a - c).0), fold((b - d).0)]
-}
-
-/// The lowest 32 bits.
-#[inline(always)]
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "a 32-bit field leaves later fields above it, which do not belong to it"
-)]
-fn low_u32(bits: u64) -> u32 {
-    bits as u32
+    [fold(a - c), fold(b - d)]
 }
 
 #[inline(always)]
 fn unfold(value: u32) -> Wrapping<i32> {
-    Wrapping((value >> 1).cast_signed() ^ -((value & 1).cast_signed()))
+    Wrapping(low_u32(unzigzag(value.into()).cast_unsigned()).cast_signed())
 }
 
 /// The smallest width code that holds `value`.

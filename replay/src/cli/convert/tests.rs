@@ -30,7 +30,14 @@ fn small() -> MemoryTrace {
     .generate()
 }
 
-fn din(trace: &Textrace, config: &RunConfig, granularity: &str) -> Vec<u64> {
+fn textures(trace: &Trace) -> &Textrace {
+    match trace {
+        Trace::Texture(trace) => trace,
+        Trace::Ray(_) => panic!("a texture trace"),
+    }
+}
+
+fn din(trace: &Trace, config: &RunConfig, granularity: &str) -> Vec<u64> {
     let args = parse(&["--to", "din", "--granularity", granularity]);
     let mut text = Vec::new();
     write_accesses(trace, config, &args, &mut text).unwrap();
@@ -43,7 +50,7 @@ fn din(trace: &Textrace, config: &RunConfig, granularity: &str) -> Vec<u64> {
 fn din_holds_the_look_ups_that_run_counts() {
     let memory = small();
     let file = file_of(&memory);
-    let trace = Textrace::open(file.path()).unwrap();
+    let trace = Trace::open(file.path()).unwrap();
     for order in [Order::MORTON, Order::Z2_STA, Order::Z2_STA_MERGE] {
         for line_bytes in [16, 64] {
             let config = RunConfig {
@@ -52,7 +59,7 @@ fn din_holds_the_look_ups_that_run_counts() {
                 line_bytes,
                 ..RunConfig::default()
             };
-            let result = replay(&trace, &config).unwrap();
+            let result = replay(textures(&trace), &config).unwrap();
             let addresses = din(&trace, &config, "line");
             assert_eq!(addresses.len() as u64, result.l1.counters.line_lookups);
             let distinct: HashSet<u64> = addresses.iter().copied().collect();
@@ -70,7 +77,7 @@ fn din_holds_the_look_ups_that_run_counts() {
 #[test]
 fn every_order_writes_the_same_accesses() {
     let file = file_of(&small());
-    let trace = Textrace::open(file.path()).unwrap();
+    let trace = Trace::open(file.path()).unwrap();
     let sorted = |order| {
         let config = RunConfig {
             order,
@@ -90,7 +97,7 @@ fn every_order_writes_the_same_accesses() {
 #[test]
 fn csv_and_json_lines_have_a_line_an_access() {
     let file = file_of(&small());
-    let trace = Textrace::open(file.path()).unwrap();
+    let trace = Trace::open(file.path()).unwrap();
     let config = RunConfig::default();
     let accesses = din(&trace, &config, "line").len();
     for (target, header) in [("csv", 1), ("jsonl", 0)] {

@@ -8,26 +8,13 @@ use super::{
 use crate::report::theme;
 use plotters::prelude::Color;
 
-/// How a series' points are joined.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How a series' points are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
-    /// A line through the points.
-    #[default]
+    /// A thin line through the points, named at its end.
     Line,
-    /// A thin line, for references and contours.
-    ThinLine,
-    /// A line with a dot at each point.
-    LineAndDots,
-    /// Dots only.
+    /// A cloud of dots.
     Dots,
-    /// Hollow dots only, for published values.
-    Rings,
-}
-
-impl Mark {
-    fn is_cloud(self) -> bool {
-        matches!(self, Self::Dots | Self::Rings)
-    }
 }
 
 /// One series.
@@ -48,8 +35,6 @@ pub struct Axis {
     pub label: String,
     /// Ends of the axis; `None` takes them from the data.
     pub range: Option<(f64, f64)>,
-    /// Logarithmic to base 2 (sizes) with ticks at powers of two.
-    pub log2: bool,
 }
 
 impl Axis {
@@ -106,12 +91,11 @@ impl LineChart {
     /// The chart as SVG.
     ///
     /// # Errors
-    /// A point that is not finite, or one at or below 0 on a logarithmic axis.
+    /// A point that is not finite.
     pub fn svg(&self) -> Result<String, PlotError> {
         for series in &self.series {
             for &(x, y) in &series.points {
-                let fits = |v: f64, axis: &Axis| v.is_finite() && (!axis.log2 || v > 0.0);
-                if !fits(x, &self.x) || !fits(y, &self.y) {
+                if !x.is_finite() || !y.is_finite() {
                     return Err(PlotError {
                         title: self.title.clone(),
                         problem: format!(
@@ -194,7 +178,7 @@ impl LineChart {
         let named: Vec<(&LineSeries, (f64, f64))> = self
             .series
             .iter()
-            .filter(|s| !s.style.name.is_empty() && !s.mark.is_cloud())
+            .filter(|s| !s.style.name.is_empty() && s.mark == Mark::Line)
             .filter_map(|s| {
                 let end = s
                     .points
@@ -222,15 +206,11 @@ impl LineChart {
     fn legend(&self) -> Vec<LegendEntry<'_>> {
         self.series
             .iter()
-            .filter(|s| s.mark.is_cloud() && !s.style.name.is_empty())
+            .filter(|s| s.mark == Mark::Dots && !s.style.name.is_empty())
             .map(|s| LegendEntry {
                 name: &s.style.name,
                 color: s.style.color,
-                symbol: if s.mark == Mark::Rings {
-                    Symbol::Ring
-                } else {
-                    Symbol::Dot
-                },
+                symbol: Symbol::Dot,
             })
             .collect()
     }
@@ -266,19 +246,13 @@ fn paint(area: &super::Area, series: &LineSeries, layout: &Layout) -> Result<(),
         .iter()
         .map(|&(x, y)| (layout.x.at(x), layout.y.at(y)))
         .collect();
+    let color = series.style.color;
     match series.mark {
-        Mark::Line | Mark::LineAndDots => {
-            stroke(area, &points, series.style.color, theme::LINE_PX)?
-        }
-        Mark::ThinLine => stroke(area, &points, series.style.color, 1)?,
-        Mark::Dots | Mark::Rings => {}
+        Mark::Line => stroke(area, &points, color, 1),
+        Mark::Dots => points
+            .iter()
+            .try_for_each(|&at| dot(area, at, color.filled())),
     }
-    let symbol = match series.mark {
-        Mark::LineAndDots | Mark::Dots => series.style.color.filled(),
-        Mark::Rings => series.style.color.stroke_width(theme::LINE_PX),
-        Mark::Line | Mark::ThinLine => return Ok(()),
-    };
-    points.iter().try_for_each(|&at| dot(area, at, symbol))
 }
 
 /// The scale of an axis and its ticks.
@@ -294,22 +268,6 @@ fn fit(
             })
             .unwrap_or((0.0, 1.0))
     });
-    if axis.log2 {
-        let first = low.log2().floor() as i32;
-        let last = (high.log2().ceil() as i32).max(first + 1);
-        let every = ((last - first) / 8).max(1) as usize;
-        let at = (first..=last)
-            .step_by(every)
-            .map(|e| {
-                let value = f64::from(e).exp2();
-                (value, theme::tick_label(value, value.min(1.0)))
-            })
-            .collect();
-        return (
-            Scale::log(f64::from(first).exp2(), f64::from(last).exp2(), from, to),
-            at,
-        );
-    }
     let mut step = theme::nice_step((high - low).max(high.abs() * 1e-3), 5);
     let (mut low, mut high) = (low, high);
     if axis.range.is_none() {
@@ -335,15 +293,11 @@ mod tests {
         let series = |name: &str, i, end: f64| LineSeries {
             style: SeriesStyle::nth(name, i),
             points: vec![(8.0, 20.0), (16.0, end)],
-            mark: Mark::LineAndDots,
+            mark: Mark::Line,
         };
         LineChart {
             title: "Miss rate".into(),
-            x: Axis {
-                label: "L1 size, KiB".into(),
-                log2: true,
-                range: None,
-            },
+            x: Axis::linear("L1 size, KiB"),
             y: Axis::linear("L1 miss rate, %"),
             series: vec![
                 series("Morton", 0, 10.0),
@@ -375,14 +329,12 @@ mod tests {
     }
 
     #[test]
-    fn a_point_at_zero_on_a_logarithmic_axis_is_refused() {
+    fn a_point_that_is_not_finite_is_refused() {
         let mut bad = chart();
-        bad.series[0].points[0].0 = 0.0;
-        assert!(
-            bad.svg()
-                .unwrap_err()
-                .to_string()
-                .contains("series `Morton` has a point at (0, 20)")
+        bad.series[0].points[0].0 = f64::NAN;
+        assert_eq!(
+            bad.svg().unwrap_err().to_string(),
+            "plot `Miss rate`: series `Morton` has a point at (NaN, 20)"
         );
     }
 }

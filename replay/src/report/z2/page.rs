@@ -5,7 +5,7 @@ use super::plots::{self, TileMeasure};
 use super::tables;
 use crate::config::{Mode, Order};
 use crate::report::html::{self, Section, figures, folded};
-use crate::report::picture::Picture;
+use crate::report::picture::EmbeddedPicture;
 use crate::report::plots::PlotError;
 use crate::result::TOOL;
 use maud::{Markup, html};
@@ -19,7 +19,7 @@ const EXAMPLE_TILES: [u32; 2] = [8, 4];
 ///
 /// # Errors
 /// A plot that cannot be drawn (a figure that is not finite).
-pub fn page(report: &PaperReport, pictures: &[Picture]) -> Result<String, PlotError> {
+pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String, PlotError> {
     let mut sections = vec![Section::new("What was run", runs(report))];
     if !pictures.is_empty() {
         sections.push(Section::new("Pictures", scenes(pictures)));
@@ -132,7 +132,7 @@ fn thousands(number: u64) -> String {
     crate::report::theme::group_thousands(&number.to_string())
 }
 
-fn scenes(pictures: &[Picture]) -> Markup {
+fn scenes(pictures: &[EmbeddedPicture]) -> Markup {
     html! {
         div.row {
             @for picture in pictures {

@@ -196,7 +196,7 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
                 color: theme::AXIS,
             },
             points: vec![(ends.0, ends.0 + offset), (ends.1, ends.1 + offset)],
-            mark: Mark::ThinLine,
+            mark: Mark::Line,
         };
         series.insert(0, line);
     }

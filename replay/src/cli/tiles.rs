@@ -1,40 +1,8 @@
-//! Opening whichever kind of trace a path names.
+//! The tiles of a trace, in file order, and ranges of them on the command line.
 
-use anyhow::Result;
-use formats::container::{Container, Kind};
-use formats::raytrace::Raytrace;
-use formats::textrace::{Pass, Textrace};
-use std::path::Path;
-
-/// An opened trace.
-pub enum TraceFile {
-    /// Texture addresses.
-    Texture(Box<Textrace>),
-    /// Rays.
-    Ray(Box<Raytrace>),
-}
-
-impl TraceFile {
-    /// Opens a trace of either kind and checks its tables and index.
-    ///
-    /// # Errors
-    /// The file cannot be read or is damaged.
-    pub fn open(path: &Path) -> formats::Result<Self> {
-        // Reading the header twice is cheap: the file is mapped.
-        Ok(match Container::open(path)?.kind() {
-            Kind::Textrace => Self::Texture(Box::new(Textrace::open(path)?)),
-            Kind::Raytrace => Self::Ray(Box::new(Raytrace::open(path)?)),
-        })
-    }
-
-    /// The container of either kind.
-    pub fn container(&self) -> &Container {
-        match self {
-            Self::Texture(trace) => trace.container(),
-            Self::Ray(trace) => trace.container(),
-        }
-    }
-}
+use formats::raytrace::RaytraceTables;
+use formats::textrace::Pass;
+use formats::view::Eye;
 
 /// Pass and tile numbers of a trace, in file order.
 pub fn tiles(passes: &[Pass]) -> impl Iterator<Item = (usize, usize)> + use<'_> {
@@ -42,6 +10,13 @@ pub fn tiles(passes: &[Pass]) -> impl Iterator<Item = (usize, usize)> + use<'_> 
         .iter()
         .enumerate()
         .flat_map(|(pass, info)| (0..info.tile_count() as usize).map(move |tile| (pass, tile)))
+}
+
+/// Eye and tile number of every tile of a ray trace, in file order.
+pub fn ray_tiles(tables: &RaytraceTables) -> impl Iterator<Item = (Eye, u32)> + use<> {
+    let tiles = tables.tile_count();
+    let of_eye = move |eye| (0..tiles).map(move |tile| (eye, tile));
+    [Eye::Left, Eye::Right].into_iter().flat_map(of_eye)
 }
 
 /// A range of numbers as given on the command line: `7`, `3..8`, `5..` or `..8`; the end is not

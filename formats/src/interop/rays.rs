@@ -1,0 +1,235 @@
+//! A ray trace sample by sample: as JSON, and as accesses to the hierarchy's memory.
+
+use crate::raytrace::{
+    BvhSummary, PixelRecord, RayKind, RayRecord, RayTile, RaytraceTables, Visit,
+};
+use crate::view::Eye;
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// One sample of a pixel with its rays and their visits.
+#[derive(Clone, Copy, Debug)]
+pub struct RaySample<'a> {
+    /// Eye.
+    pub eye: Eye,
+    /// Tile of the eye's image.
+    pub tile: u32,
+    /// Column and row in the image.
+    pub pixel: [u32; 2],
+    /// Number of the sample in its pixel.
+    pub sample: u32,
+    /// What it sees.
+    pub record: &'a PixelRecord,
+    /// Its rays.
+    pub rays: &'a [RayRecord],
+    /// Visits of all of them, `None` where the trace lists none.
+    visits: Option<&'a [Visit]>,
+}
+
+/// The samples of a decoded tile, in file order.
+pub fn ray_samples<'a>(
+    tables: &'a RaytraceTables,
+    eye: Eye,
+    number: u32,
+    tile: &'a RayTile,
+) -> impl Iterator<Item = RaySample<'a>> {
+    let samples = tables.meta.samples_per_px.max(1);
+    let width = tile.size_px[0].max(1);
+    let [left, top] = tile.origin_px;
+    let mut visits = tile.visits.as_slice();
+    (0u32..).zip(&tile.pixels).map(move |(index, record)| {
+        let rays = tile.rays_of(record);
+        let count = rays.iter().map(RayRecord::visit_count).sum::<u64>();
+        let (own, rest) = visits
+            .split_at_checked(usize::try_from(count).unwrap_or(usize::MAX))
+            .unwrap_or_default();
+        visits = rest;
+        let at = index / samples;
+        RaySample {
+            eye,
+            tile: number,
+            pixel: [left + at % width, top + at / width],
+            sample: index % samples,
+            record,
+            rays,
+            visits: tables.meta.has_visits.then_some(own),
+        }
+    })
+}
+
+/// A sample as `replay dump` prints it.
+#[derive(Serialize)]
+struct SampleLine<'a> {
+    eye: Eye,
+    tile: u32,
+    x: u32,
+    y: u32,
+    sample: u32,
+    hit: Option<crate::raytrace::Hit>,
+    view_independent: [f32; 3],
+    view_dependent: [f32; 3],
+    rays: Vec<RayLine<'a>>,
+}
+
+#[derive(Serialize)]
+struct RayLine<'a> {
+    #[serde(flatten)]
+    ray: &'a RayRecord,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    visits: Option<Vec<VisitLine>>,
+}
+
+#[derive(Serialize)]
+struct VisitLine {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    node: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    triangle: Option<u32>,
+    address: u64,
+}
+
+impl VisitLine {
+    fn new(bvh: &BvhSummary, visit: Visit) -> Self {
+        let (node, triangle) = match visit {
+            Visit::Node(index) => (Some(index), None),
+            Visit::Triangle(slot) => (None, Some(slot)),
+        };
+        Self {
+            node,
+            triangle,
+            address: bvh.address(visit),
+        }
+    }
+}
+
+impl RaySample<'_> {
+    /// Each ray with its visits.
+    fn rays_and_visits(&self) -> impl Iterator<Item = (&RayRecord, Option<&[Visit]>)> {
+        let mut visits = self.visits;
+        self.rays.iter().map(move |ray| {
+            let count = usize::try_from(ray.visit_count()).unwrap_or(usize::MAX);
+            let split = visits.and_then(|visits| visits.split_at_checked(count));
+            visits = split.map(|(_, rest)| rest);
+            (ray, split.map(|(own, _)| own))
+        })
+    }
+
+    /// The sample as one line of JSON.
+    ///
+    /// # Errors
+    /// None in practice; the signature is the serialiser's.
+    pub fn to_json(&self, bvh: &BvhSummary) -> serde_json::Result<String> {
+        let rays = self.rays_and_visits().map(|(ray, visits)| RayLine {
+            ray,
+            visits: visits.map(|all| all.iter().map(|v| VisitLine::new(bvh, *v)).collect()),
+        });
+        serde_json::to_string(&SampleLine {
+            eye: self.eye,
+            tile: self.tile,
+            x: self.pixel[0],
+            y: self.pixel[1],
+            sample: self.sample,
+            hit: self.record.hit,
+            view_independent: self.record.view_independent,
+            view_dependent: self.record.view_dependent,
+            rays: rays.collect(),
+        })
+    }
+
+    /// Calls `visit` for each access to the hierarchy, in the order made. Stops at an error.
+    ///
+    /// # Errors
+    /// Those of `visit`.
+    pub fn accesses(
+        &self,
+        bvh: &BvhSummary,
+        mut visit: impl FnMut(&RayAccess) -> io::Result<()>,
+    ) -> io::Result<()> {
+        for ((ray, visits), number) in self.rays_and_visits().zip(0u32..) {
+            for each in visits.unwrap_or_default() {
+                let (entry, index) = match *each {
+                    Visit::Node(index) => (Entry::Node, index),
+                    Visit::Triangle(slot) => (Entry::Triangle, slot),
+                };
+                visit(&RayAccess {
+                    address: bvh.address(*each),
+                    bytes: bvh.visit_bytes(*each),
+                    eye: self.eye,
+                    tile: self.tile,
+                    x: self.pixel[0],
+                    y: self.pixel[1],
+                    sample: self.sample,
+                    ray: number,
+                    kind: ray.kind,
+                    entry,
+                    index,
+                })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What an access of a ray reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Entry {
+    /// An inner node.
+    Node,
+    /// A triangle.
+    Triangle,
+}
+
+/// One read of the hierarchy's memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct RayAccess {
+    /// Address of the first byte.
+    pub address: u64,
+    /// Bytes read.
+    pub bytes: u32,
+    /// Eye.
+    pub eye: Eye,
+    /// Tile of the eye's image.
+    pub tile: u32,
+    /// Column of the pixel in the image.
+    pub x: u32,
+    /// Row of the pixel.
+    pub y: u32,
+    /// Sample of the pixel.
+    pub sample: u32,
+    /// The ray's number among its sample's.
+    pub ray: u32,
+    /// Why the ray was cast.
+    pub kind: RayKind,
+    /// Node or triangle.
+    pub entry: Entry,
+    /// Number of the node, or slot of the triangle.
+    pub index: u32,
+}
+
+impl RayAccess {
+    /// Addresses of the cache lines that it touches; `line_bytes` is a power of two.
+    pub fn lines(&self, line_bytes: u32) -> impl Iterator<Item = u64> + use<> {
+        let line_bytes = u64::from(line_bytes.max(1));
+        let last = self.address + u64::from(self.bytes.max(1)) - 1;
+        (self.address / line_bytes..=last / line_bytes).map(move |line| line * line_bytes)
+    }
+
+    /// Header of the columns that [`Self::write_csv`] writes.
+    pub const CSV_HEADER: &str = "address,bytes,eye,tile,x,y,sample,ray,kind,entry,index";
+
+    /// Writes a line of comma-separated values; the address is hexadecimal with `0x`.
+    ///
+    /// # Errors
+    /// Those of the writer below.
+    pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
+        let eye = format!("{:?}", self.eye).to_lowercase();
+        let kind = format!("{:?}", self.kind).to_lowercase();
+        let entry = format!("{:?}", self.entry).to_lowercase();
+        writeln!(
+            out,
+            "{:#x},{},{eye},{},{},{},{},{},{kind},{entry},{}",
+            self.address, self.bytes, self.tile, self.x, self.y, self.sample, self.ray, self.index
+        )
+    }
+}

@@ -1,0 +1,50 @@
+//! A trace of either kind.
+
+use crate::container::{Container, Kind};
+use crate::error::Result;
+use crate::raytrace::Raytrace;
+use crate::textrace::Textrace;
+use std::path::Path;
+
+/// An opened trace: everything but what its tiles hold has been checked.
+#[derive(Debug)]
+pub enum Trace {
+    /// Texture addresses.
+    Texture(Box<Textrace>),
+    /// Rays.
+    Ray(Box<Raytrace>),
+}
+
+impl Trace {
+    /// Opens a file or a pipe.
+    ///
+    /// # Errors
+    /// When it cannot be read or is malformed; the error names the place.
+    pub fn open(path: &Path) -> Result<Self> {
+        Self::from_container(Container::open(path)?)
+    }
+
+    /// Reads a trace from memory.
+    ///
+    /// # Errors
+    /// When the bytes are malformed.
+    pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
+        Self::from_container(Container::from_bytes(bytes)?)
+    }
+
+    fn from_container(container: Container) -> Result<Self> {
+        Ok(match container.kind() {
+            Kind::Textrace => Self::Texture(Box::new(Textrace::from_container(container)?)),
+            Kind::Raytrace => Self::Ray(Box::new(Raytrace::from_container(container)?)),
+        })
+    }
+
+    /// The container of either kind.
+    #[must_use]
+    pub fn container(&self) -> &Container {
+        match self {
+            Self::Texture(trace) => trace.container(),
+            Self::Ray(trace) => trace.container(),
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! `docs/configuration.md` says what the code reads: keys, defaults, values and what they mean come
+//! from the types themselves. `UPDATE_DOCS=1` rewrites the page; review the diff.
+
+use clap::ValueEnum;
+use replay::config::{Assign, Mode, Order, Replacement, RunConfig};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+const INTRODUCTION: &str = "\
+# Configuration of a replay
+
+`replay run --config FILE` reads the keys below as TOML; flags win over the file, and what neither says
+is the Z2 paper's machine. `replay run --print-config` prints the whole configuration. An unknown key is
+refused. Sizes (`size_bytes`) are numbers of bytes or texts such as `\"16KiB\"`.
+
+    order = \"z2-sta\"
+    l1.size_bytes = \"16KiB\"
+
+## Experiment files
+
+`replay sweep FILE` replays every point of an experiment:
+
+    traces = [\"crytek.textrace\"]      # beside the file; the command line's traces win
+    [base]                            # any key below
+    mode = \"functional\"
+    [axes]                            # crossed with one another
+    order = [\"morton\", \"z2-sta\"]
+    l1.size_bytes = [\"8KiB\", \"16KiB\"]
+    [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
+    layout.block_order = [\"morton\", \"tiled\"]
+
+At most 100000 points; a point that no machine can have is refused before any is replayed. A sweep that was
+stopped goes on where it stopped: each point's result is a file under `points/` in the output folder.
+
+## Keys
+";
+
+fn root() -> PathBuf {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    manifest.parent().unwrap().to_owned()
+}
+
+/// Documented items of a type's body: documentation, attributes and the item's own line.
+struct Item {
+    about: String,
+    renamed: Option<String>,
+    line: String,
+}
+
+/// The items of `pub struct name` or `pub enum name`, wherever it stands in the sources.
+fn items(sources: &str, name: &str) -> Vec<Item> {
+    let head = ["struct", "enum"].map(|kind| format!("pub {kind} {name} {{\n"));
+    let start = head.iter().find_map(|h| Some(sources.find(h)? + h.len()));
+    let body = &sources[start.unwrap_or_else(|| panic!("no type {name}"))..];
+    let (mut items, mut about, mut renamed) = (Vec::new(), String::new(), None);
+    for line in body.lines().map(str::trim).take_while(|line| *line != "}") {
+        if let Some(text) = line.strip_prefix("///") {
+            about += text;
+        } else if line.starts_with("#[") {
+            let quoted = line.strip_prefix("#[serde(rename = \"");
+            renamed = quoted
+                .and_then(|rest| Some(rest.split_once('"')?.0.to_owned()))
+                .or(renamed);
+        } else if !line.is_empty() {
+            items.push(Item {
+                about: std::mem::take(&mut about).trim().to_owned(),
+                renamed: renamed.take(),
+                line: line.to_owned(),
+            });
+        }
+    }
+    items
+}
+
+fn kebab(variant: &str) -> String {
+    let mut out = String::new();
+    for (i, c) in variant.chars().enumerate() {
+        if c.is_ascii_uppercase() && i > 0 {
+            out.push('-');
+        }
+        out.push(c.to_ascii_lowercase());
+    }
+    out
+}
+
+/// Names and meanings of the values that a type takes; nothing for numbers and flags.
+fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
+    fn of<T: ValueEnum>() -> Vec<(String, String)> {
+        let variants = T::value_variants().iter();
+        let possible = variants.filter_map(ValueEnum::to_possible_value);
+        possible
+            .map(|v| {
+                let help = v.get_help().map(ToString::to_string);
+                (v.get_name().to_owned(), help.unwrap_or_default())
+            })
+            .collect()
+    }
+    match type_name {
+        "Order" => of::<Order>(),
+        "Replacement" => of::<Replacement>(),
+        "Mode" => of::<Mode>(),
+        "Assign" => of::<Assign>(),
+        "FilterOverride" | "LodFormula" | "BlockOrder" | "TextureOrder" | "TexelFormat" => {
+            let name = |item: &Item| {
+                let variant = item.line.split([' ', ',']).next().unwrap();
+                item.renamed.clone().unwrap_or_else(|| kebab(variant))
+            };
+            let items = items(sources, type_name);
+            items.iter().map(|i| (name(i), i.about.clone())).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// A configuration with one key set.
+fn with(key: &str, value: Value) -> Result<RunConfig, String> {
+    let mut table = Table::try_from(RunConfig::default()).unwrap();
+    let (mut inner, mut rest) = (&mut table, key);
+    while let Some((first, last)) = rest.split_once('.') {
+        inner = inner.get_mut(first).and_then(Value::as_table_mut).unwrap();
+        rest = last;
+    }
+    inner.insert(rest.to_owned(), value);
+    table.try_into().map_err(|e: toml::de::Error| e.to_string())
+}
+
+/// What is accepted for a number, in the words of the refusal of one that is not.
+fn range(key: &str) -> Option<String> {
+    [-1_000_000, 0, 3, 4_000_000_000]
+        .into_iter()
+        .flat_map(|n| [Value::Integer(n), Value::Float(n as f64)])
+        .filter_map(|value| with(key, value).ok()?.validate().err())
+        .map(|error| error.to_string())
+        .find_map(|text| {
+            let of_key = text.starts_with(&format!("{key}: "));
+            let expected = text.split_once("expected ")?.1;
+            of_key.then(|| expected.rsplit_once(", found").unwrap().0.to_owned())
+        })
+}
+
+/// Adds a line for every key of a type, and the keys of the types in it.
+fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page: &mut String) {
+    for item in items(sources, type_name) {
+        let (name, kind) = item
+            .line
+            .trim_start_matches("pub ")
+            .split_once(": ")
+            .unwrap();
+        let key = format!("{prefix}{name}");
+        let kind = kind.trim_end_matches(',');
+        let kind = kind
+            .strip_prefix("Option<")
+            .map_or(kind, |k| k.trim_end_matches('>'));
+        let kind = if kind == "SamplingConfig" {
+            "SamplingOptions"
+        } else {
+            kind
+        };
+        let default = defaults.get(name);
+        if let Some(Value::Table(inner)) = default {
+            describe(sources, kind, &format!("{key}."), inner, page);
+            continue;
+        }
+        let default = default.map_or_else(|| "none".to_owned(), |v| format!("`{v}`"));
+        let values = values(sources, kind);
+        for (value, _) in &values {
+            let read = with(&key, Value::String(value.clone()));
+            assert!(read.is_ok(), "{key} = {value}: {read:?}");
+        }
+        let range = range(&key).map_or_else(String::new, |r| format!(" Accepted: {r}."));
+        let about = item.about.replace('|', "\\|");
+        let _ = writeln!(page, "| `{key}` | {default} | {about}{range} |");
+        for (value, about) in values {
+            let about = about.trim_end_matches('.').replace('|', "\\|");
+            let _ = writeln!(page, "| | `\"{value}\"` | {about} |");
+        }
+    }
+}
+
+fn page() -> String {
+    let sources: String = [
+        "replay/src/config.rs",
+        "formats/src/footprint/options.rs",
+        "formats/src/layout/mod.rs",
+        "formats/src/texture.rs",
+    ]
+    .map(|path| fs::read_to_string(root().join(path)).unwrap())
+    .concat();
+    let defaults = Table::try_from(RunConfig::default()).unwrap();
+    let mut page =
+        format!("{INTRODUCTION}\n| key | default; values | what it is |\n| --- | --- | --- |\n");
+    describe(&sources, "RunConfig", "", &defaults, &mut page);
+    page
+}
+
+#[test]
+fn the_page_of_keys_is_what_the_code_reads() {
+    let path = root().join("docs/configuration.md");
+    let page = page();
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(&path, &page).unwrap();
+    }
+    let found = fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        found == page,
+        "docs/configuration.md is not what the code reads; UPDATE_DOCS=1 rewrites it"
+    );
+}
+
+#[test]
+fn every_key_has_a_line_that_says_what_it_is() {
+    fn count(table: &Table) -> usize {
+        let inner = |value: &Value| value.as_table().map_or(1, count);
+        table.values().map(inner).sum()
+    }
+    let page = page();
+    let keys: Vec<&str> = page
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .collect();
+    // Two keys have no default.
+    let written = count(&Table::try_from(RunConfig::default()).unwrap());
+    assert_eq!(keys.len(), written + 2);
+    for line in keys {
+        let about = line.split(" | ").last().unwrap();
+        assert!(about.len() > 8, "{line}");
+    }
+}

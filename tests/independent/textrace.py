@@ -1,0 +1,299 @@
+"""Prints a .textrace: a line of JSON with the tables, then one for each record.
+
+    python3 textrace.py FILE
+
+Written from FORMAT.md alone; see container.py.
+"""
+
+import sys
+
+from container import META, Bytes, check_meta, parse_json, print_line, read, require
+from container import shaped, tile_spans, unzigzag
+
+TAGS = ["META", "TEXS", "SMPS", "DRAW", "PASS", "TILE", "TIDX"]
+FORMATS = {
+    1: "bc1",
+    3: "bc3",
+    7: "bc7",
+    10: "etc2",
+    11: "etc2-rgba",
+    20: "astc-4x4",
+    21: "astc-5x5",
+    22: "astc-6x6",
+    23: "astc-8x8",
+    40: "rgba8",
+    41: "r32f",
+}
+WRAPS = {0: "repeat", 1: "mirrored-repeat", 2: "clamp-to-edge"}
+FILTERS = {0: "nearest", 1: "linear"}
+MIP_FILTERS = {0: "none", 1: "nearest", 2: "linear"}
+NO_GROUP = 15
+WIDTHS = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 18, 24, 32]
+
+
+def named(names, number):
+    require(number in names, f"an unknown id, {number}")
+    return names[number]
+
+
+def read_texture(data):
+    width, height, levels, layers, fmt, space, zero = data.fields("IIIIHBB")
+    require(1 <= width <= 65536 and 1 <= height <= 65536, "size of a texture")
+    require(1 <= levels <= max(width, height).bit_length(), "mip levels")
+    require(1 <= layers <= 65536 and zero == 0, "layers or reserved byte")
+    return {
+        "size": [width, height],
+        "levels": levels,
+        "layers": layers,
+        "format": named(FORMATS, fmt),
+        "color_space": named({0: "linear", 1: "srgb"}, space),
+        "name": data.name(),
+    }
+
+
+def read_sampler(data):
+    u, v, mag, small, mip = data.fields("5B")
+    return {
+        "wrap": [named(WRAPS, u), named(WRAPS, v)],
+        "mag": named(FILTERS, mag),
+        "min": named(FILTERS, small),
+        "mip": named(MIP_FILTERS, mip),
+    }
+
+
+def read_group(data, textures, samplers):
+    width, height, count = data.fields("IIH")
+    require(1 <= width <= 65536 and 1 <= height <= 65536, "extent")
+    samples = []
+    for _ in range(count):
+        texture, sampler, layer, x, y = data.fields("IHHbb")
+        require(texture < len(textures) and sampler < len(samplers), "a sample of nothing")
+        require(layer < textures[texture]["layers"], "a layer that is not there")
+        samples.append(
+            {"texture": texture, "sampler": sampler, "layer": layer, "offset": [x, y]}
+        )
+    return {"extent": [width, height], "samples": samples}
+
+
+def read_draw(data, textures, samplers):
+    first, primitives, groups = data.fields("IIH")
+    require(first + primitives < 1 << 32 and groups <= 15, "a draw")
+    material = data.name()
+    return {
+        "material": material,
+        "first_primitive": first,
+        "primitives": primitives,
+        "groups": [read_group(data, textures, samplers) for _ in range(groups)],
+    }
+
+
+def read_pass(data, meta):
+    frame, kind, eye, zero, width, height, columns, rows = data.fields("IBBHIIII")
+    require(zero == 0 and columns >= 1 and rows >= 1, "a pass")
+    require((columns, rows) == (-(-width // 16), -(-height // 16)), "tiles of a pass")
+    require(frame in [views["frame"] for views in meta["frames"]], "a frame that is not there")
+    kind = named({0: "main", 1: "shadow"}, kind)
+    eye = named({0: "left", 1: "right", 255: None}, eye)
+    if kind == "main" and eye:
+        require([width, height] == meta["hmd"]["eye_size_px"], "size of an eye's picture")
+    return {
+        "frame": frame,
+        "kind": kind,
+        "eye": eye,
+        "size_px": [width, height],
+        "tiles": [columns, rows],
+    }
+
+
+def read_table(chunk, least_bytes, entry):
+    data = Bytes(chunk)
+    items = [entry(data) for _ in range(data.count(least_bytes))]
+    data.end()
+    return items
+
+
+def every_other_bit(number):
+    return number & 1 | number >> 1 & 2 | number >> 2 & 4
+
+
+def i32(number):
+    return (number + (1 << 31)) % (1 << 32) - (1 << 31)
+
+
+def decode_raw(data, runs, records):
+    heads = [data.fields("III") for _ in range(runs)]
+    rows = []
+    for _ in range(records):
+        x, y, mask, group, *numbers = data.fields("4B8i")
+        rows.append((x, y, mask, group, *(numbers[i : i + 2] for i in (0, 2, 4, 6))))
+    data.end()
+    return heads, rows
+
+
+class Bits:
+    """Bits from the lowest of the first byte on."""
+
+    def __init__(self, data):
+        self.data = data
+        self.at = 0
+
+    def take(self, count):
+        """At most 32 bits, which lie in five bytes."""
+        first, shift = self.at >> 3, self.at & 7
+        self.at += count
+        require(self.at <= 8 * len(self.data), "bits beyond the end")
+        word = int.from_bytes(self.data[first : first + 5], "little")
+        return word >> shift & ((1 << count) - 1)
+
+
+class Context:
+    def __init__(self):
+        self.x = self.y = 0
+        self.uv, self.dx, self.dy, self.cross = [0, 0], [0, 0], [0, 0], [0, 0]
+        self.sx, self.sy = [0, 0], [0, 0]
+
+
+def along(n, start, end):
+    bend = 0 if n == 0 else i32(end - start) >> 1
+    return n * (start + end) - bend
+
+
+def decode_delta(data, runs, records):
+    heads, following, draw = [], 0, 0
+    for _ in range(runs):
+        head = data.number(1 << 33)
+        primitive = following + (head >> 1)
+        require(primitive < 1 << 32, "a primitive out of range")
+        if head & 1:
+            draw = data.number()
+        heads.append((primitive, draw, data.number() + 1))
+        following = primitive + 1
+    require(sum(count for _, _, count in heads) == records, "records of the runs")
+    bits = Bits(data.take(data.left()))
+    rows = []
+
+    def start_anew():
+        return [Context() for _ in range(16)], list(range(16)), 0
+
+    contexts, follows, group = start_anew()
+    previous_draw = 0
+    for _, draw, count in heads:
+        if draw != previous_draw:
+            contexts, follows, group = start_anew()
+            previous_draw = draw
+        position, seen = 0, set()
+        for _ in range(count):
+            codes = [bits.take(4) for _ in range(4)]
+            step, mask, expected = bits.take(3), bits.take(4), bits.take(1)
+            if step == 7:
+                step = bits.take(6)
+            now = follows[group] if expected else bits.take(4)
+            follows[group] = group = now
+            position += step
+            require(position < 64, "a quad outside its tile")
+            x, y = every_other_bit(position), every_other_bit(position >> 1)
+            left = [[unzigzag(bits.take(WIDTHS[code])) for _ in "uv"] for code in codes]
+            c = contexts[group]
+            right, down = x - c.x, y - c.y
+            uv, dx, dy, cross = [0, 0], [0, 0], [0, 0], [0, 0]
+            for a in range(2):
+                dx[a] = i32(c.dx[a] + right * c.sx[a] + 2 * down * c.cross[a] + left[0][a])
+                dy[a] = i32(c.dy[a] + down * c.sy[a] + 2 * right * c.cross[a] + left[1][a])
+                cross[a] = i32(c.cross[a] + left[2][a])
+                dx_there = i32(dx[a] - 2 * down * c.cross[a])
+                dy_here = i32(c.dy[a] + 2 * right * c.cross[a])
+                uv[a] = i32(
+                    c.uv[a]
+                    + along(right, c.dx[a], dx_there)
+                    + along(down, dy_here, dy[a])
+                    + left[3][a]
+                )
+                if group in seen and abs(right) == 1:
+                    c.sx[a] = i32(right * (dx[a] - c.dx[a] - 2 * down * c.cross[a]))
+                if group in seen and abs(down) == 1:
+                    c.sy[a] = i32(down * (dy[a] - c.dy[a] - 2 * right * c.cross[a]))
+            c.x, c.y, c.uv, c.dx, c.dy, c.cross = x, y, uv, dx, dy, cross
+            seen.add(group)
+            rows.append((x, y, mask, group, uv, dx, dy, cross))
+    require(not bits.take(-bits.at % 8), "bits after the last record")
+    require(bits.data[bits.at // 8 :] == bytes(8), "padding")
+    return heads, rows
+
+
+def check_tile(heads, rows, draws):
+    previous, first = -1, 0
+    for primitive, draw, count in heads:
+        require(primitive > previous and count >= 1 and draw < len(draws), "a run")
+        of = draws[draw]
+        number = primitive - of["first_primitive"]
+        require(0 <= number < of["primitives"], "a primitive of another draw")
+        previous, position = primitive, 0
+        for x, y, mask, group, *_ in rows[first : first + count]:
+            require(x < 8 and y < 8 and 1 <= mask <= 15, "a record")
+            require(group < len(of["groups"]) or group == NO_GROUP, "a group")
+            now = sum((x >> b & 1) << 2 * b | (y >> b & 1) << 2 * b + 1 for b in range(3))
+            require(now >= position, "records out of order")
+            position = now
+        first += count
+    require(first == len(rows), "records of the runs")
+
+
+def main(path):
+    chunks = read(path, 1)
+    require([tag for tag in chunks if tag in TAGS] == TAGS, "chunks missing or out of order")
+    meta = check_meta(shaped(parse_json(chunks["META"]), META))
+    textures = read_table(chunks["TEXS"], 22, read_texture)
+    samplers = read_table(chunks["SMPS"], 5, read_sampler)
+    draws = read_table(chunks["DRAW"], 12, lambda data: read_draw(data, textures, samplers))
+    passes = read_table(chunks["PASS"], 24, lambda data: read_pass(data, meta))
+    print_line(
+        {
+            "meta": meta,
+            "textures": textures,
+            "samplers": samplers,
+            "draws": draws,
+            "passes": passes,
+        }
+    )
+    index = Bytes(chunks["TIDX"])
+    places = [
+        (number, tile)
+        for number, each in enumerate(passes)
+        for tile in range(each["tiles"][0] * each["tiles"][1])
+    ]
+    entries = [index.fields("QIIIIQ") for _ in places]
+    index.end()
+    touched = [entry for entry in entries if entry[3]]
+    require(all(not any(e[:5]) and e[5] < 2 for e in entries if not e[3]), "an untouched tile")
+    tile_spans([entry[:3] for entry in touched], chunks["TILE"])
+    for (number, tile), (offset, size, _, records, runs, encoding) in zip(places, entries):
+        if not records:
+            continue
+        require(runs <= records and encoding < 2, "an index entry")
+        decode = decode_delta if encoding else decode_raw
+        heads, rows = decode(Bytes(chunks["TILE"][offset : offset + size]), runs, records)
+        check_tile(heads, rows, draws)
+        rows = iter(rows)
+        for primitive, draw, count in heads:
+            for _ in range(count):
+                x, y, mask, group, uv, dx, dy, cross = next(rows)
+                print_line(
+                    {
+                        "pass": number,
+                        "tile": tile,
+                        "draw": draw,
+                        "primitive": primitive,
+                        "x": x,
+                        "y": y,
+                        "mask": mask,
+                        "group": None if group == NO_GROUP else group,
+                        "uv": uv,
+                        "dx": dx,
+                        "dy": dy,
+                        "cross": cross,
+                    }
+                )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,199 @@
+//! Traces taken apart into chunks and put together again with every checksum right, so that a
+//! test can change what lies behind the checksums.
+
+use formats::Trace;
+use formats::container::{ChunkTag, Container, ContainerWriter, Kind};
+use formats::raytrace::RayTile;
+use formats::textrace::Tile;
+use formats::view::Eye;
+
+/// A trace as its chunks, in file order.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    /// What it holds.
+    pub kind: Kind,
+    /// Tag and bytes of each chunk.
+    pub chunks: Vec<([u8; 4], Vec<u8>)>,
+}
+
+impl Parts {
+    /// Takes a sound trace apart.
+    ///
+    /// # Panics
+    /// When it is not a container.
+    #[must_use]
+    pub fn of(bytes: &[u8]) -> Self {
+        let container = Container::from_bytes(bytes.to_vec()).expect("a sound container");
+        let chunks = container.directory().iter().map(|entry| {
+            let chunk = container.chunk(entry.tag).expect("a sound chunk");
+            (entry.tag.0, chunk.to_vec())
+        });
+        Self {
+            kind: container.kind(),
+            chunks: chunks.collect(),
+        }
+    }
+
+    /// Bytes of a chunk; empty where there is none.
+    pub fn chunk(&mut self, tag: &[u8; 4]) -> &mut Vec<u8> {
+        let at = self.chunks.iter().position(|(other, _)| other == tag);
+        let at = at.unwrap_or_else(|| {
+            self.chunks.push((*tag, Vec::new()));
+            self.chunks.len() - 1
+        });
+        &mut self.chunks[at].1
+    }
+
+    /// Writes a number into a chunk.
+    ///
+    /// # Panics
+    /// When the chunk is too short.
+    pub fn put(&mut self, tag: &[u8; 4], at: usize, bytes: &[u8]) {
+        self.chunk(tag)[at..at + bytes.len()].copy_from_slice(bytes);
+    }
+
+    /// Changes the value of a JSON chunk.
+    ///
+    /// # Panics
+    /// When the chunk is no JSON.
+    pub fn edit(&mut self, tag: &[u8; 4], change: impl FnOnce(&mut serde_json::Value)) {
+        let chunk = self.chunk(tag);
+        let mut value = serde_json::from_slice(chunk).expect("a JSON chunk");
+        change(&mut value);
+        *chunk = value.to_string().into_bytes();
+    }
+
+    /// Replaces text in a JSON chunk, once.
+    ///
+    /// # Panics
+    /// When the text is not there.
+    pub fn replace(&mut self, tag: &[u8; 4], from: &str, to: &str) {
+        let chunk = self.chunk(tag);
+        let text = String::from_utf8(chunk.clone()).expect("JSON is UTF-8");
+        assert!(text.contains(from), "{from} is not in {text}");
+        *chunk = text.replacen(from, to, 1).into_bytes();
+    }
+
+    /// Tags of the chunk of tiles and of its index, and the size of an index entry.
+    fn tiles_and_index(&self) -> ([u8; 4], [u8; 4], usize) {
+        match self.kind {
+            Kind::Textrace => (*b"TILE", *b"TIDX", 32),
+            Kind::Raytrace => (*b"RAYS", *b"RTIX", 24),
+        }
+    }
+
+    /// The bytes of every slot of the index, as far as they are there.
+    #[must_use]
+    pub fn tiles(&mut self) -> Vec<Vec<u8>> {
+        let (tiles, index, entry_bytes) = self.tiles_and_index();
+        let all = self.chunk(&tiles).clone();
+        let entries = self.chunk(&index).chunks_exact(entry_bytes);
+        let of = |entry: &[u8]| {
+            let (offset, size) = (number(entry, 0, 8), number(entry, 8, 4));
+            let end = offset.saturating_add(size).min(all.len());
+            all.get(offset.min(end)..end).unwrap_or_default().to_vec()
+        };
+        entries.map(of).collect()
+    }
+
+    /// Puts other tiles in place: the index's offsets, sizes and checksums follow, its counts stay.
+    pub fn set_tiles(&mut self, tiles: &[Vec<u8>]) {
+        let (tag, index, entry_bytes) = self.tiles_and_index();
+        let mut offset = 0u64;
+        let entries = self.chunk(&index).chunks_exact_mut(entry_bytes);
+        for (entry, tile) in entries.zip(tiles) {
+            let at = if tile.is_empty() { 0 } else { offset };
+            entry[..8].copy_from_slice(&at.to_le_bytes());
+            entry[8..12].copy_from_slice(&(tile.len() as u32).to_le_bytes());
+            let crc32 = if tile.is_empty() { 0 } else { crc32(tile) };
+            entry[12..16].copy_from_slice(&crc32.to_le_bytes());
+            offset += tile.len() as u64;
+        }
+        *self.chunk(&tag) = tiles.concat();
+    }
+
+    /// Makes the checksums of the tiles right, wherever the index says that they lie.
+    pub fn repair_tiles(&mut self) {
+        let (_, index, entry_bytes) = self.tiles_and_index();
+        let crc32s: Vec<u32> = self.tiles().iter().map(|tile| crc32(tile)).collect();
+        let entries = self.chunk(&index).chunks_exact_mut(entry_bytes);
+        for (entry, crc32) in entries.zip(crc32s) {
+            if number(entry, 8, 4) > 0 {
+                entry[12..16].copy_from_slice(&crc32.to_le_bytes());
+            }
+        }
+    }
+
+    /// The file, with the checksums of chunks, directory and header made anew. A chunk whose tag
+    /// was there before is left out, since no container can have it twice.
+    #[must_use]
+    pub fn sealed(&self) -> Vec<u8> {
+        let mut writer = ContainerWriter::in_memory(self.kind).expect("in memory");
+        for (tag, bytes) in &self.chunks {
+            let _twice = writer.chunk(ChunkTag(*tag), bytes);
+        }
+        writer.into_bytes().expect("in memory")
+    }
+}
+
+/// A little-endian number of some bytes.
+fn number(bytes: &[u8], at: usize, size: usize) -> usize {
+    let of = bytes.get(at..at + size).unwrap_or_default();
+    of.iter()
+        .rev()
+        .fold(0, |n, byte| n << 8 | usize::from(*byte))
+}
+
+/// CRC-32 of zlib and PNG, bit by bit: independent of the library that the traces use.
+#[must_use]
+pub fn crc32(bytes: &[u8]) -> u32 {
+    let mut crc = u32::MAX;
+    for byte in bytes {
+        crc ^= u32::from(*byte);
+        for _ in 0..8 {
+            crc = crc >> 1 ^ (0xEDB8_8320 & (crc & 1).wrapping_neg());
+        }
+    }
+    !crc
+}
+
+/// Makes the checksums of directory and header right, if these are where the header says.
+pub fn repair_header(bytes: &mut [u8]) {
+    let at = number(bytes, 16, 8);
+    if let Some(directory) = bytes.get(at..) {
+        let crc = crc32(directory);
+        if let Some(field) = bytes.get_mut(36..40) {
+            field.copy_from_slice(&crc.to_le_bytes());
+        }
+    }
+    if bytes.len() >= 48 {
+        let crc = crc32(&bytes[..44]);
+        bytes[44..48].copy_from_slice(&crc.to_le_bytes());
+    }
+}
+
+/// Reads a whole trace as `replay validate` does.
+///
+/// # Errors
+/// The first thing that breaks a rule.
+pub fn validate(trace: &Trace) -> formats::Result<()> {
+    match trace {
+        Trace::Texture(trace) => {
+            let mut tile = Tile::default();
+            for (pass, info) in trace.tables().passes.iter().enumerate() {
+                for index in 0..info.tile_count() as usize {
+                    trace.decode_tile(pass, index, &mut tile)?;
+                }
+            }
+        }
+        Trace::Ray(trace) => {
+            let mut tile = RayTile::default();
+            for eye in [Eye::Left, Eye::Right] {
+                for index in 0..trace.tables().tile_count() {
+                    trace.decode_tile(eye, index, &mut tile)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,388 @@
+//! Small made-up traces of both kinds that use everything that the format has.
+
+use formats::container::Kind;
+use formats::raytrace::camera::sample_position_px;
+use formats::raytrace::{
+    BvhSummary, EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayLight, RayMaterial,
+    RayRecord, RayTile, RayTriangle, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
+    Visit, encode_ray_tile, half,
+};
+use formats::textrace::{
+    Draw, Encoding, NO_GROUP, Pass, PassKind, PrimitiveRun, QuadRecord, Sample, Tables,
+    TextraceWriter, Tile, TraceMeta, UvGroup, encode_tile_as, quad_morton,
+};
+use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
+use formats::view::{Eye, FovTangents, FrameViews, Hmd};
+
+/// Width and height of an eye's image: neither is a multiple of a tile's.
+const EYE_SIZE_PX: [u32; 2] = [39, 21];
+
+/// Numbers that look random and are the same for a seed (splitmix64).
+#[derive(Clone, Debug)]
+pub struct Random(pub u64);
+
+impl Random {
+    /// The next 64 bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// Below a bound above 0.
+    pub fn below(&mut self, bound: u32) -> u32 {
+        (self.bits() % u64::from(bound)) as u32
+    }
+}
+
+fn fov() -> FovTangents {
+    FovTangents {
+        left: 1.2,
+        right: 0.9,
+        up: 1.1,
+        down: 1.0,
+    }
+}
+
+fn meta(frames: u32) -> TraceMeta {
+    TraceMeta {
+        tool: "made up 1".to_owned(),
+        command_line: vec!["a \"quoted\" word".to_owned(), "\u{e9}\u{1f332}".to_owned()],
+        scene: "made up".to_owned(),
+        scene_triangles: 3000,
+        camera: "default".to_owned(),
+        backend: "none".to_owned(),
+        driver: "none".to_owned(),
+        seed: u64::MAX,
+        hmd: Hmd {
+            name: "custom".to_owned(),
+            source: "unverified".to_owned(),
+            eye_size_px: EYE_SIZE_PX,
+            fov: [fov(); 2],
+            ipd_m: 0.064,
+            cant_deg: -3.5,
+        },
+        frames: (0..frames)
+            .map(|frame| FrameViews {
+                frame: 2 * frame,
+                ..FrameViews::default()
+            })
+            .collect(),
+    }
+}
+
+/// Tables of a texture trace: several groups, an untextured draw, two frames and a shadow map.
+#[must_use]
+pub fn texture_tables() -> Tables {
+    let texture = |name: &str, size, levels, format| Texture {
+        name: name.to_owned(),
+        size,
+        levels,
+        layers: 2,
+        format,
+        color_space: ColorSpace::Srgb,
+    };
+    let sample = |texture, sampler| Sample {
+        texture,
+        sampler,
+        layer: 1,
+        offset: [-1, 3],
+    };
+    let group = |extent, samples| UvGroup { extent, samples };
+    let draw = |material: &str, first_primitive, groups| Draw {
+        material: material.to_owned(),
+        first_primitive,
+        primitives: 1000,
+        groups,
+    };
+    let pass = |frame, kind, eye, size_px: [u32; 2]| Pass {
+        frame,
+        kind,
+        eye,
+        size_px,
+        tiles: size_px.map(|size| size.div_ceil(16)),
+    };
+    Tables {
+        meta: meta(2),
+        textures: vec![
+            texture("a.png", [1024, 256], 11, TexelFormat::Bc1),
+            texture("", [300, 65536], 17, TexelFormat::Astc6x6),
+            texture("\u{e9}.png", [1, 1], 1, TexelFormat::R32f),
+        ],
+        samplers: vec![
+            Sampler::TRILINEAR_REPEAT,
+            Sampler {
+                wrap: [Wrap::MirroredRepeat, Wrap::ClampToEdge],
+                mag: Filter::Nearest,
+                min: Filter::Linear,
+                mip: MipFilter::Nearest,
+            },
+        ],
+        draws: vec![
+            draw(
+                "brick",
+                0,
+                vec![
+                    group([1024, 256], vec![sample(0, 0), sample(2, 1)]),
+                    group([300, 65536], vec![sample(1, 0)]),
+                    group([7, 9], vec![]),
+                ],
+            ),
+            draw("plain", 1000, vec![]),
+            draw("leaf", 2000, vec![group([1, 1], vec![sample(2, 0)])]),
+        ],
+        passes: vec![
+            pass(0, PassKind::Main, Some(Eye::Left), EYE_SIZE_PX),
+            pass(0, PassKind::Main, Some(Eye::Right), EYE_SIZE_PX),
+            pass(2, PassKind::Shadow, None, [17, 16]),
+        ],
+    }
+}
+
+/// A tile with a few primitives of every draw.
+fn texture_tile(tables: &Tables, random: &mut Random) -> Tile {
+    let mut tile = Tile::default();
+    for primitive in 0..3000 {
+        if random.below(400) != 0 {
+            continue;
+        }
+        let draw = primitive / 1000;
+        let groups = tables.draws[draw as usize].groups.len() as u32;
+        // Small numbers mostly, as a picture has them; any at all now and then.
+        let wild = random.below(4) == 0;
+        let mut number = |range: u32| match wild {
+            true => random.bits() as i32,
+            false => random.below(range) as i32 - (range / 2) as i32,
+        };
+        let mut records: Vec<QuadRecord> = (0..1 + primitive % 9)
+            .map(|_| QuadRecord {
+                uv: [number(1 << 24), number(1 << 24)],
+                dx: [number(5000), number(50)],
+                dy: [number(50), number(5000)],
+                cross: [number(5), number(5)],
+                ..QuadRecord::default()
+            })
+            .collect();
+        for record in &mut records {
+            (record.x, record.y) = (random.below(8) as u8, random.below(8) as u8);
+            record.mask = 1 + random.below(15) as u8;
+            record.group = match random.below(groups + 1) {
+                none if none == groups => NO_GROUP,
+                group => group as u8,
+            };
+        }
+        records.sort_by_key(|record| (quad_morton(record.x, record.y), record.group));
+        tile.runs.push(PrimitiveRun {
+            primitive,
+            draw,
+            first: tile.records.len() as u32,
+            count: records.len() as u32,
+        });
+        tile.records.extend(records);
+    }
+    tile
+}
+
+/// A texture trace; about a tile in three is untouched.
+#[must_use]
+pub fn texture_trace(encoding: Encoding, seed: u64) -> Vec<u8> {
+    let tables = texture_tables();
+    let mut random = Random(seed);
+    let mut writer = TextraceWriter::in_memory(&tables).expect("sound tables");
+    for (pass, info) in tables.passes.iter().enumerate() {
+        for index in 0..info.tile_count() as usize {
+            if random.below(3) > 0 {
+                let tile = texture_tile(&tables, &mut random);
+                let encoded = encode_tile_as(encoding, &tables, &tile).expect("a sound tile");
+                writer.append(pass, index, encoded).expect("in order");
+            }
+        }
+    }
+    writer.into_bytes().expect("in memory")
+}
+
+/// Tables of a ray trace with triangles, materials and lights of every kind.
+#[must_use]
+pub fn ray_tables(samples_per_px: u32, has_visits: bool) -> RaytraceTables {
+    let eye = |x: f32| EyeCamera {
+        position: [x, 0.1, 0.0],
+        right: [0.8, 0.0, 0.6],
+        up: [0.0, 1.0, 0.0],
+        forward: [0.6, 0.0, -0.8],
+        fov: fov(),
+        size_px: EYE_SIZE_PX,
+    };
+    let material = |name: &str, mirror: bool| RayMaterial {
+        name: name.to_owned(),
+        diffuse: !mirror,
+        mirror,
+        ..ray_material()
+    };
+    RaytraceTables {
+        meta: RaytraceMeta {
+            trace: meta(1),
+            origin: [0.1, 1e6 + 1.0 / 3.0, -7.0],
+            eyes: [eye(-0.032), eye(0.032)],
+            max_depth: 3,
+            samples_per_px,
+            has_visits,
+            sky: [[0.3, 0.4, 0.5], [0.1; 3]],
+        },
+        bvh: BvhSummary {
+            builder: "none".to_owned(),
+            settings: vec![("leaf".to_owned(), "4".to_owned())],
+            traversal: TraversalKind::Bvh2,
+            triangles: 1 << 31,
+            nodes: (1 << 32) - 1,
+            leaves: 18,
+            depth: 6,
+            sah_cost: 61.623_411_2,
+            bytes_per_node: 64,
+            bytes_per_triangle: 40,
+        },
+        materials: vec![material("clay", false), material("chrome", true)],
+        lights: vec![
+            RayLight::Directional {
+                direction: [0.0, -1.0, 0.0],
+                color: [3.0; 3],
+            },
+            RayLight::Point {
+                position: [0.1, 0.2, 0.3],
+                color: [1.0; 3],
+            },
+        ],
+        triangles: (0..20u32)
+            .map(|i| RayTriangle {
+                primitive: if i == 19 { u32::MAX } else { 2 * i },
+                object: i / 7,
+                material: i % 2,
+                vertices: [
+                    [i as f32, 0.0, -5.0],
+                    [i as f32 + 0.7, 0.1, -5.5],
+                    // One has no area.
+                    [i as f32, 0.9 * (i % 5) as f32, -5.25],
+                ],
+            })
+            .collect(),
+    }
+}
+
+/// A material that does nothing.
+fn ray_material() -> RayMaterial {
+    RayMaterial {
+        name: String::new(),
+        diffuse: false,
+        mirror: false,
+        glass: false,
+        glossy: true,
+        alpha_masked: false,
+    }
+}
+
+fn ray_tile(tables: &RaytraceTables, eye: Eye, number: u32, random: &mut Random) -> RayTile {
+    let mut tile = RayTile::default();
+    (tile.origin_px, tile.size_px) = tables.tile_rect(number);
+    let camera = tables.camera(eye);
+    let samples = tables.meta.samples_per_px;
+    for i in 0..tile.size_px[0] * tile.size_px[1] * samples {
+        let (at, sample) = (i / samples, i % samples);
+        let x = tile.origin_px[0] + at % tile.size_px[0];
+        let y = tile.origin_px[1] + at / tile.size_px[0];
+        let direction = camera.direction(sample_position_px(x, y, sample, samples));
+        let hit = (random.below(4) > 0).then(|| {
+            let triangle = &tables.triangles[random.below(20) as usize];
+            let code = [0; 2].map(|_| (random.below(65535) as i32 - 32767) as i16);
+            let uv = match random.below(16) {
+                0 => [f32::NAN, f32::NEG_INFINITY],
+                _ => [random.below(1000) as f32 / 7.0, -1.5],
+            };
+            let t = random.below(9000) as f32 / 900.0;
+            Hit::new(camera, direction, t, triangle, code, uv)
+        });
+        let mut color = || [0; 3].map(|_| random.below(9000) as f32 / 300.0 - 1.0);
+        let (seen, dependent) = (color(), color());
+        tile.pixels.push(PixelRecord {
+            hit,
+            view_independent: half::round3(hit.map_or([0.0; 3], |_| seen)),
+            view_dependent: half::round3(dependent),
+            first_ray: tile.rays.len() as u32,
+            ray_count: 1 + random.below(5),
+        });
+        push_rays(&mut tile, random);
+    }
+    if tables.meta.has_visits {
+        let visits: u64 = tile.rays.iter().map(RayRecord::visit_count).sum();
+        tile.visits = (0..visits)
+            .map(|_| match random.below(8) {
+                0 => Visit::Node(random.below(u32::MAX)),
+                1..4 => Visit::Node(random.below(100)),
+                4 => Visit::Triangle(random.below(1 << 31)),
+                _ => Visit::Triangle(random.below(100)),
+            })
+            .collect();
+    }
+    tile
+}
+
+/// The rays of the last pixel.
+fn push_rays(tile: &mut RayTile, random: &mut Random) {
+    let Some(pixel) = tile.pixels.last() else {
+        return;
+    };
+    for own in 0..pixel.ray_count {
+        let parent = if own == 0 {
+            NO_PARENT
+        } else {
+            random.below(own)
+        };
+        let above = tile.rays.get((pixel.first_ray + parent.min(own)) as usize);
+        let depth = above.map_or(0, |ray| ray.depth + 1);
+        let kind = match random.below(3) {
+            _ if own == 0 => RayKind::Primary,
+            0 => RayKind::Shadow,
+            1 => RayKind::Reflection,
+            _ => RayKind::Refraction,
+        };
+        tile.rays.push(RayRecord {
+            kind,
+            outcome: [Outcome::Miss, Outcome::Hit, Outcome::Occluded][random.below(3) as usize],
+            depth,
+            parent,
+            steps: random.below(12),
+            triangle_tests: random.below(5),
+            alpha_tests: random.below(2) * random.below(300),
+        });
+    }
+}
+
+/// A ray trace.
+#[must_use]
+pub fn ray_trace(samples_per_px: u32, has_visits: bool, seed: u64) -> Vec<u8> {
+    let tables = ray_tables(samples_per_px, has_visits);
+    let mut random = Random(seed);
+    let mut writer = RaytraceWriter::in_memory().expect("in memory");
+    for eye in [Eye::Left, Eye::Right] {
+        for number in 0..tables.tile_count() {
+            let tile = ray_tile(&tables, eye, number, &mut random);
+            let encoded = encode_ray_tile(&tile, has_visits).expect("a sound tile");
+            writer.tile(&encoded).expect("in memory");
+        }
+    }
+    writer.into_bytes(&tables).expect("sound tables")
+}
+
+/// One of each: both kinds, both encodings, with visits and without, one sample a pixel and more.
+#[must_use]
+pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
+    let textures = [Encoding::Raw, Encoding::Delta].map(|encoding| {
+        let name = format!("{encoding:?}").to_lowercase();
+        (name, Kind::Textrace, texture_trace(encoding, 5))
+    });
+    let rays = [(1, true), (1, false), (3, true)].map(|(samples, visits)| {
+        let name = format!("{samples}-samples-visits-{visits}");
+        (name, Kind::Raytrace, ray_trace(samples, visits, 7))
+    });
+    textures.into_iter().chain(rays).collect()
+}

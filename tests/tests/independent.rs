@@ -1,0 +1,200 @@
+//! The readers in `tests/independent/`, written in Python from FORMAT.md alone, against
+//! `replay dump` and `replay info`: every table and every record of every golden trace and of
+//! traces that are made here.
+
+use parallax_tests::{program, root, run_ok, traces};
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+/// False, with a line on stderr, where there is no Python; `scripts/test.sh` says so, too.
+fn has_python() -> bool {
+    let found = Command::new("python3").arg("--version").output();
+    let found = found.is_ok_and(|output| output.status.success());
+    if !found {
+        eprintln!("SKIPPED: python3 is absent");
+    }
+    found
+}
+
+fn start(command: &mut Command) -> (Child, BufReader<ChildStdout>) {
+    let mut child = command
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let out = child.stdout.take().expect("a pipe was asked for");
+    (child, BufReader::new(out))
+}
+
+fn parse(line: Option<std::io::Result<String>>) -> Option<Value> {
+    let line = line?.expect("the output is readable");
+    Some(serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error}: {line}")))
+}
+
+/// Compares what Python read with what replay read; keys that only replay has are its own
+/// additions unless `exact`.
+fn compare(place: &str, python: &Value, replay: &Value, exact: bool) {
+    match (python, replay) {
+        (Value::Object(a), Value::Object(b)) => {
+            assert!(!exact || a.len() == b.len(), "{place}: {python}\n{replay}");
+            for (key, value) in a {
+                let other = b
+                    .get(key)
+                    .unwrap_or_else(|| panic!("{place}.{key} is missing in {replay}"));
+                compare(&format!("{place}.{key}"), value, other, exact);
+            }
+        }
+        (Value::Array(a), Value::Array(b)) => {
+            assert_eq!(a.len(), b.len(), "{place}: {python}\n{replay}");
+            for (index, (value, other)) in a.iter().zip(b).enumerate() {
+                compare(&format!("{place}[{index}]"), value, other, exact);
+            }
+        }
+        (Value::Number(a), Value::Number(b)) if a != b => {
+            let both = a.as_f64().zip(b.as_f64());
+            let (a, b) = both.expect("numbers are finite");
+            // Python prints an f32 with all the digits of its f64.
+            let same = a as f32 == b as f32
+                // The one figure that the text leaves to rounding.
+                || place.contains("geometric_normal") && (a - b).abs() < 1e-6;
+            assert!(same, "{place}: {a} and {b}");
+        }
+        _ => assert_eq!(python, replay, "{place}"),
+    }
+}
+
+/// Reads a trace both ways; returns the number of records.
+fn check(path: &Path) -> u64 {
+    let name = path.display().to_string();
+    let kind = path
+        .extension()
+        .and_then(|extension| extension.to_str())
+        .expect("a trace has its kind as extension");
+    let script = root().join("tests/independent").join(format!("{kind}.py"));
+    let (mut reader, python) = start(Command::new("python3").arg("-B").arg(script).arg(path));
+    let (mut dumper, replay) = start(program("replay").arg("dump").arg(path));
+    let (mut python, mut replay) = (python.lines(), replay.lines());
+    let tables = parse(python.next()).unwrap_or_else(|| panic!("{name}: Python refuses it"));
+    let info = run_ok(program("replay").args(["info", "--json"]).arg(path)).stdout;
+    let info: Value = serde_json::from_slice(&info).expect("info prints JSON");
+    compare(&format!("{name} tables"), &tables, &info, false);
+    let mut records = 0;
+    loop {
+        match (parse(python.next()), parse(replay.next())) {
+            (Some(a), Some(b)) => compare(&format!("{name} record {records}"), &a, &b, true),
+            (None, None) => break,
+            (a, b) => panic!("{name} record {records}: Python has {a:?}, replay {b:?}"),
+        }
+        records += 1;
+    }
+    assert!(reader.wait().expect("Python ends").success(), "{name}");
+    assert!(dumper.wait().expect("replay ends").success(), "{name}");
+    records
+}
+
+fn goldens(extension: &str) -> Vec<PathBuf> {
+    let found: Vec<PathBuf> = fs::read_dir(root().join("traces"))
+        .expect("traces/ exists")
+        .map(|entry| entry.expect("traces/ is readable").path())
+        .filter(|path| path.extension().is_some_and(|e| e == extension))
+        .collect();
+    assert!(!found.is_empty(), "no golden .{extension}");
+    found
+}
+
+#[test]
+fn python_reads_every_golden_texture_trace_as_replay_does() {
+    if has_python() {
+        for path in goldens("textrace") {
+            assert!(check(&path) > 10_000, "{}", path.display());
+        }
+    }
+}
+
+#[test]
+fn python_reads_every_golden_ray_trace_as_replay_does() {
+    if has_python() {
+        for path in goldens("raytrace") {
+            assert!(check(&path) > 10_000, "{}", path.display());
+        }
+    }
+}
+
+#[test]
+fn python_reads_made_up_traces_as_replay_does() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, kind, bytes) in traces::all() {
+        let path = folder.path().join(name).with_extension(kind.to_string());
+        fs::write(&path, bytes).expect("temporary file");
+        assert!(check(&path) > 50, "{}", path.display());
+    }
+}
+
+#[test]
+fn python_reads_a_fresh_capture_in_both_encodings_as_replay_does() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let delta = folder.path().join("delta.textrace");
+    let raw = folder.path().join("raw.textrace");
+    let size = ["--size", "56x40", "--frames", "2", "--no-plain", "-o"];
+    run_ok(
+        program("tracegen")
+            .args(["raster", "teapot"])
+            .args(size)
+            .arg(&delta),
+    );
+    let encode = ["convert", "--to", "textrace", "--encoding", "raw", "-o"];
+    run_ok(program("replay").args(encode).arg(&raw).arg(&delta));
+    let records = check(&delta);
+    assert!(records > 1000);
+    assert_eq!(check(&raw), records);
+}
+
+#[test]
+fn python_reads_fresh_rays_with_visits_and_several_samples_as_replay_does() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (scene, tree) in [("teapot", "bvh2"), ("chess", "bvh8")] {
+        let path = folder.path().join(scene).with_extension("raytrace");
+        let options = ["--size", "40x24", "--spp", "3", "--visits", "--bvh", tree];
+        run_ok(
+            program("tracegen")
+                .args(["rays", scene])
+                .args(options)
+                .arg("-o")
+                .arg(&path),
+        );
+        assert_eq!(check(&path), 2 * 40 * 24 * 3);
+    }
+}
+
+#[test]
+fn python_refuses_what_is_damaged() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, kind, mut bytes) in traces::all() {
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 0x10;
+        let path = folder.path().join(name).with_extension(kind.to_string());
+        fs::write(&path, bytes).expect("temporary file");
+        let script = root().join(format!("tests/independent/{kind}.py"));
+        let output = Command::new("python3")
+            .arg("-B")
+            .arg(script)
+            .arg(&path)
+            .output();
+        let output = output.expect("Python starts");
+        assert_eq!(output.status.code(), Some(1), "{}", path.display());
+    }
+}

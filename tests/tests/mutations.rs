@@ -1,0 +1,457 @@
+//! Thousands of traces with something changed and every checksum right again: each is refused or
+//! read, and whatever is valid can be replayed. Nothing panics, takes ten seconds or a gigabyte.
+//!
+//! `MUTATIONS=100000 cargo test --release -p parallax-tests --test mutations` tries more.
+
+use formats::Trace;
+use formats::footprint::SamplingOptions;
+use formats::interop::{Expander, Granularity, Origin, ray_samples};
+use formats::layout::{Layout, LayoutConfig};
+use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
+use formats::textrace::{Textrace, Tile};
+use formats::view::Eye;
+use parallax_tests::repair::{Parts, repair_header, validate};
+use parallax_tests::traces::{self, Random};
+use replay::config::{Mode, RunConfig};
+use replay::sgrt::compose::Reuse;
+use replay::sgrt::config::SgrtConfig;
+use replay::sgrt::frame::RaySource;
+use replay::sgrt::loaded::LoadedTrace;
+use std::alloc::{GlobalAlloc, Layout as Block, System};
+use std::error::Error;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// Cases for all traces together, unless `MUTATIONS` says otherwise.
+const CASES: u64 = 5000;
+const MOST_TIME: Duration = Duration::from_secs(10);
+const MOST_BYTES: usize = 1 << 30;
+
+/// Counts the bytes that are allocated, and the most there were at once.
+struct Counting;
+
+static LIVE_BYTES: AtomicUsize = AtomicUsize::new(0);
+static PEAK_BYTES: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call goes to the system's allocator as it is; only counters are kept beside it.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, block: Block) -> *mut u8 {
+        let live = LIVE_BYTES.fetch_add(block.size(), Ordering::Relaxed) + block.size();
+        PEAK_BYTES.fetch_max(live, Ordering::Relaxed);
+        // SAFETY: the caller's promises are those that the system asks for.
+        unsafe { System.alloc(block) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, block: Block) {
+        LIVE_BYTES.fetch_sub(block.size(), Ordering::Relaxed);
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, block) }
+    }
+
+    unsafe fn alloc_zeroed(&self, block: Block) -> *mut u8 {
+        let live = LIVE_BYTES.fetch_add(block.size(), Ordering::Relaxed) + block.size();
+        PEAK_BYTES.fetch_max(live, Ordering::Relaxed);
+        // SAFETY: as above.
+        unsafe { System.alloc_zeroed(block) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Numbers at which arithmetic and checks turn.
+const EXTREMES: [u64; 14] = [
+    0,
+    1,
+    2,
+    15,
+    127,
+    128,
+    255,
+    65535,
+    65536,
+    (1 << 31) - 1,
+    1 << 31,
+    u32::MAX as u64,
+    1 << 32,
+    u64::MAX,
+];
+
+/// What a number or another value in JSON is replaced with.
+const JSON_VALUES: [&str; 18] = [
+    "0",
+    "-0.0",
+    "1",
+    "-1",
+    "2",
+    "0.5",
+    "1e-30",
+    "1e30",
+    "3.4e38",
+    "1e300",
+    "65536",
+    "4294967295",
+    "4294967296",
+    "18446744073709551615",
+    "null",
+    "[]",
+    "{}",
+    "\"\"",
+];
+
+/// Changes a trace in one of many ways; what was done is in the text.
+fn mutate(bytes: &[u8], other: &[u8], random: &mut Random) -> (Vec<u8>, String) {
+    let mut parts = Parts::of(bytes);
+    let way = random.below(10);
+    let what = match way {
+        0 | 1 => flip_bytes(&mut parts, random),
+        2 => set_integer(&mut parts, random),
+        3 | 4 => edit_json(&mut parts, random),
+        5 => splice(&mut parts, &mut Parts::of(other), random),
+        6 | 7 => edit_tile(&mut parts, random),
+        8 => move_chunks(&mut parts, random),
+        _ => return edit_container(bytes, random),
+    };
+    (parts.sealed(), what)
+}
+
+fn pick<'a>(parts: &'a mut Parts, random: &mut Random) -> &'a mut ([u8; 4], Vec<u8>) {
+    let chunk = random.below(parts.chunks.len() as u32) as usize;
+    &mut parts.chunks[chunk]
+}
+
+fn name(tag: [u8; 4]) -> String {
+    tag.escape_ascii().to_string()
+}
+
+fn flip_bytes(parts: &mut Parts, random: &mut Random) -> String {
+    let (tag, chunk) = pick(parts, random);
+    let what = format!("bytes of {}", name(*tag));
+    for _ in 0..1 + random.below(3) {
+        let at = random.below(chunk.len().max(1) as u32) as usize;
+        if let Some(byte) = chunk.get_mut(at) {
+            *byte ^= 1 << random.below(8);
+        }
+    }
+    parts.repair_tiles();
+    what
+}
+
+fn set_integer(parts: &mut Parts, random: &mut Random) -> String {
+    let (tag, chunk) = pick(parts, random);
+    let size = 1usize << random.below(4);
+    let value = EXTREMES[random.below(EXTREMES.len() as u32) as usize];
+    let places = (chunk.len() / size).max(1) as u32;
+    // Tables have fields at odd places, too.
+    let at = random.below(places) as usize * size + random.below(2) as usize * 2;
+    if let Some(field) = chunk.get_mut(at..at + size) {
+        field.copy_from_slice(&value.to_le_bytes()[..size]);
+    }
+    let what = format!("{value} in {size} bytes at {at} of {}", name(*tag));
+    if random.below(4) > 0 {
+        parts.repair_tiles();
+    }
+    what
+}
+
+/// Starts and ends of the values of a JSON text: numbers, strings that are no keys, brackets.
+fn json_values(text: &str) -> Vec<(usize, usize)> {
+    let bytes = text.as_bytes();
+    let mut found = Vec::new();
+    let mut at = 0;
+    while at < bytes.len() {
+        let start = at;
+        match bytes[at] {
+            b'"' => {
+                at += 1;
+                while at < bytes.len() && bytes[at] != b'"' {
+                    at += 1 + usize::from(bytes[at] == b'\\');
+                }
+                at += 1;
+                if bytes.get(at) != Some(&b':') {
+                    found.push((start, at.min(bytes.len())));
+                }
+            }
+            b'-' | b'0'..=b'9' | b't' | b'f' => {
+                while at < bytes.len() && !b",]}".contains(&bytes[at]) {
+                    at += 1;
+                }
+                found.push((start, at));
+            }
+            b'[' | b'{' => {
+                let close = bytes[at..].iter().position(|b| b"]}".contains(b));
+                found.extend(close.map(|length| (start, start + length + 1)));
+                at += 1;
+            }
+            _ => at += 1,
+        }
+    }
+    found
+}
+
+fn edit_json(parts: &mut Parts, random: &mut Random) -> String {
+    let tags: Vec<[u8; 4]> = parts
+        .chunks
+        .iter()
+        .filter(|(_, chunk)| chunk.starts_with(b"{") || chunk.starts_with(b"["))
+        .map(|(tag, _)| *tag)
+        .collect();
+    let tag = tags[random.below(tags.len() as u32) as usize];
+    let text = String::from_utf8(parts.chunk(&tag).clone()).expect("JSON is UTF-8");
+    let values = json_values(&text);
+    let (start, end) = values[random.below(values.len() as u32) as usize];
+    let new = match random.below(4) {
+        // Another value of the same text: the types often fit.
+        0 => {
+            let (start, end) = values[random.below(values.len() as u32) as usize];
+            &text[start..end]
+        }
+        _ => JSON_VALUES[random.below(JSON_VALUES.len() as u32) as usize],
+    };
+    let what = format!("{} of {} becomes {new}", &text[start..end], name(tag));
+    *parts.chunk(&tag) = format!("{}{new}{}", &text[..start], &text[end..]).into_bytes();
+    what
+}
+
+/// Puts a piece of another trace's chunk into the chunk of the same tag.
+fn splice(parts: &mut Parts, other: &mut Parts, random: &mut Random) -> String {
+    let (tag, _) = *pick(parts, random);
+    let donor = other.chunk(&tag).clone();
+    let mut range = |length: usize| {
+        let start = random.below(length as u32 + 1) as usize;
+        let end = start + random.below((length - start).min(64) as u32 + 1) as usize;
+        start..end
+    };
+    let from = range(donor.len());
+    let to = range(parts.chunk(&tag).len());
+    let what = format!("{from:?} of another {} in place of {to:?}", name(tag));
+    parts.chunk(&tag).splice(to, donor[from].iter().copied());
+    parts.repair_tiles();
+    what
+}
+
+/// Cuts, lengthens or swaps tiles; the index follows.
+fn edit_tile(parts: &mut Parts, random: &mut Random) -> String {
+    let mut tiles = parts.tiles();
+    let full: Vec<usize> = (0..tiles.len()).filter(|i| !tiles[*i].is_empty()).collect();
+    let index = full[random.below(full.len() as u32) as usize];
+    let tile = &mut tiles[index];
+    let at = random.below(tile.len() as u32) as usize;
+    let what = match random.below(5) {
+        0 => {
+            tile.truncate(at);
+            format!("tile {index} cut to {at} bytes")
+        }
+        1 => {
+            tile.insert(at, random.bits() as u8);
+            format!("a byte more in tile {index} at {at}")
+        }
+        2 => {
+            tile.remove(at);
+            format!("a byte less in tile {index} at {at}")
+        }
+        3 => {
+            // A number as long as numbers get, or longer.
+            let length = 1 + random.below(11) as usize;
+            let end = tile.len().min(at + length);
+            tile[at..end].fill(0xff);
+            format!("{length} bytes of ones in tile {index} at {at}")
+        }
+        _ => {
+            let with = full[random.below(full.len() as u32) as usize];
+            tiles.swap(index, with);
+            format!("tiles {index} and {with} swapped")
+        }
+    };
+    parts.set_tiles(&tiles);
+    what
+}
+
+fn move_chunks(parts: &mut Parts, random: &mut Random) -> String {
+    let count = parts.chunks.len() as u32;
+    let [a, b] = [0; 2].map(|_| random.below(count) as usize);
+    match random.below(4) {
+        0 => {
+            let (tag, _) = parts.chunks.remove(a);
+            format!("{} left out", name(tag))
+        }
+        1 => {
+            parts.chunks.swap(a, b);
+            format!("chunks {a} and {b} swapped")
+        }
+        2 => {
+            let bytes = parts.chunks[b].1.clone();
+            parts.chunks[a].1 = bytes;
+            format!("chunk {b} as chunk {a}")
+        }
+        _ => {
+            let (tag, chunk) = &mut parts.chunks[a];
+            chunk.truncate(random.below(chunk.len() as u32 + 1) as usize);
+            format!("{} cut to {} bytes", name(*tag), chunk.len())
+        }
+    }
+}
+
+/// Changes header and directory.
+fn edit_container(bytes: &[u8], random: &mut Random) -> (Vec<u8>, String) {
+    let mut bytes = bytes.to_vec();
+    let directory = bytes.len() - 24 * 7;
+    let at = match random.below(2) {
+        0 => random.below(48) as usize,
+        _ => directory + random.below(24 * 7) as usize,
+    };
+    let what = match random.below(3) {
+        0 => {
+            bytes[at] ^= 1 << random.below(8);
+            format!("a bit of byte {at}")
+        }
+        1 => {
+            let value = EXTREMES[random.below(EXTREMES.len() as u32) as usize];
+            let end = (at + 8).min(bytes.len());
+            bytes[at..end].copy_from_slice(&value.to_le_bytes()[..end - at]);
+            format!("{value} at byte {at}")
+        }
+        _ => {
+            bytes.truncate(random.below(bytes.len() as u32) as usize);
+            format!("cut to {} bytes", bytes.len())
+        }
+    };
+    repair_header(&mut bytes);
+    (bytes, what)
+}
+
+/// Reads a file and does with it what the commands do; true if it is valid.
+fn exercise(bytes: Vec<u8>) -> bool {
+    let Ok(trace) = Trace::from_bytes(bytes) else {
+        return false;
+    };
+    if validate(&trace).is_err() {
+        return false;
+    }
+    match trace {
+        Trace::Texture(trace) => {
+            expand(&trace);
+            for mode in [Mode::Functional, Mode::Timed] {
+                let config = RunConfig {
+                    mode,
+                    ..RunConfig::default()
+                };
+                // Textures may be too large for a layout, which is an error and no panic.
+                let _result = replay::engine::replay(&*trace, &config);
+            }
+        }
+        Trace::Ray(trace) => reproject(&trace),
+    }
+    true
+}
+
+/// Every access of a texture trace, as `replay convert` writes them.
+fn expand(trace: &Textrace) {
+    let tables = trace.tables();
+    let Ok(layout) = Layout::new(&tables.textures, &LayoutConfig::default()) else {
+        return;
+    };
+    let expander = Expander {
+        tables,
+        layout: &layout,
+        sampling: SamplingOptions::default(),
+        granularity: Granularity::Line,
+        line_bytes: 64,
+    };
+    let mut tile = Tile::default();
+    for (pass, info) in tables.passes.iter().enumerate() {
+        for index in 0..info.tile_count() {
+            trace
+                .decode_tile(pass, index as usize, &mut tile)
+                .expect("it was decoded before");
+            for run in &tile.runs {
+                let origin = Origin {
+                    draw: run.draw,
+                    ..Origin::default()
+                };
+                let records = tile.records.iter().skip(run.first as usize);
+                for record in records.take(run.count as usize) {
+                    expander
+                        .expand(origin, record, |_| Ok(()))
+                        .expect("nothing fails here");
+                }
+            }
+        }
+    }
+}
+
+struct Source<'a>(&'a Raytrace);
+
+impl RaySource for Source<'_> {
+    fn tables(&self) -> &RaytraceTables {
+        self.0.tables()
+    }
+
+    fn tile(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        Ok(self.0.decode_tile(eye, index, tile)?)
+    }
+}
+
+fn reproject(trace: &Raytrace) {
+    let tables = trace.tables();
+    let mut tile = RayTile::default();
+    trace
+        .decode_tile(Eye::Right, 0, &mut tile)
+        .expect("it was decoded before");
+    for sample in ray_samples(tables, Eye::Right, 0, &tile) {
+        sample.to_json(&tables.bvh).expect("JSON");
+        sample
+            .accesses(&tables.bvh, |access| {
+                access.lines(64).for_each(drop);
+                Ok(())
+            })
+            .expect("nothing fails here");
+    }
+    let source = Source(trace);
+    let Ok(loaded) = LoadedTrace::load(&source) else {
+        return;
+    };
+    for rule in ["none", replay::sgrt::DEFAULT_RULE] {
+        let rule = rule.parse().expect("a known rule");
+        // What the model cannot score is an error and no panic.
+        let _result = loaded.run(&rule, Reuse::Color, &SgrtConfig::default());
+    }
+}
+
+#[test]
+fn changed_traces_with_valid_checksums_neither_panic_nor_hang_nor_fill_memory() {
+    let seeds = traces::all();
+    let cases = std::env::var("MUTATIONS").ok().and_then(|n| n.parse().ok());
+    let cases = cases.unwrap_or(CASES);
+    let (mut valid, mut slowest, mut largest) = (0u64, Duration::ZERO, 0);
+    for case in 0..cases {
+        let (seed, _, bytes) = &seeds[(case % seeds.len() as u64) as usize];
+        let other = &seeds[((case / 7) % seeds.len() as u64) as usize].2;
+        let mut random = Random(case);
+        let (changed, what) = mutate(bytes, other, &mut random);
+        let place = format!("case {case} ({seed}): {what}");
+        let before = LIVE_BYTES.load(Ordering::Relaxed);
+        PEAK_BYTES.store(before, Ordering::Relaxed);
+        let start = Instant::now();
+        let outcome = catch_unwind(AssertUnwindSafe(|| exercise(changed)));
+        let time = start.elapsed();
+        let bytes = PEAK_BYTES.load(Ordering::Relaxed).saturating_sub(before);
+        match outcome {
+            Ok(is_valid) => valid += u64::from(is_valid),
+            Err(_) => panic!("panicked: {place}"),
+        }
+        assert!(time < MOST_TIME, "{time:?}: {place}");
+        assert!(bytes < MOST_BYTES, "{bytes} bytes: {place}");
+        slowest = slowest.max(time);
+        largest = largest.max(bytes);
+    }
+    println!("{cases} cases, {valid} valid; slowest {slowest:?}, most {largest} bytes at once");
+    // Deep code is reached: many changes leave a valid file.
+    assert!(valid > cases / 20, "{valid} of {cases} are valid");
+}
