@@ -33,6 +33,9 @@ pub static RULES: [&RuleKind; 7] = [
     &triangles::RULE,
 ];
 
+/// Makes the test of a frame from what arrived and the rule's share.
+pub type MakeTest = for<'a> fn(&'a Frame, &'a Reprojection, f32) -> Box<dyn Test + 'a>;
+
 /// A rule as the registry lists it.
 pub struct RuleKind {
     /// Name on the command line.
@@ -46,7 +49,7 @@ pub struct RuleKind {
     /// What it reads beyond [`Reads::ARRIVALS`].
     pub reads: Reads,
     /// Sees the whole frame and yields the test; `None` for a rule that only re-tests triangles.
-    pub test: Option<for<'a> fn(&'a Frame, &'a Reprojection, f32) -> Box<dyn Test + 'a>>,
+    pub test: Option<MakeTest>,
     /// Intersects the right-eye ray with the candidate's triangle and with those that arrived at
     /// these neighbours: the nearest hit is reused, a ray that misses all of them rejects.
     pub retests: Option<&'static [Offset]>,
