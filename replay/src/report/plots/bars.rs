@@ -93,7 +93,6 @@ impl BarChart {
             let mut mesh = chart.configure_mesh();
             themed(&mut mesh)
                 .disable_x_mesh()
-                .disable_y_axis()
                 .x_labels(0)
                 .x_desc(&self.group_label)
                 .y_label_formatter(&tick_format(&values))
@@ -263,6 +262,7 @@ mod tests {
         let svg = chart().svg().unwrap();
         assert!(svg.contains("external traffic, MB per frame"));
         assert!(svg.contains("L1/L2, KiB"));
+        assert!(svg.contains("\n10\n"), "a tick of the value axis");
     }
 
     #[test]

@@ -82,7 +82,6 @@ impl ContourChart<'_> {
             let mut chart = builder.build_cartesian_2d(x, 0.0..100.0)?;
             themed(&mut chart.configure_mesh())
                 .disable_x_mesh()
-                .disable_y_axis()
                 .x_desc(&self.x_label)
                 .x_labels(12)
                 .x_label_formatter(&|x| x.to_string())

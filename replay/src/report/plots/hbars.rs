@@ -86,7 +86,6 @@ impl HBarChart {
             let name = |y: &i32| names.get((y / row_px) as usize).cloned();
             themed(&mut chart.configure_mesh())
                 .disable_y_mesh()
-                .disable_x_axis()
                 .y_label_style(text_style(theme::TICK_PX, theme::INK, HPos::Right))
                 .x_label_formatter(&tick_format(&values))
                 .y_label_formatter(&|y| name(y).unwrap_or_default())
@@ -147,6 +146,8 @@ mod tests {
             decimals: Some(1),
         };
         assert_eq!(chart.svg().unwrap(), chart.svg().unwrap());
-        assert!(chart.svg().unwrap().contains("L1 miss rate, %"));
+        for text in ["L1 miss rate, %", "\n3.0\n", "\nb.png\n"] {
+            assert!(chart.svg().unwrap().contains(text), "{text}");
+        }
     }
 }

@@ -117,7 +117,6 @@ impl LineChart {
             let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
             themed(&mut chart.configure_mesh())
                 .disable_x_mesh()
-                .disable_y_axis()
                 .x_desc(&self.x.label)
                 .x_label_formatter(&tick_format(&x))
                 .y_label_formatter(&tick_format(&y))
@@ -223,6 +222,7 @@ mod tests {
     fn both_axes_carry_their_units() {
         let svg = chart().svg().unwrap();
         assert!(svg.contains("L1 size, KiB") && svg.contains("L1 miss rate, %"));
+        assert!(svg.contains("\n16\n") && svg.contains("\n20\n"), "ticks");
     }
 
     #[test]
