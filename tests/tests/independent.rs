@@ -163,7 +163,7 @@ fn python_reads_fresh_rays_with_visits_and_several_samples_as_replay_does() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for (scene, tree) in [("teapot", "bvh2"), ("lab", "bvh8")] {
+    for (scene, tree) in [("teapot", "bvh2"), ("chess", "bvh8")] {
         let path = folder.path().join(scene).with_extension("raytrace");
         let options = ["--size", "40x24", "--spp", "3", "--visits", "--bvh", tree];
         run_ok(

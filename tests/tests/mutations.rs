@@ -13,10 +13,10 @@ use formats::view::Eye;
 use parallax_tests::repair::{Parts, repair_header, validate};
 use parallax_tests::traces::{self, Random};
 use replay::config::{Mode, RunConfig};
-use replay::sgrt::analyse::Analysis;
 use replay::sgrt::compose::Reuse;
 use replay::sgrt::config::SgrtConfig;
 use replay::sgrt::frame::RaySource;
+use replay::sgrt::loaded::LoadedTrace;
 use std::alloc::{GlobalAlloc, Layout as Block, System};
 use std::error::Error;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -414,13 +414,13 @@ fn reproject(trace: &Raytrace) {
             .expect("nothing fails here");
     }
     let source = Source(trace);
-    let Ok(analysis) = Analysis::load(&source) else {
+    let Ok(loaded) = LoadedTrace::load(&source) else {
         return;
     };
     for rule in ["none", replay::sgrt::DEFAULT_RULE] {
         let rule = rule.parse().expect("a known rule");
         // What the model cannot score is an error and no panic.
-        let _result = analysis.run(&rule, Reuse::Color, &SgrtConfig::default());
+        let _result = loaded.run(&rule, Reuse::Color, &SgrtConfig::default());
     }
 }
 

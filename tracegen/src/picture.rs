@@ -1,36 +1,33 @@
-//! The picture of both eyes side by side.
+//! The picture of all views side by side.
 
 use formats::container::AtomicFile;
-use raster::capture::Pictures;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes both eyes side by side as a PNG into a temporary file beside `path`, to be persisted
+/// Writes all views side by side as a PNG into a temporary file beside `path`, to be persisted
 /// there once everything else has succeeded.
 ///
 /// # Errors
 /// What the file system or the encoder reports.
 pub fn prepare_side_by_side(
     path: &Path,
-    pictures: &Pictures,
+    pictures: &[Vec<u8>],
     size_px: [u32; 2],
 ) -> anyhow::Result<AtomicFile> {
     let [width, height] = size_px;
     let row_bytes = width as usize * 4;
-    let mut pixels = Vec::with_capacity(2 * row_bytes * height as usize);
-    for (left, right) in pictures[0]
-        .chunks_exact(row_bytes)
-        .zip(pictures[1].chunks_exact(row_bytes))
-    {
-        pixels.extend_from_slice(left);
-        pixels.extend_from_slice(right);
+    let mut pixels = Vec::with_capacity(pictures.len() * row_bytes * height as usize);
+    for row in 0..height as usize {
+        for picture in pictures {
+            pixels.extend_from_slice(&picture[row * row_bytes..][..row_bytes]);
+        }
     }
     let mut file = AtomicFile::create(path)?;
     let mut bytes = std::io::Cursor::new(Vec::new());
     image::write_buffer_with_format(
         &mut bytes,
         &pixels,
-        2 * width,
+        pictures.len() as u32 * width,
         height,
         image::ExtendedColorType::Rgba8,
         image::ImageFormat::Png,

@@ -275,7 +275,7 @@ fn decode_colors<'a>(
             let at = *input;
             *value = half::decode(decode_short(input, &mut previous, "a colour")?);
             if !value.is_finite() {
-                return Err(at.fault("a finite colour", &*value));
+                return Err(at.fault("a finite colour", *value));
             }
         }
     }

@@ -59,7 +59,8 @@ pub struct RayMaterial {
     pub glass: bool,
     /// Has a specular highlight.
     pub glossy: bool,
-    /// Has texels with alpha below a cutoff, through which rays go on.
+    /// May have texels through which rays go on: below the cutoff of an alpha mask, or below
+    /// 1/255 of a blended surface.
     pub alpha_masked: bool,
 }
 

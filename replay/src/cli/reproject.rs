@@ -3,15 +3,17 @@
 
 use crate::files::{self, write_atomically};
 use crate::image::{Picture, png};
+use crate::paper::sgrt as paper;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
-use crate::result::{TOOL, TraceId};
-use crate::sgrt::analyse::{Analysed, Analysis, curve_rules};
+use crate::result::{TOOL, TraceId, scene_name};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use crate::sgrt::frame::RaySource;
-use crate::sgrt::reject::Rule;
-use crate::sgrt::result::{Config, PaperValues, Report, SCHEMA};
-use crate::sgrt::{DEFAULT_RULE, paper, picture};
+use crate::sgrt::loaded::{LoadedTrace, RuleRun};
+use crate::sgrt::result::{Config, Report, SCHEMA};
+use crate::sgrt::rules::{self, Rule};
+use crate::sgrt::variations::curve_rules;
+use crate::sgrt::{DEFAULT_RULE, picture};
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
@@ -32,11 +34,7 @@ pub struct ReprojectArgs {
     /// Ray traces.
     #[arg(value_name = "FILE", required_unless_present = "print_config")]
     files: Vec<PathBuf>,
-    /// Which reprojected pixels are rejected and traced: `none` (the paper's plain reuse), or
-    /// `depth[=SHARE]` (behind a neighbour), `row[=SHARE]` (behind a surface of its row), `object`
-    /// (no neighbour of its object), `opaque` (its material has alpha cut-outs), `silhouette` (a neighbour of another object), `triangle` (the
-    /// right-eye ray misses the reused triangle), `triangles` (and those around it), joined by `+`.
-    #[arg(long, value_name = "RULE", default_value = DEFAULT_RULE)]
+    #[arg(long, value_name = "RULE", default_value = DEFAULT_RULE, help = rules::help())]
     rule: Rule,
     /// What a reused pixel takes over.
     #[arg(long, value_enum, default_value_t = Reuse::Primary)]
@@ -59,6 +57,10 @@ pub struct ReprojectArgs {
     /// Prints CSV: a row for the rule and one for plain reuse, per file.
     #[arg(long)]
     csv: bool,
+    /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
+    /// [default: the scene that a built-in one of the paper's stands for].
+    #[arg(long = "as", value_name = "SCENE")]
+    paper_scenes: Vec<String>,
     /// Writes the right image, its bad pixels in yellow and its FLIP map side by side (one file).
     #[arg(long, value_name = "PNG")]
     image: Option<PathBuf>,
@@ -107,11 +109,13 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         "--image: expected one FILE, found {}",
         args.files.len()
     );
+    // A wrong --as is refused before the work.
+    paper::values("", "", &args.paper_scenes)?;
     let prints = check_outputs(&args)?;
     let mut entries = Vec::new();
     let progress = Progress::new("reprojecting", args.files.len() as u64, "traces");
     for path in &args.files {
-        entries.push(analyse(path, &args, &config)?);
+        entries.push(report_on(path, &args, &config)?);
         progress.advance(1);
     }
     drop(progress);
@@ -160,47 +164,45 @@ fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
     SgrtConfig::from_overrides(&text).with_context(|| path.display().to_string())
 }
 
-fn analyse(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
+fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
     let file = TraceFile(Raytrace::open(path)?);
     let in_file = || path.display().to_string();
-    let analysis = Analysis::load(&file).with_context(in_file)?;
-    let ours = analysis
+    let loaded = LoadedTrace::load(&file).with_context(in_file)?;
+    let ours = loaded
         .run(&args.rule, args.reuse, config)
         .with_context(in_file)?;
-    let plain = analysis
+    let plain = loaded
         .run(&Rule::default(), args.reuse, config)
         .with_context(in_file)?;
     if let Some(image) = &args.image {
-        write_atomically(image, &png::encode(&triptych(&analysis, &ours))?)?;
+        write_atomically(image, &png::encode(&triptych(&loaded, &ours))?)?;
     }
-    let meta = &analysis.frame().tables.meta;
+    let meta = &loaded.frame().tables.meta;
+    let scene = meta.trace.scene.as_str();
     let report = Report {
         schema: SCHEMA.to_owned(),
         tool: TOOL.to_owned(),
         trace: TraceId {
-            scene: meta.trace.scene.clone(),
+            scene: scene.to_owned(),
             checksum: format!("{:08x}", file.0.file_checksum()),
         },
         scene_triangles: meta.trace.scene_triangles,
-        eye_size_px: analysis.frame().size_px,
+        eye_size_px: loaded.frame().size_px,
+        rows: loaded.rows().summary,
         config: Config {
-            rule: args.rule,
+            rule: args.rule.clone(),
             reuse: args.reuse,
-            cache_misses: analysis.cache_misses().to_owned(),
+            cache_misses: loaded.cache_misses().to_owned(),
             model: config.clone(),
         },
-        paper: paper::counterpart(&meta.trace.scene).map(|p| PaperValues {
-            scene: p.name.to_owned(),
-            relative_performance: p.relative_performance,
-            relative_energy: p.relative_energy,
-        }),
+        paper: paper::values(scene, scene_name(scene), &args.paper_scenes)?,
         curve: if args.curve {
-            analysis.curve(&curve_rules(), config)
+            loaded.curve(&curve_rules(), config)
         } else {
             Vec::new()
         },
         sensitivity: if args.sensitivity {
-            analysis
+            loaded
                 .sensitivity(&ours, args.reuse, config)
                 .with_context(in_file)?
         } else {
@@ -210,7 +212,7 @@ fn analyse(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Re
         plain: plain.outcome.clone(),
     };
     let pictures = if args.html.is_some() {
-        Some(thumbnails(&analysis, &ours, &plain)?)
+        Some(thumbnails(&loaded, &ours, &plain)?)
     } else {
         None
     };
@@ -218,20 +220,16 @@ fn analyse(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Re
 }
 
 /// The right image, its bad pixels, and its error.
-fn triptych(analysis: &Analysis, ours: &Analysed) -> Picture {
-    let bad = picture::bad_pixels(analysis.frame(), &ours.decisions, &ours.picture);
+fn triptych(loaded: &LoadedTrace, ours: &RuleRun) -> Picture {
+    let bad = picture::bad_pixels(loaded.frame(), &ours.decisions, &ours.picture);
     Picture::side_by_side(&[&ours.picture, &bad, &ours.flip.picture()], 8)
 }
 
-fn thumbnails(
-    analysis: &Analysis,
-    ours: &Analysed,
-    plain: &Analysed,
-) -> anyhow::Result<Thumbnails> {
-    let frame = analysis.frame();
+fn thumbnails(loaded: &LoadedTrace, ours: &RuleRun, plain: &RuleRun) -> anyhow::Result<Thumbnails> {
+    let frame = loaded.frame();
     let small = |p: &Picture| png::encode(&p.shrunk_to(report::THUMBNAIL_PX));
     Ok(Thumbnails {
-        left: small(&analysis.left())?,
+        left: small(&loaded.left())?,
         bad: small(&picture::bad_pixels(frame, &ours.decisions, &ours.picture))?,
         flip: small(&ours.flip.picture())?,
         plain_bad: small(&picture::bad_pixels(
@@ -275,11 +273,11 @@ mod tests {
     fn a_trace_file_gives_the_result_of_the_trace_in_memory() {
         let (_folder, path) = trace_file();
         let args = args(&[&path]);
-        let entry = analyse(Path::new(&path), &args, &SgrtConfig::default()).expect("analysed");
+        let entry = report_on(Path::new(&path), &args, &SgrtConfig::default()).expect("a report");
         let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
         scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
         let source = trace(&scene, View::default());
-        let direct = Analysis::load(&source)
+        let direct = LoadedTrace::load(&source)
             .expect("loads")
             .run(&args.rule, args.reuse, &SgrtConfig::default())
             .expect("runs");

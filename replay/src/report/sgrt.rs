@@ -3,9 +3,9 @@
 mod charts;
 mod tables;
 
+use crate::paper::sgrt as paper;
 use crate::report::html::{Section, folded, page as html_page};
 use crate::report::plots::{PlotError, data_uri};
-use crate::sgrt::paper;
 use crate::sgrt::result::Report;
 use maud::{Markup, html};
 
@@ -123,9 +123,12 @@ pub fn text(entries: &[Entry]) -> String {
     if let Some(line) = tables::mean_reuse_line(entries) {
         part("Average reuse", line);
     }
+    for note in tables::row_notes(entries) {
+        part("Rows", note);
+    }
     part("Reuse and image error", tables::accuracy(entries).text());
     part("Right pixels by class", tables::classes(entries).text());
-    part("G-buffer traffic", tables::traffic(entries).text());
+    part("Bytes moved", tables::traffic(entries).text());
     for entry in entries {
         let scene = tables::scene_name(&entry.report);
         if !entry.report.curve.is_empty() {
@@ -147,6 +150,7 @@ fn performance(entries: &[Entry]) -> Result<Markup, PlotError> {
         (charts::ratios(entries)?)
         p { (tables::rule_line(entries)) "." }
         @if let Some(line) = tables::mean_reuse_line(entries) { p { (line) "." } }
+        @for note in tables::row_notes(entries) { p { strong { (note) "." } } }
         (tables::performance(entries).markup())
         p {
             "The paper's average reuse is " (paper::REUSE_PCT) " %, its units' work falls by about "

@@ -1,7 +1,7 @@
 //! Reused hits against the traced truth.
 
+use super::detect::{Decision, PixelClass};
 use super::frame::{Frame, Sample};
-use super::reject::{Decision, PixelClass};
 use formats::raytrace::EyeCamera;
 use formats::view::Eye;
 use rayon::prelude::*;
@@ -91,9 +91,9 @@ pub fn position_error_px(
     reused.distance(actual) / pixel_m
 }
 
-/// Counts the classes and the errors.
+/// Counts the decisions by class and holds reused hits against the traced ones.
 #[must_use]
-pub fn assess(frame: &Frame, decisions: &[Decision]) -> Accuracy {
+pub fn count_errors(frame: &Frame, decisions: &[Decision]) -> Accuracy {
     let eye = frame.tables.camera(Eye::Right);
     let mut accuracy = Accuracy::default();
     // NaN marks samples without a position error.

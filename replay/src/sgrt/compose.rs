@@ -12,8 +12,8 @@
 //! - Any other hit is wrong: both parts are the left pixel's, so that the error shows.
 
 use super::accuracy::position_error_px;
+use super::detect::Decision;
 use super::frame::{Frame, add};
-use super::reject::Decision;
 use clap::ValueEnum;
 use formats::view::Eye;
 use rayon::prelude::*;

@@ -1,5 +1,6 @@
 //! The model's parameters, read from TOML. Defaults and their reasons: `data/sgrt-default.toml`.
 
+use formats::raytrace::TraversalKind;
 use serde::{Deserialize, Serialize};
 
 /// The default parameters with their comments.
@@ -33,8 +34,10 @@ pub struct Tni {
     pub clock_mhz: f64,
     /// Traversal pipelines of a unit.
     pub trv_pipelines: u32,
-    /// Issue cycles of a step.
+    /// Issue cycles of a step at a binary node.
     pub trv_cycles_per_step: f64,
+    /// Issue cycles of a step at an eight-wide node.
+    pub trv_cycles_per_wide_step: f64,
     /// Stages of a traversal pipeline.
     pub trv_depth_cycles: u32,
     /// Intersection pipelines of a unit.
@@ -95,6 +98,10 @@ pub struct Memory {
     pub bandwidth_gb_s: f64,
     /// Latency of a read.
     pub latency_ns: f64,
+    /// Attributes and texels per shaded hit.
+    pub shading_bytes: f64,
+    /// Frame buffer per pixel.
+    pub frame_buffer_bytes: u32,
 }
 
 /// Programmable cores and the kernels' costs in cycles of one lane.
@@ -133,35 +140,20 @@ pub struct Gbuffer {
     pub texcoord_bytes: u32,
     /// Position.
     pub position_bytes: u32,
-    /// Primitive and object number.
-    pub ids_bytes: u32,
-    /// What error detection reads of each pixel of the row.
-    pub row_bytes: u32,
-}
-
-impl Gbuffer {
-    /// Bytes of a whole record.
-    #[must_use]
-    pub fn record_bytes(&self) -> u64 {
-        [
-            self.color_bytes,
-            self.normal_bytes,
-            self.texcoord_bytes,
-            self.position_bytes,
-            self.ids_bytes,
-        ]
-        .into_iter()
-        .map(u64::from)
-        .sum()
-    }
+    /// Object number, in the record where error detection reads it.
+    pub object_bytes: u32,
+    /// Triangle number, in the record where error detection reads it.
+    pub triangle_bytes: u32,
 }
 
 /// Energy per operation and per byte.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Energy {
-    /// Per traversal step.
+    /// Per step at a binary node.
     pub step_pj: f64,
+    /// Per step at an eight-wide node.
+    pub wide_step_pj: f64,
     /// Per ray-triangle test.
     pub triangle_test_pj: f64,
     /// Per ray taken in and handed back.
@@ -178,10 +170,6 @@ pub struct Energy {
     pub dram_pj_per_byte: f64,
     /// Power that flows whatever is done.
     pub static_mw: f64,
-    /// DRAM bytes of attributes and texels per shaded hit.
-    pub shading_dram_bytes: f64,
-    /// DRAM bytes of the frame buffer per pixel.
-    pub frame_buffer_bytes: f64,
 }
 
 /// Parameters that cannot be used.
@@ -210,6 +198,15 @@ impl Default for SgrtConfig {
 }
 
 impl SgrtConfig {
+    /// Issue cycles and energy of a step of a tree.
+    #[must_use]
+    pub fn step(&self, traversal: TraversalKind) -> (f64, f64) {
+        match traversal {
+            TraversalKind::Bvh2 => (self.tni.trv_cycles_per_step, self.energy.step_pj),
+            TraversalKind::Bvh8 => (self.tni.trv_cycles_per_wide_step, self.energy.wide_step_pj),
+        }
+    }
+
     /// The defaults with a file's values laid over them.
     ///
     /// # Errors
@@ -229,7 +226,9 @@ impl SgrtConfig {
     pub fn check(&self) -> Result<(), ConfigError> {
         for (key, value) in self.numbers() {
             let rate = key.contains("hit_rate");
-            let cost = key.starts_with("energy.") || key.starts_with("gbuffer.");
+            let cost = key.starts_with("energy.")
+                || key.starts_with("gbuffer.")
+                || (key.starts_with("memory.") && key.ends_with("_bytes"));
             let kernel = key.starts_with("srp.") && key.ends_with("_cycles");
             let (expected, fits) = if rate {
                 ("a rate from 0 to 1", (0.0..=1.0).contains(&value))

@@ -1,10 +1,7 @@
 //! Energy of a frame by component. Only ratios between two runs of this model mean anything.
 
-use super::cache::Misses;
 use super::config::SgrtConfig;
-use super::gbuffer::Traffic;
-use super::srp::SrpCycles;
-use super::work::BatchWork;
+use super::hardware::Run;
 use formats::raytrace::BvhSummary;
 use serde::{Deserialize, Serialize};
 
@@ -33,84 +30,66 @@ impl EnergyPj {
     }
 }
 
-/// What a frame did.
-#[derive(Clone, Copy, Debug)]
-pub struct Activity<'a> {
-    /// Work of all batches.
-    pub work: &'a BatchWork,
-    /// Misses of all batches.
-    pub misses: &'a Misses,
-    /// Kernel cycles.
-    pub srp: &'a SrpCycles,
-    /// G-buffer traffic.
-    pub gbuffer: Traffic,
-    /// Pixels written to the frame buffer, both eyes.
-    pub frame_buffer_px: u64,
-    /// Time of the frame.
-    pub time_ns: f64,
-}
-
-/// Energy of a frame.
+/// Energy of what a frame did.
 #[must_use]
-pub fn energy(activity: &Activity, bvh: &BvhSummary, config: &SgrtConfig) -> EnergyPj {
+pub fn energy(run: &Run, bvh: &BvhSummary, config: &SgrtConfig) -> EnergyPj {
     let e = &config.energy;
-    let work = activity.work;
+    let work = &run.work;
     let (steps, tests) = (work.steps() as f64, work.triangle_tests() as f64);
     let rays = (work.rays() + work.retest_rays) as f64;
+    let (_, step_pj) = config.step(bvh.traversal);
     let read_bytes =
         steps * f64::from(bvh.bytes_per_node) + tests * f64::from(bvh.bytes_per_triangle);
-    let dram_bytes = activity.misses.dram_bytes
-        + activity.gbuffer.dram_bytes as f64
-        + work.shaded as f64 * e.shading_dram_bytes
-        + activity.frame_buffer_px as f64 * e.frame_buffer_bytes;
     EnergyPj {
-        tni_pj: steps * e.step_pj + tests * e.triangle_test_pj + rays * e.ray_pj,
-        srp_pj: activity.srp.lane_cycles() * e.srp_lane_cycle_pj,
+        tni_pj: steps * step_pj + tests * e.triangle_test_pj + rays * e.ray_pj,
+        srp_pj: run.srp.lane_cycles() * e.srp_lane_cycle_pj,
         caches_pj: read_bytes * e.l1_pj_per_byte
-            + activity.misses.l1 * config.cache.line_bytes as f64 * e.l2_pj_per_byte,
-        sram_pj: activity.gbuffer.on_chip_bytes as f64 * e.sram_pj_per_byte,
-        dram_pj: dram_bytes * e.dram_pj_per_byte,
+            + run.misses.l1 * config.cache.line_bytes as f64 * e.l2_pj_per_byte,
+        sram_pj: run.on_chip_bytes as f64 * e.sram_pj_per_byte,
+        dram_pj: run.dram.total() as f64 * e.dram_pj_per_byte,
         // A milliwatt is a picojoule a nanosecond.
-        static_pj: activity.time_ns * e.static_mw,
+        static_pj: run.time_ns * e.static_mw,
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::dram::DramBytes;
     use super::super::synthetic::bvh;
     use super::*;
+    use formats::raytrace::TraversalKind;
 
     #[test]
     fn each_component_is_its_count_times_its_cost() {
         let config = SgrtConfig::default();
-        let mut work = BatchWork {
-            shaded: 3,
-            ..BatchWork::default()
-        };
-        work.by_class[0].steps = 10;
-        work.by_class[1].triangle_tests = 4;
-        work.by_class[2].rays = 2;
-        let activity = Activity {
-            work: &work,
-            misses: &Misses::default(),
-            srp: &SrpCycles::default(),
-            gbuffer: Traffic {
-                on_chip_bytes: 100,
-                dram_bytes: 7,
+        let mut run = Run {
+            on_chip_bytes: 100,
+            dram: DramBytes {
+                hierarchy_bytes: 1,
+                gbuffer_bytes: 7,
+                shading_bytes: 20,
+                frame_buffer_bytes: 300,
             },
-            frame_buffer_px: 5,
             time_ns: 11.0,
+            ..Run::default()
         };
-        let got = energy(&activity, &bvh(), &config);
+        run.work.by_class[0].steps = 10;
+        run.work.by_class[1].triangle_tests = 4;
+        run.work.by_class[2].rays = 2;
+        let got = energy(&run, &bvh(), &config);
         let e = &config.energy;
-        assert_eq!(
-            got.tni_pj,
-            10.0 * e.step_pj + 4.0 * e.triangle_test_pj + 2.0 * e.ray_pj
-        );
+        let tests_and_rays = 4.0 * e.triangle_test_pj + 2.0 * e.ray_pj;
+        assert_eq!(got.tni_pj, 10.0 * e.step_pj + tests_and_rays);
         assert_eq!(got.sram_pj, 100.0 * e.sram_pj_per_byte);
-        let bytes = 7.0 + 3.0 * e.shading_dram_bytes + 5.0 * e.frame_buffer_bytes;
-        assert_eq!(got.dram_pj, bytes * e.dram_pj_per_byte);
+        assert_eq!(got.dram_pj, 328.0 * e.dram_pj_per_byte);
         assert_eq!(got.static_pj, 11.0 * e.static_mw);
         assert_eq!(got.srp_pj, 0.0);
+
+        let wide = BvhSummary {
+            traversal: TraversalKind::Bvh8,
+            ..bvh()
+        };
+        let got = energy(&run, &wide, &config);
+        assert_eq!(got.tni_pj, 10.0 * e.wide_step_pj + tests_and_rays);
     }
 }

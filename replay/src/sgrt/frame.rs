@@ -1,6 +1,7 @@
 //! A whole stereo frame of a ray trace: what each pixel sees and what its rays cost.
 
 use super::work::PixelWork;
+use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::{RayTile, RaytraceTables};
 use formats::view::{Eye, TILE_SIZE_PX};
 use rayon::prelude::*;
@@ -170,6 +171,17 @@ impl Frame {
         })
     }
 
+    /// Image position of a sample of either eye, in pixels from the top left.
+    #[must_use]
+    pub fn position_px(&self, sample: usize) -> [f32; 2] {
+        let (pixel, number) = (
+            sample as u32 / self.samples_per_px,
+            sample as u32 % self.samples_per_px,
+        );
+        let (x, y) = (pixel % self.size_px[0], pixel / self.size_px[0]);
+        sample_position_px(x, y, number, self.samples_per_px)
+    }
+
     /// Averages per-sample colours to an image, linear RGB.
     #[must_use]
     pub fn resolve(&self, colors: &[[f32; 3]]) -> Vec<[f32; 3]> {
@@ -246,8 +258,7 @@ fn load_eye(
                         None => {
                             let (x, y) = (left + (in_row / spp) as u32, top + row as u32);
                             let s = (in_row % spp) as u32;
-                            let at =
-                                formats::raytrace::camera::sample_position_px(x, y, s, spp as u32);
+                            let at = sample_position_px(x, y, s, spp as u32);
                             Sample {
                                 position: camera.direction(at),
                                 ..empty

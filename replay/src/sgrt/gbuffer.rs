@@ -2,11 +2,13 @@
 //! G-buffer in DRAM.
 //!
 //! Tile by tile (paper section III), shading leaves a tile's records in internal SRAM, from which
-//! the reproject and reuse kernels read; only error detection needs other tiles, so what
-//! it reads of every left pixel goes to DRAM once and DMA fetches each row once, for all tiles of the
-//! row band. On the whole screen, every record goes to DRAM and each kernel reads it back.
+//! the reproject and reuse kernels read; only error detection needs other tiles, so what it reads of
+//! every left pixel goes to DRAM once and DMA fetches the rows that a band of tiles needs, once for
+//! the whole band. On the whole screen, every record goes to DRAM, each kernel reads it back, and
+//! detection reads the same rows.
 
 use super::config::Gbuffer;
+use super::reads::Reads;
 use serde::{Deserialize, Serialize};
 
 /// Bytes moved by one way of keeping the G-buffer.
@@ -18,47 +20,59 @@ pub struct Traffic {
     pub dram_bytes: u64,
 }
 
-/// Pixels that the kernels handle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Left pixels.
-    pub left: u64,
-    /// Right pixels.
-    pub right: u64,
-    /// Right pixels reused.
-    pub reused: u64,
+/// Where the G-buffer's records are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeping {
+    /// One tile's on chip.
+    Tile,
+    /// The whole screen's in DRAM.
+    Screen,
 }
 
-/// Traffic with the G-buffer of one tile on chip.
+/// Pixels of a right tile that the kernels handle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RightTile {
+    /// Pixels tested.
+    pub tested: u64,
+    /// Pixels reused.
+    pub reused: u64,
+    /// The tile's share of the bytes that its band's rows are fetched with.
+    pub fetched_bytes: u64,
+}
+
+/// Traffic of a left tile: shading writes its records, the reproject kernel reads what detection
+/// will, and that is written for the rows.
 #[must_use]
-pub fn tiled(counts: Counts, g: &Gbuffer) -> Traffic {
-    let record = g.record_bytes();
-    let row = u64::from(g.row_bytes);
-    let projected = u64::from(g.position_bytes + g.ids_bytes);
-    Traffic {
-        // Written by shading, read by reproject, read again by reuse, and the tile's own right
-        // records written; the row comes in by DMA and is read by detection.
-        on_chip_bytes: counts.left * (record + projected)
-            + counts.reused * record
-            + counts.right * record
-            + counts.left * row
-            + counts.right * row,
-        dram_bytes: counts.left * row + counts.left * row,
+pub fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
+    let record = pixels * reads.record_bytes(g);
+    let row = pixels * reads.pixel_bytes(g);
+    match keeping {
+        Keeping::Tile => Traffic {
+            on_chip_bytes: record + row,
+            dram_bytes: row,
+        },
+        Keeping::Screen => Traffic {
+            on_chip_bytes: 0,
+            dram_bytes: record + row,
+        },
     }
 }
 
-/// Traffic with both eyes' G-buffers in DRAM.
+/// Traffic of a right tile: the rows come in and detection looks things up in them, reuse reads the
+/// left records, and the tile's own records are written.
 #[must_use]
-pub fn whole_screen(counts: Counts, g: &Gbuffer) -> Traffic {
-    let record = g.record_bytes();
-    let row = u64::from(g.row_bytes);
-    let projected = u64::from(g.position_bytes + g.ids_bytes);
-    Traffic {
-        on_chip_bytes: 0,
-        dram_bytes: counts.left * (record + projected)
-            + counts.reused * record
-            + counts.right * record
-            + counts.right * row,
+pub fn right_tile(tile: &RightTile, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
+    let records = (tile.reused + tile.tested) * reads.record_bytes(g);
+    let rows_on_chip = tile.fetched_bytes + tile.tested * reads.looked_up_bytes(g);
+    match keeping {
+        Keeping::Tile => Traffic {
+            on_chip_bytes: records + rows_on_chip,
+            dram_bytes: tile.fetched_bytes,
+        },
+        Keeping::Screen => Traffic {
+            on_chip_bytes: rows_on_chip,
+            dram_bytes: records + tile.fetched_bytes,
+        },
     }
 }
 
@@ -70,18 +84,24 @@ mod tests {
     #[test]
     fn tiling_leaves_only_the_rows_in_dram() {
         let g = SgrtConfig::default().gbuffer;
-        let counts = Counts {
-            left: 1000,
-            right: 1000,
+        let reads = Reads::ARRIVALS;
+        let right = RightTile {
+            tested: 1000,
             reused: 900,
+            fetched_bytes: 12_500,
         };
-        let (tiled, screen) = (tiled(counts, &g), whole_screen(counts, &g));
-        assert_eq!(tiled.dram_bytes, 2 * 1000 * u64::from(g.row_bytes));
-        assert!(tiled.dram_bytes < screen.dram_bytes / 2);
-        // What the tile keeps on chip is what the whole screen moves through DRAM, and the row.
-        assert_eq!(
-            tiled.on_chip_bytes,
-            screen.dram_bytes + 1000 * u64::from(g.row_bytes)
-        );
+        let both = |keeping| {
+            let left = left_tile(1000, keeping, reads, &g);
+            let right = right_tile(&right, keeping, reads, &g);
+            [
+                left.dram_bytes + right.dram_bytes,
+                left.on_chip_bytes + right.on_chip_bytes,
+            ]
+        };
+        let (tiled, screen) = (both(Keeping::Tile), both(Keeping::Screen));
+        assert_eq!(tiled[0], 12_000 + 12_500);
+        assert!(tiled[0] < screen[0] / 2);
+        // A tile keeps on chip what the whole screen moves through DRAM.
+        assert_eq!(screen[0] - tiled[0], tiled[1] - screen[1] - 12_000);
     }
 }

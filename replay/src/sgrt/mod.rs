@@ -3,27 +3,34 @@
 //!
 //! The left image is traced in full. Its hits are projected into the right eye, where the nearest
 //! one a pixel is a candidate ([`reproject`]); error detection rejects doubtful candidates
-//! ([`reject`]); what stands is reused, the rest is traced ([`compose`]). The trace holds both
-//! eyes traced in full, so each reuse is held against the truth ([`accuracy`]), and the work that
-//! it saves is known ray by ray: [`tni`] and [`srp`] turn work into cycles, [`energy`] into
-//! joules, [`gbuffer`] counts what the tile buffers and DRAM move. [`evaluate`] puts them together.
+//! ([`detect`], by [`rules`]); what stands is reused, the rest is traced ([`compose`]). The trace
+//! holds both eyes traced in full, so each reuse is held against the truth ([`accuracy`]), and the
+//! work that it saves is known ray by ray: [`hardware`] puts together what [`tni`] and [`srp`] make
+//! of it in cycles, [`dram`] in bytes ([`gbuffer`]'s share follows from what a rule [`reads`] and
+//! from the [`rows`] that hold it) and [`energy`] in joules. [`loaded`] runs a rule on a trace,
+//! [`variations`] many rules or parameters.
 
 pub mod accuracy;
-pub mod analyse;
 pub mod cache;
 pub mod compose;
 pub mod config;
+pub mod detect;
+pub mod dram;
 pub mod energy;
-pub mod evaluate;
 pub mod frame;
 pub mod gbuffer;
-pub mod paper;
+pub mod hardware;
+pub mod loaded;
 pub mod picture;
-pub mod reject;
+pub mod place;
+pub mod reads;
 pub mod reproject;
 pub mod result;
+pub mod rows;
+pub mod rules;
 pub mod srp;
 pub mod tni;
+pub mod variations;
 pub mod work;
 
 #[cfg(test)]

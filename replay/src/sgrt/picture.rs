@@ -1,7 +1,7 @@
 //! The right image with its bad pixels in yellow, as the paper's figure 1 shows them.
 
+use super::detect::{Decision, PixelClass};
 use super::frame::Frame;
-use super::reject::{Decision, PixelClass};
 use crate::image::Picture;
 
 /// Traced pixels, missing or rejected.

@@ -3,15 +3,18 @@
 use super::accuracy::Accuracy;
 use super::compose::Reuse;
 use super::config::SgrtConfig;
+use super::dram::DramBytes;
 use super::energy::EnergyPj;
-use super::evaluate::Evaluation;
-use super::gbuffer::Traffic;
-use super::reject::Rule;
+use super::hardware::{Comparison, Run};
+use super::reads::Reads;
+use super::rows::RowSummary;
+use super::rules::Rule;
+use crate::paper::sgrt::PaperValues;
 use crate::result::TraceId;
 use serde::{Deserialize, Serialize};
 
 /// Schema of the object that `replay reproject --json` prints.
-pub const SCHEMA: &str = "replay.reproject/1";
+pub const SCHEMA: &str = "replay.reproject/2";
 
 /// Everything about one trace.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -26,13 +29,15 @@ pub struct Report {
     pub scene_triangles: u64,
     /// Width and height of an eye's image.
     pub eye_size_px: [u32; 2],
+    /// Whether the paper's row test applies to the eyes.
+    pub rows: RowSummary,
     /// The whole configuration.
     pub config: Config,
     /// Under the rule asked for.
     pub result: Outcome,
     /// The paper's plain reuse: every arrival, as it is.
     pub plain: Outcome,
-    /// The paper's values for the scene that this one stands for.
+    /// The paper's values, where the trace is set beside one of its scenes.
     pub paper: Option<PaperValues>,
     /// Units' cycles saved against image error, where asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -53,17 +58,6 @@ pub struct Config {
     pub cache_misses: String,
     /// The hardware.
     pub model: SgrtConfig,
-}
-
-/// The paper's values for a scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PaperValues {
-    /// Scene in the paper.
-    pub scene: String,
-    /// Frames per second over the reference's.
-    pub relative_performance: f64,
-    /// Energy over the reference's.
-    pub relative_energy: f64,
 }
 
 /// The figures of one rule and level of reuse.
@@ -107,8 +101,12 @@ pub struct Outcome {
     pub tni_bottleneck: String,
     /// Time of the frame in the model.
     pub time_us: f64,
+    /// Part of it in which external memory is the bottleneck.
+    pub memory_bound_us: f64,
     /// Time of the reference in the model.
     pub reference_time_us: f64,
+    /// The same with both eyes traced in full.
+    pub reference_memory_bound_us: f64,
     /// Mean FLIP of the right image against the traced one.
     pub flip_mean: f64,
     /// 99th percentile of FLIP.
@@ -125,16 +123,31 @@ pub struct Outcome {
     pub work: Work,
     /// The same with both eyes traced in full.
     pub reference_work: Work,
-    /// G-buffer bytes, tile by tile.
-    pub gbuffer_tiled: Traffic,
-    /// G-buffer bytes with the whole screen's in DRAM.
-    pub gbuffer_whole_screen: Traffic,
-    /// Energy with the whole screen's G-buffer in DRAM over the reference's.
-    pub whole_screen_relative_energy: f64,
+    /// What error detection reads, hence what goes through DRAM for it.
+    pub detection_reads: Reads,
+    /// Bytes in and out of the tile buffers.
+    pub on_chip_bytes: u64,
+    /// Bytes in and out of external memory.
+    pub dram: DramBytes,
+    /// The same with both eyes traced in full.
+    pub reference_dram: DramBytes,
+    /// With the whole screen's G-buffer in DRAM.
+    pub whole_screen: WholeScreen,
     /// Energy by component.
     pub energy: EnergyPj,
     /// The same with both eyes traced in full.
     pub reference_energy: EnergyPj,
+}
+
+/// Reprojection without tiles: the whole screen's G-buffer in DRAM.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WholeScreen {
+    /// Frames per second over those of tracing both eyes in full.
+    pub relative_performance: f64,
+    /// Energy over that of tracing both eyes in full.
+    pub relative_energy: f64,
+    /// Bytes in and out of external memory.
+    pub dram: DramBytes,
 }
 
 /// Work of a frame on the units.
@@ -157,7 +170,7 @@ pub struct Work {
 }
 
 impl Work {
-    fn of(run: &super::evaluate::Run) -> Self {
+    fn of(run: &Run) -> Self {
         Self {
             rays: run.work.rays(),
             steps: run.work.steps(),
@@ -185,6 +198,8 @@ pub struct CurvePoint {
     pub tni_reduction_pct: f64,
     /// Frames per second over the reference's.
     pub relative_performance: f64,
+    /// Energy over the reference's.
+    pub relative_energy: f64,
     /// Mean FLIP.
     pub flip_mean: f64,
     /// 99th percentile of FLIP.
@@ -222,9 +237,15 @@ pub struct ImageError {
 impl Outcome {
     /// Puts the figures together.
     #[must_use]
-    pub fn new(accuracy: &Accuracy, evaluation: &Evaluation, error: &ImageError) -> Self {
+    pub fn new(
+        accuracy: &Accuracy,
+        comparison: &Comparison,
+        error: &ImageError,
+        reads: Reads,
+    ) -> Self {
         let reused = accuracy.all_reused();
-        let (reference, run) = (&evaluation.reference, &evaluation.reprojected);
+        let (reference, run) = (&comparison.reference, &comparison.reprojected);
+        let whole_screen = &comparison.whole_screen;
         let saved_pct = |part: f64, whole: f64| {
             if whole > 0.0 {
                 100.0 * (1.0 - part / whole)
@@ -239,8 +260,8 @@ impl Outcome {
             wrong_primitive_pct: accuracy.pct(reused.wrong_primitive),
             position_over_1px_pct: accuracy.pct(reused.position_over[0]),
             position_over_2px_pct: accuracy.pct(reused.position_over[1]),
-            relative_performance: evaluation.relative_performance(),
-            relative_energy: evaluation.relative_energy(),
+            relative_performance: comparison.relative_performance(),
+            relative_energy: comparison.relative_energy(),
             tni_relative_performance: reference.tni_cycles / run.tni_cycles,
             primary_steps_pct: 100.0 * reference.work.by_class[0].steps as f64
                 / reference.work.steps().max(1) as f64,
@@ -250,13 +271,15 @@ impl Outcome {
             reference_srp_cycles: cycles(reference.srp.total()),
             tni_reduction_pct: saved_pct(run.tni_cycles, reference.tni_cycles),
             right_tni_reduction_pct: saved_pct(
-                evaluation.right_tni_cycles,
-                evaluation.right_full_tni_cycles,
+                comparison.right_tni_cycles,
+                comparison.right_full_tni_cycles,
             ),
             srp_overhead_pct: 100.0 * run.srp.added_lane_cycles() / reference.srp.lane_cycles(),
             tni_bottleneck: run.tni.bottleneck().to_owned(),
             time_us: run.time_ns * 1e-3,
+            memory_bound_us: run.memory_bound_ns * 1e-3,
             reference_time_us: reference.time_ns * 1e-3,
+            reference_memory_bound_us: reference.memory_bound_ns * 1e-3,
             flip_mean: error.flip_mean,
             flip_p99: error.flip_p99,
             pixels_per_degree: error.pixels_per_degree,
@@ -265,10 +288,15 @@ impl Outcome {
             classes: *accuracy,
             work: Work::of(run),
             reference_work: Work::of(reference),
-            gbuffer_tiled: run.gbuffer,
-            gbuffer_whole_screen: evaluation.whole_screen,
-            whole_screen_relative_energy: evaluation.whole_screen_energy_pj
-                / reference.energy.total(),
+            detection_reads: reads,
+            on_chip_bytes: run.on_chip_bytes,
+            dram: run.dram,
+            reference_dram: reference.dram,
+            whole_screen: WholeScreen {
+                relative_performance: whole_screen.performance_over(reference),
+                relative_energy: whole_screen.energy_over(reference),
+                dram: whole_screen.dram,
+            },
             energy: run.energy,
             reference_energy: reference.energy,
         }

@@ -1,7 +1,7 @@
 //! Ray traces of scenes simple enough to know the answer, for tests.
 
+use super::detect::intersect;
 use super::frame::{Frame, RaySource};
-use super::reject::intersect;
 use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::half::round3;
 use formats::raytrace::{
@@ -18,6 +18,8 @@ use std::error::Error;
 pub const DIFFUSE: u32 = 0;
 /// Index of the mirror material.
 pub const MIRROR: u32 = 1;
+/// Index of a diffuse material with holes.
+pub const LEAF: u32 = 2;
 
 /// Something to look at.
 #[derive(Clone, Copy, Debug)]
@@ -92,6 +94,14 @@ pub struct View {
     pub size_px: [u32; 2],
     pub ipd_m: f32,
     pub samples_per_px: u32,
+    /// Outward turn of each eye.
+    pub cant_deg: f32,
+    /// What the right eye sees more upwards than the left one and less downwards, as a tangent.
+    pub right_tilt: f32,
+    /// Position between the eyes.
+    pub center: [f32; 3],
+    /// Tree that the steps are of.
+    pub tree: TraversalKind,
 }
 
 impl Default for View {
@@ -100,11 +110,15 @@ impl Default for View {
             size_px: [72, 40],
             ipd_m: 0.064,
             samples_per_px: 1,
+            cant_deg: 0.0,
+            right_tilt: 0.0,
+            center: [0.0; 3],
+            tree: TraversalKind::Bvh2,
         }
     }
 }
 
-/// Traces a scene for two parallel 90-degree eyes at the origin that look along -z.
+/// Traces a scene for two 90-degree eyes that look along -z.
 pub fn trace(scene: &[Placed], view: View) -> Synthetic {
     let fov = FovTangents {
         left: 1.0,
@@ -112,13 +126,22 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
         up: 0.6,
         down: 0.6,
     };
-    let eyes = [-0.5f32, 0.5].map(|side| EyeCamera {
-        position: [side * view.ipd_m, 0.0, 0.0],
-        right: [1.0, 0.0, 0.0],
-        up: [0.0, 1.0, 0.0],
-        forward: [0.0, 0.0, -1.0],
-        fov,
-        size_px: view.size_px,
+    let eyes = [-1.0f32, 1.0].map(|side| {
+        let (sine, cosine) = (side * view.cant_deg).to_radians().sin_cos();
+        let tilt = view.right_tilt * side.max(0.0);
+        let [x, y, z] = view.center;
+        EyeCamera {
+            position: [x + 0.5 * side * view.ipd_m, y, z],
+            right: [cosine, 0.0, sine],
+            up: [0.0, 1.0, 0.0],
+            forward: [sine, 0.0, -cosine],
+            fov: FovTangents {
+                up: fov.up + tilt,
+                down: fov.down - tilt,
+                ..fov
+            },
+            size_px: view.size_px,
+        }
     });
     let triangles = scene
         .iter()
@@ -169,8 +192,18 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
             has_visits: false,
             sky: [[0.3, 0.5, 0.9]; 2],
         },
-        bvh: bvh(),
-        materials: vec![material("diffuse", false), material("mirror", true)],
+        bvh: BvhSummary {
+            traversal: view.tree,
+            ..bvh()
+        },
+        materials: vec![
+            material("diffuse", false),
+            material("mirror", true),
+            RayMaterial {
+                alpha_masked: true,
+                ..material("leaf", false)
+            },
+        ],
         lights: Vec::new(),
         triangles,
     };

@@ -2,9 +2,9 @@
 //!
 //! A unit holds many rays in flight and issues, each cycle, at most one step per traversal
 //! pipeline and one triangle test per intersection pipeline, whichever ray is ready. Its
-//! throughput is therefore set by the scarcest of five resources, and the batch takes
+//! throughput is therefore set by the scarcest of four resources, and the batch takes
 //!
-//! `max(traversal issue, intersection issue, ray hand-over, latency / rays in flight, DRAM bytes)`
+//! `max(traversal issue, intersection issue, ray hand-over, latency / rays in flight)`
 //!
 //! where latency is what a ray would take alone: its steps and tests through the full depth of
 //! their pipelines, plus what its cache misses wait. Batches follow each other without a gap, so
@@ -14,6 +14,7 @@
 use super::cache::Misses;
 use super::config::SgrtConfig;
 use super::work::BatchWork;
+use formats::raytrace::TraversalKind;
 
 /// Cycles that each resource needs for a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,8 +27,6 @@ pub struct TniCycles {
     pub handover: f64,
     /// Serial latency of all rays over the rays in flight.
     pub latency: f64,
-    /// Transfer of the lines that missed the L2.
-    pub bandwidth: f64,
 }
 
 impl TniCycles {
@@ -39,7 +38,6 @@ impl TniCycles {
             self.intersection,
             self.handover,
             self.latency,
-            self.bandwidth,
         ]
         .into_iter()
         .fold(0.0, f64::max)
@@ -53,7 +51,6 @@ impl TniCycles {
             ("intersection", self.intersection),
             ("hand-over", self.handover),
             ("latency", self.latency),
-            ("bandwidth", self.bandwidth),
         ];
         let total = self.total();
         all.iter()
@@ -67,32 +64,35 @@ impl TniCycles {
         self.intersection += other.intersection;
         self.handover += other.handover;
         self.latency += other.latency;
-        self.bandwidth += other.bandwidth;
     }
 }
 
-/// Cycles of a batch whose memory accesses missed as told.
+/// Cycles of a batch in a tree of a kind whose memory accesses missed as told. A step that holds
+/// its pipeline for several cycles leaves it as much later.
 #[must_use]
-pub fn cycles(work: &BatchWork, misses: &Misses, config: &SgrtConfig) -> TniCycles {
+pub fn cycles(
+    work: &BatchWork,
+    misses: &Misses,
+    tree: TraversalKind,
+    config: &SgrtConfig,
+) -> TniCycles {
+    let (step_cycles, _) = config.step(tree);
     let tni = &config.tni;
     let units = f64::from(tni.units);
     let (steps, tests) = (work.steps() as f64, work.triangle_tests() as f64);
     let rays = (work.rays() + work.retest_rays) as f64;
 
     let dram_cycles = config.memory.latency_ns * tni.clock_mhz * 1e-3;
-    let latency = steps * f64::from(tni.trv_depth_cycles)
+    let latency = steps * (f64::from(tni.trv_depth_cycles) + (step_cycles - 1.0).max(0.0))
         + tests * f64::from(tni.ist_depth_cycles)
         + misses.l1 * f64::from(config.cache.l2_latency_cycles)
         + misses.l2 * dram_cycles;
-    // GB/s over MHz is thousands of bytes a cycle.
-    let bytes_per_cycle = config.memory.bandwidth_gb_s * 1e3 / tni.clock_mhz;
 
     TniCycles {
-        traversal: steps * tni.trv_cycles_per_step / (units * f64::from(tni.trv_pipelines)),
+        traversal: steps * step_cycles / (units * f64::from(tni.trv_pipelines)),
         intersection: tests * tni.ist_cycles_per_test / (units * f64::from(tni.ist_pipelines)),
         handover: rays / (units * tni.rays_per_cycle),
         latency: latency / (units * f64::from(tni.rays_in_flight)),
-        bandwidth: misses.dram_bytes / bytes_per_cycle,
     }
 }
 

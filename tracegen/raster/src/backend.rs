@@ -2,24 +2,16 @@
 
 use super::draws::DrawList;
 use super::error::RasterError;
+use super::frame::Frame;
 use super::lighting::Lighting;
 use formats::view::EyeView;
 use glam::Mat4;
-use record::RawRecords;
+use record::{Captured, Region, Sink};
 
-/// A rectangle of the view in pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Region {
-    /// Left and top edge.
-    pub origin_px: [u32; 2],
-    /// Width and height.
-    pub size_px: [u32; 2],
-}
-
-/// What every draw of a view shares.
-#[derive(Clone, Debug)]
+/// One view to render: its camera, its light and its draws.
+#[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// Eye matrices.
+    /// Matrices.
     pub eye: EyeView,
     /// Lights and shadow matrices of the frame.
     pub lighting: &'a Lighting,
@@ -31,25 +23,31 @@ impl View<'_> {
     /// World to clip space.
     #[must_use]
     pub fn clip_from_world(&self) -> Mat4 {
-        Mat4::from_cols_array_2d(&self.eye.eye_to_clip)
-            * Mat4::from_cols_array_2d(&self.eye.world_to_eye)
+        clip_from_world(&self.eye)
     }
 }
 
-/// What became of one region.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rendered {
-    /// The picture is complete; this many records were handed to the sink (0 without capture).
-    Complete {
-        /// Records of the region.
-        records: u64,
-    },
-    /// The record buffer was too small; nothing was handed over and the region must be rendered
-    /// again in parts.
-    Overflow {
-        /// Records that the region produces.
-        needed: u64,
-    },
+/// World to the clip space of an eye.
+#[must_use]
+pub(crate) fn clip_from_world(eye: &EyeView) -> Mat4 {
+    Mat4::from_cols_array_2d(&eye.eye_to_clip) * Mat4::from_cols_array_2d(&eye.world_to_eye)
+}
+
+/// What a backend has done so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Regions of views rendered, those that overflowed counted too.
+    pub regions: u64,
+    /// Draws of all passes.
+    pub draws: u64,
+    /// Draw calls that they took.
+    pub calls: u64,
+    /// Shadow maps rendered, one a cascade.
+    pub shadow_maps: u64,
+    /// Pipelines made.
+    pub pipelines: u64,
+    /// Samplers made.
+    pub samplers: u64,
 }
 
 /// A driver that renders a scene and hands over what its fragments sampled.
@@ -67,25 +65,27 @@ pub trait CaptureBackend {
     /// Records that one region may produce.
     fn record_capacity(&self) -> u64;
 
-    /// Renders the shadow maps of a frame, if the lighting has any.
-    ///
-    /// # Errors
-    /// Driver errors.
-    fn render_shadows(&mut self, draws: &DrawList, lighting: &Lighting) -> Result<(), RasterError>;
+    /// What was done so far.
+    fn work(&self) -> Work;
 
-    /// Renders a region of a view into the view's picture, and with `capture` hands every record
-    /// of the region to `sink`.
+    /// Renders the shadow maps of a frame, if its lighting has any.
     ///
     /// # Errors
     /// Driver errors.
+    fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError>;
+
+    /// Renders a region of a view into the view's picture and, where there is a `sink`, hands it
+    /// every record of the region (see [`record::Capturer::capture`]).
+    ///
+    /// # Errors
+    /// Driver errors, and what `sink` returns.
     fn render(
         &mut self,
         draws: &DrawList,
         view: &View<'_>,
         region: Region,
-        capture: bool,
-        sink: &mut dyn FnMut(RawRecords<'_>) -> Result<(), RasterError>,
-    ) -> Result<Rendered, RasterError>;
+        sink: Option<&mut Sink<'_>>,
+    ) -> Result<Captured, RasterError>;
 
     /// Reads the picture that the regions since have filled: sRGB RGBA8, row by row.
     ///

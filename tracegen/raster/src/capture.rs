@@ -4,12 +4,11 @@ use super::backend::{CaptureBackend, View};
 use super::cascades;
 use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
+use super::frame::Frame;
 use super::lighting::Lighting;
-use super::regions;
-use formats::textrace::{EncodedTile, Pass, PassKind, Tables, TextraceWriter, encode_tile};
+use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
-use rayon::prelude::*;
-use record::{Bins, CaptureCounts, RawRecords, Scratch, TileRect, TileRules};
+use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
 
@@ -23,45 +22,70 @@ pub struct CaptureJob<'a> {
     pub bounds: (glam::Vec3, glam::Vec3),
     /// Distances from the head that the cascades span, metres.
     pub shadow_range_m: [f32; 2],
-    /// Pixels of one eye.
+    /// Pixels of one view.
     pub size_px: [u32; 2],
-    /// Bands that a view is split into at first; grows when one overflows.
-    pub parts: u32,
+    /// The views of each frame, in the order of their passes.
+    pub views: &'a [Eye],
 }
 
-/// The pictures of one frame: left and right eye, sRGB RGBA8.
-pub type Pictures = [Vec<u8>; 2];
+/// The pictures of one frame, one a view: sRGB RGBA8.
+pub type Pictures = Vec<Vec<u8>>;
 
 impl CaptureJob<'_> {
     /// Passes of `frames` frames in the order in which [`Self::capture_frame`] writes them.
     #[must_use]
-    pub fn passes(size_px: [u32; 2], frames: u32) -> Vec<Pass> {
+    pub fn passes(&self, frames: u32) -> Vec<Pass> {
+        let pass = |frame, eye| Pass {
+            frame,
+            kind: PassKind::Main,
+            eye: Some(eye),
+            size_px: self.size_px,
+            tiles: self.size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
+        };
         (0..frames)
-            .flat_map(|frame| {
-                [Eye::Left, Eye::Right].map(|eye| Pass {
-                    frame,
-                    kind: PassKind::Main,
-                    eye: Some(eye),
-                    size_px,
-                    tiles: size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
-                })
-            })
+            .flat_map(|frame| self.views.iter().map(move |eye| pass(frame, *eye)))
             .collect()
     }
 
-    /// Fits the frame's shadow cascades.
-    pub(crate) fn light_frame(&self, views: &FrameViews) -> Lighting {
+    /// The recorder of this job's passes; `tables` are the trace's.
+    #[must_use]
+    pub fn recorder<'t>(&self, tables: &'t Tables) -> Recorder<'t> {
+        let modes = self.draws.calls.iter().map(|call| call.mode);
+        Recorder::new(tables, modes.map(|mode| mode == DrawMode::Masked).collect())
+    }
+
+    /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds what each
+    /// view may see.
+    #[must_use]
+    pub fn frame(&self, views: &FrameViews) -> Frame {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
         lighting.cascades = cascades::fit(
-            views,
+            &views.eyes,
             self.draws.cascades,
             lighting.to_sun,
             self.bounds,
             near,
             far,
         );
-        lighting
+        let eyes: Vec<_> = (self.views.iter())
+            .map(|eye| views.eyes[*eye as usize])
+            .collect();
+        Frame::new(self.draws, lighting, &eyes)
+    }
+
+    /// Renders the frame's shadow maps: once for all its pictures.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn light(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<Duration, RasterError> {
+        let start = Instant::now();
+        backend.render_shadows(self.draws, frame)?;
+        Ok(start.elapsed())
     }
 
     /// Makes the driver compile every shader that the frame's plain and captured pictures use, by
@@ -72,140 +96,99 @@ impl CaptureJob<'_> {
     pub fn warm_up(
         &self,
         backend: &mut dyn CaptureBackend,
-        views: &FrameViews,
+        frame: &Frame,
     ) -> Result<(), RasterError> {
-        let lighting = self.light_frame(views);
-        backend.render_shadows(self.draws, &lighting)?;
-        let corner = super::backend::Region {
+        let corner = Region {
             origin_px: [0, 0],
             size_px: self.size_px.map(|s| s.min(TILE_SIZE_PX)),
         };
-        for eye in views.eyes {
-            let mut view = View {
-                eye,
-                lighting: &lighting,
-                visible: &[],
-            };
-            let visible = self.draws.visible(view.clip_from_world());
-            view.visible = &visible;
-            for capture in [false, true] {
-                backend.render(self.draws, &view, corner, capture, &mut |_| Ok(()))?;
-            }
+        for view in frame.views() {
+            backend.render(self.draws, &view, corner, None)?;
+            backend.render(self.draws, &view, corner, Some(&mut |_| Ok(())))?;
         }
         Ok(())
     }
 
-    /// Renders a frame without capture: shadow maps, both eyes, pictures read back.
+    /// Renders a frame without capture: every view, pictures read back. The frame's shadow maps
+    /// have been rendered.
     ///
     /// # Errors
     /// Driver errors.
     pub fn plain_frame(
         &self,
         backend: &mut dyn CaptureBackend,
-        views: &FrameViews,
+        frame: &Frame,
     ) -> Result<(Pictures, Duration), RasterError> {
         let start = Instant::now();
-        let lighting = self.light_frame(views);
-        backend.render_shadows(self.draws, &lighting)?;
-        let mut pictures = Pictures::default();
-        for (eye, picture) in views.eyes.into_iter().zip(&mut pictures) {
-            let mut view = View {
-                eye,
-                lighting: &lighting,
-                visible: &[],
-            };
-            let visible = self.draws.visible(view.clip_from_world());
-            view.visible = &visible;
-            regions::render_view(backend, self.draws, &view, self.size_px)?;
-            *picture = backend.picture()?;
-        }
+        let whole = Region {
+            origin_px: [0, 0],
+            size_px: self.size_px,
+        };
+        let pictures = frame
+            .views()
+            .map(|view| {
+                backend.render(self.draws, &view, whole, None)?;
+                backend.picture()
+            })
+            .collect::<Result<_, _>>()?;
         Ok((pictures, start.elapsed()))
     }
 
     /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the
-    /// number of the left eye's pass. The time is what sorting, encoding and writing took.
+    /// number of the first view's pass. The frame's shadow maps have been rendered. The time is
+    /// what sorting, encoding and writing took.
     ///
     /// # Errors
     /// Driver errors, a record budget that one tile overflows, and errors of writing.
     pub fn capture_frame<W: Write + Seek>(
-        &mut self,
+        &self,
         backend: &mut dyn CaptureBackend,
-        views: &FrameViews,
+        frame: &Frame,
         first_pass: usize,
-        tables: &Tables,
+        recorder: &mut Recorder<'_>,
         writer: &mut TextraceWriter<W>,
     ) -> Result<(Pictures, CaptureCounts, Duration), RasterError> {
-        let modes = self.draws.calls.iter().map(|call| call.mode);
-        let masked = modes.map(|mode| mode == DrawMode::Masked).collect();
-        let rules = TileRules::new(tables, masked);
-        let lighting = self.light_frame(views);
-        backend.render_shadows(self.draws, &lighting)?;
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new();
         let mut counts = CaptureCounts::default();
         let mut sorting = Duration::ZERO;
-        let eyes = views.eyes.into_iter().zip(&mut pictures).zip(first_pass..);
-        for ((eye, picture), pass) in eyes {
-            let mut view = View {
-                eye,
-                lighting: &lighting,
-                visible: &[],
+        for (pass, view) in (first_pass..).zip(frame.views()) {
+            let mut capturer = ViewCapturer {
+                backend: &mut *backend,
+                draws: self.draws,
+                view,
+                size_px: self.size_px,
             };
-            let visible = self.draws.visible(view.clip_from_world());
-            view.visible = &visible;
-            let columns = tables.passes[pass].tiles[0];
-            let mut sink = |rect: &TileRect, records: RawRecords<'_>| {
-                let start = Instant::now();
-                let (tiles, of_region) = encode_region(&rules, tables, rect, records)?;
-                counts += of_region;
-                for (number, tile) in tiles.into_iter().enumerate() {
-                    let [column, row] = rect.tile(number);
-                    let index = (row * columns + column) as usize;
-                    writer
-                        .append(pass, index, tile)
-                        .map_err(|e| RasterError::Write(e.to_string()))?;
-                }
-                sorting += start.elapsed();
-                Ok(())
-            };
-            self.parts = regions::capture_view(
-                backend,
-                self.draws,
-                &view,
-                self.size_px,
-                self.parts,
-                &mut sink,
-            )?;
-            *picture = backend.picture()?;
+            let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
+            counts += recorded.counts;
+            sorting += recorded.sorting;
+            pictures.push(backend.picture()?);
         }
         Ok((pictures, counts, sorting))
     }
 }
 
-/// Bins, sorts, filters, quantises and encodes a region's records, tiles in parallel.
-fn encode_region(
-    rules: &TileRules,
-    tables: &Tables,
-    rect: &TileRect,
-    records: RawRecords<'_>,
-) -> Result<(Vec<EncodedTile>, CaptureCounts), RasterError> {
-    let bins = Bins::new(records.quads, rect);
-    let encoded: Vec<(EncodedTile, CaptureCounts)> = (0..rect.count())
-        .into_par_iter()
-        .map_init(Scratch::default, |scratch, tile| {
-            let mut counts = rules.build(records, &bins, tile, scratch);
-            let encoded = encode_tile(tables, &scratch.tile)
-                .map_err(|e| RasterError::Write(e.to_string()))?;
-            counts.tile_bytes = encoded.size_bytes() as u64;
-            Ok((encoded, counts))
-        })
-        .collect::<Result<_, RasterError>>()?;
-    let mut counts = CaptureCounts::default();
-    let tiles = encoded
-        .into_iter()
-        .map(|(tile, of_tile)| {
-            counts += of_tile;
-            tile
-        })
-        .collect();
-    Ok((tiles, counts))
+/// One view on a backend.
+struct ViewCapturer<'a> {
+    backend: &'a mut dyn CaptureBackend,
+    draws: &'a DrawList,
+    view: View<'a>,
+    size_px: [u32; 2],
+}
+
+impl Capturer for ViewCapturer<'_> {
+    type Error = RasterError;
+
+    fn record_capacity(&self) -> u64 {
+        self.backend.record_capacity()
+    }
+
+    fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, RasterError> {
+        // A part of the view needs only the draws that may touch it.
+        let touching = self.draws.touching(&self.view, region, self.size_px);
+        let view = View {
+            visible: &touching,
+            ..self.view
+        };
+        self.backend.render(self.draws, &view, region, Some(sink))
+    }
 }

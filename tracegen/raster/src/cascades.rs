@@ -7,7 +7,7 @@
 //! frame.
 
 use super::draws::SHADOW_SIZE;
-use formats::view::FrameViews;
+use formats::view::EyeView;
 use glam::camera::rh::{proj::directx::orthographic, view::look_at_mat4};
 use glam::{Mat4, Vec3};
 
@@ -27,11 +27,11 @@ pub struct Cascade {
     pub texel_m: f32,
 }
 
-/// Fits `count` cascades along `to_sun` to both eyes of a frame between `near_m` and `far_m` from
+/// Fits `count` cascades along `to_sun` to the frusta of `eyes` between `near_m` and `far_m` from
 /// the head; `bounds` are the scene's, so that every caster lies within the depth range.
 #[must_use]
 pub fn fit(
-    views: &FrameViews,
+    eyes: &[EyeView],
     count: u32,
     to_sun: Vec3,
     bounds: (Vec3, Vec3),
@@ -52,7 +52,7 @@ pub fn fit(
     (0..count)
         .map(|k| {
             let slice = [k, k + 1].map(|edge| split(edge, count, near_m, far_m));
-            let (center, radius) = slice_sphere(views, slice);
+            let (center, radius) = slice_sphere(eyes, slice);
             let half = radius * MARGIN;
             let texel = 2.0 * half / SHADOW_SIZE as f32;
             let c = light.transform_point3(center);
@@ -82,11 +82,11 @@ fn split(edge: u32, count: u32, near_m: f32, far_m: f32) -> f32 {
     LOG_WEIGHT * log + (1.0 - LOG_WEIGHT) * uniform
 }
 
-/// Sphere around the parts of both frusta at eye distances `slice`. The radius is rounded up to
+/// Sphere around the parts of all frusta at eye distances `slice`. The radius is rounded up to
 /// 1/16 m so that rounding under head rotation does not change the texel size.
-fn slice_sphere(views: &FrameViews, slice: [f32; 2]) -> (Vec3, f32) {
-    let mut points = Vec::with_capacity(16);
-    for eye in &views.eyes {
+fn slice_sphere(eyes: &[EyeView], slice: [f32; 2]) -> (Vec3, f32) {
+    let mut points = Vec::with_capacity(8 * eyes.len());
+    for eye in eyes {
         let world_from_eye = Mat4::from_cols_array_2d(&eye.world_to_eye).inverse();
         let tangents = tangents(&Mat4::from_cols_array_2d(&eye.eye_to_clip));
         for distance in slice {
@@ -129,10 +129,9 @@ fn corners(lo: Vec3, hi: Vec3) -> impl Iterator<Item = Vec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use formats::view::EyeView;
     use glam::camera::rh::proj::directx::perspective;
 
-    fn views(target: Vec3) -> FrameViews {
+    fn eyes(target: Vec3) -> [EyeView; 2] {
         let eye = |x: f32| {
             let position = Vec3::new(x, 1.7, 0.0);
             EyeView {
@@ -141,25 +140,22 @@ mod tests {
                 position: position.to_array(),
             }
         };
-        FrameViews {
-            frame: 0,
-            eyes: [eye(-0.032), eye(0.032)],
-        }
+        [eye(-0.032), eye(0.032)]
     }
 
     #[test]
     fn every_point_of_both_frusta_lies_in_a_cascade() {
-        let views = views(Vec3::new(0.3, -0.1, -1.0));
+        let eyes = eyes(Vec3::new(0.3, -0.1, -1.0));
         let bounds = (Vec3::new(-40.0, -2.0, -40.0), Vec3::new(40.0, 20.0, 40.0));
         let cascades = fit(
-            &views,
+            &eyes,
             4,
             Vec3::new(0.4, 0.8, 0.3).normalize(),
             bounds,
             0.1,
             30.0,
         );
-        for eye in &views.eyes {
+        for eye in &eyes {
             let clip = Mat4::from_cols_array_2d(&eye.eye_to_clip)
                 * Mat4::from_cols_array_2d(&eye.world_to_eye);
             let world = clip.inverse();
@@ -193,7 +189,7 @@ mod tests {
     fn turning_the_head_keeps_the_texel_size() {
         let bounds = (Vec3::splat(-10.0), Vec3::splat(10.0));
         let size = |target| {
-            let fitted = fit(&views(target), 4, Vec3::Y, bounds, 0.1, 20.0);
+            let fitted = fit(&eyes(target), 4, Vec3::Y, bounds, 0.1, 20.0);
             fitted.iter().map(|c| c.texel_m).collect::<Vec<_>>()
         };
         assert_eq!(size(Vec3::NEG_Z), size(Vec3::new(0.6, 0.1, -0.8)));

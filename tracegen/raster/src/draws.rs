@@ -1,10 +1,12 @@
 //! The draws of a scene in submission order, and their entries in the trace's tables.
 
+use super::backend::View;
 use super::error::RasterError;
 use super::groups::MaterialGroups;
 use formats::textrace::{Draw, Sample, UvGroup};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Mat4, Vec3};
+use record::Region;
 use scene::{AlphaMode, Material, Scene};
 use textures::TextureSet;
 use visibility::frustum;
@@ -142,6 +144,20 @@ impl DrawList {
     #[must_use]
     pub fn visible(&self, clip_from_world: Mat4) -> Vec<u32> {
         frustum::visible(self.calls.iter().map(|call| call.bounds), clip_from_world)
+    }
+
+    /// The draws of a view that may touch a region of it, ascending; `size_px` is the view's.
+    #[must_use]
+    pub(crate) fn touching(&self, view: &View<'_>, region: Region, size_px: [u32; 2]) -> Vec<u32> {
+        if region.size_px == size_px {
+            return view.visible.to_vec();
+        }
+        let clip =
+            frustum::crop(region.origin_px, region.size_px, size_px) * view.clip_from_world();
+        let bounds = (view.visible.iter()).map(|&draw| self.calls[draw as usize].bounds);
+        (frustum::visible(bounds, clip).into_iter())
+            .map(|position| view.visible[position as usize])
+            .collect()
     }
 
     /// Texture table of the trace: the scene's textures in their order, then the shadow maps.

@@ -1,6 +1,6 @@
 //! Why a capture failed.
 
-use record::RECORD_BYTES;
+use record::RecordError;
 
 /// Why a capture failed.
 #[derive(Debug, thiserror::Error)]
@@ -36,24 +36,10 @@ pub enum RasterError {
         /// How large it may be.
         limit: u64,
     },
-    /// The smallest part of a frame does not fit the record buffer.
-    #[error(
-        "tile ({tx}, {ty}) alone needs {needed} records of {RECORD_BYTES} bytes, the record budget holds {capacity}; raise --record-budget"
-    )]
-    Budget {
-        /// Tile column.
-        tx: u32,
-        /// Tile row.
-        ty: u32,
-        /// Records that the tile produces.
-        needed: u64,
-        /// Records that fit.
-        capacity: u64,
-    },
     /// Inconsistent input.
     #[error("{0}")]
     Scene(String),
-    /// The trace could not be written.
-    #[error("writing the trace: {0}")]
-    Write(String),
+    /// The records could not become a trace.
+    #[error(transparent)]
+    Record(#[from] RecordError),
 }

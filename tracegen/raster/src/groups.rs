@@ -4,7 +4,17 @@ use scene::{Material, TextureRef};
 
 /// Textures that the shader samples: base colour, normal, metallic-roughness, specular,
 /// occlusion, emissive.
-pub const MATERIAL_TEXTURES: usize = 6;
+pub const MATERIAL_TEXTURES: usize = SLOTS.len();
+
+/// The slots of [`Material::textures`] by the shader's names for them.
+pub(crate) const SLOTS: [&str; 6] = [
+    "BASE_COLOR",
+    "NORMAL",
+    "METALLIC_ROUGHNESS",
+    "SPECULAR",
+    "OCCLUSION",
+    "EMISSIVE",
+];
 
 /// The material's textures by uv group: same texture coordinate set and same transform.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,12 +9,17 @@
 //! file order: a trace should not depend on a sort by distance, which differs between the eyes).
 
 pub mod backend;
+mod batches;
 pub mod capture;
-pub mod cascades;
+mod cascades;
 pub mod draws;
 pub mod error;
-pub mod groups;
+pub mod frame;
+mod groups;
 pub mod lavapipe;
 pub mod lighting;
-pub mod regions;
+mod roles;
 mod seen;
+mod shader;
+mod uniforms;
+mod vertices;

@@ -1,6 +1,5 @@
 //! Which images a capture's views sample: only those need texels.
 
-use super::backend::View;
 use super::capture::CaptureJob;
 use super::draws::DrawMode;
 use super::groups::MATERIAL_TEXTURES;
@@ -10,30 +9,21 @@ use scene::Scene;
 use visibility::triangles;
 
 impl CaptureJob<'_> {
-    /// For each image of the scene, whether a draw that samples it may be seen by an eye of any
+    /// For each image of the scene, whether a draw that samples it may be seen by a view of any
     /// frame, or is a masked caster that a shadow cascade may see.
     #[must_use]
     pub fn seen_images(&self, scene: &Scene, frames: &[FrameViews]) -> Vec<bool> {
         let mut seen = vec![false; scene.images.len()];
         for views in frames {
-            let lighting = self.light_frame(views);
-            for eye in views.eyes {
-                let view = View {
-                    eye,
-                    lighting: &lighting,
-                    visible: &[],
-                };
-                self.mark(
-                    scene,
-                    view.clip_from_world(),
-                    |_| MATERIAL_TEXTURES,
-                    &mut seen,
-                );
+            let frame = self.frame(views);
+            for view in frame.views() {
+                let all = |_| MATERIAL_TEXTURES;
+                self.mark(scene, view.clip_from_world(), view.visible, all, &mut seen);
             }
-            for cascade in &lighting.cascades {
+            for (cascade, casters) in frame.lighting.cascades.iter().zip(&frame.casters) {
                 // A masked caster samples its base colour, the first slot.
                 let slots = |mode| usize::from(mode == DrawMode::Masked);
-                self.mark(scene, cascade.clip_from_world, slots, &mut seen);
+                self.mark(scene, cascade.clip_from_world, casters, slots, &mut seen);
             }
         }
         seen
@@ -44,10 +34,11 @@ impl CaptureJob<'_> {
         &self,
         scene: &Scene,
         clip_from_world: Mat4,
+        visible: &[u32],
         slots: impl Fn(DrawMode) -> usize,
         seen: &mut [bool],
     ) {
-        for index in self.draws.visible(clip_from_world) {
+        for &index in visible {
             let call = &self.draws.calls[index as usize];
             let mesh = &scene.meshes[call.mesh];
             let sampled = scene.materials[call.material].textures();

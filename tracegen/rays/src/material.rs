@@ -12,6 +12,9 @@ const GLOSSY_ROUGHNESS: f32 = 0.7;
 /// Smoother metals mirror their surroundings.
 const MIRROR_ROUGHNESS: f32 = 0.35;
 
+/// Alpha from which a blended surface stops a ray that looks for its closest hit.
+const BLEND_STOPS_FROM: f32 = 1.0 / 255.0;
+
 /// Smoother dielectrics do, as far as Fresnel's law goes.
 const POLISHED_ROUGHNESS: f32 = 0.15;
 
@@ -145,7 +148,7 @@ impl Materials {
         match material.alpha {
             AlphaMode::Opaque => true,
             AlphaMode::Mask(cutoff) => alpha() >= cutoff,
-            AlphaMode::Blend => alpha() >= 1.0 / 255.0,
+            AlphaMode::Blend => alpha() >= BLEND_STOPS_FROM,
         }
     }
 
@@ -225,6 +228,34 @@ fn describe(m: &Material) -> RayMaterial {
         mirror: m.mirror > 0.0 || metal || polished,
         glass,
         glossy,
-        alpha_masked: matches!(m.alpha, AlphaMode::Mask(_)),
+        alpha_masked: match m.alpha {
+            AlphaMode::Opaque => false,
+            AlphaMode::Mask(_) => true,
+            AlphaMode::Blend => m.base_color_texture.is_some() || m.base_color.w < BLEND_STOPS_FROM,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_blended_texture_may_let_a_ray_pass_as_a_mask_may() {
+        let masked = |alpha, alpha_factor: f32, textured: bool| {
+            let material = Material {
+                alpha,
+                base_color: Vec4::new(1.0, 1.0, 1.0, alpha_factor),
+                base_color_texture: textured.then(|| TextureRef::new(0)),
+                ..Material::default()
+            };
+            describe(&material).alpha_masked
+        };
+        assert!(masked(AlphaMode::Blend, 1.0, true));
+        assert!(masked(AlphaMode::Blend, 0.001, false));
+        assert!(masked(AlphaMode::Mask(0.5), 1.0, true));
+        // An even veil stops every ray.
+        assert!(!masked(AlphaMode::Blend, 0.5, false));
+        assert!(!masked(AlphaMode::Opaque, 1.0, true));
     }
 }

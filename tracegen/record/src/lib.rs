@@ -1,14 +1,25 @@
 //! From what a capturer hands over to the tiles of a trace.
 //!
-//! Raw quad records and the depths of masked draws are binned by tile, sorted, put through the
-//! in-order alpha test and brought to fixed point. Nothing here knows a driver or a scene.
+//! ```text
+//! Capturer (any driver) -> raw quad records, one region at a time
+//!   -> binning by tile -> in-order alpha test -> fixed point -> encoded tiles -> TextraceWriter
+//! ```
+//!
+//! Nothing here knows a driver or a scene: whoever implements [`Capturer`] and fills
+//! `formats::textrace::Tables` can write a trace.
 
-mod bin;
+mod bins;
+mod capturer;
+mod error;
 mod masked;
 mod quantise;
 mod raw;
+mod recorder;
+mod regions;
 mod tiles;
 
-pub use bin::{Bins, TileRect};
+pub use capturer::{Captured, Capturer, Region, Sink};
+pub use error::RecordError;
 pub use raw::{DEPTH_BYTES, RECORD_BYTES, RawDepth, RawRecord, RawRecords};
-pub use tiles::{CaptureCounts, Scratch, TileRules};
+pub use recorder::{Recorded, Recorder};
+pub use tiles::CaptureCounts;

@@ -12,7 +12,7 @@ const EDGE: usize = formats::view::TILE_SIZE_PX as usize;
 
 /// Depth that one masked draw has written so far in one tile.
 #[derive(Clone, Debug)]
-pub struct MaskedDepth {
+pub(crate) struct MaskedDepth {
     draw: Option<u32>,
     nearest: [f32; EDGE * EDGE],
 }

@@ -10,7 +10,7 @@ const LIMIT: f64 = (1 << 29) as f64;
 
 /// Fixed-point rule of one uv group.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GroupScale {
+pub(crate) struct GroupScale {
     /// Steps per unit of u and v.
     scale: [f64; 2],
     /// Every sampler of the group repeats along the axis, so whole periods may be removed.
@@ -19,7 +19,6 @@ pub struct GroupScale {
 
 impl GroupScale {
     /// The rule of `group`.
-    #[must_use]
     pub fn new(group: &UvGroup, samplers: &[Sampler]) -> Self {
         let periodic = |axis: usize| {
             group
@@ -37,7 +36,7 @@ impl GroupScale {
 
 /// Coordinates of a record in fixed point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FixedUv {
+pub(crate) struct FixedUv {
     /// Top-left lane.
     pub uv: [i32; 2],
     /// Horizontal derivative, top row.
@@ -53,7 +52,7 @@ pub struct FixedUv {
 /// Coordinates too large for 32 bits lose a multiple of two repeats (two, for mirrored wrap); the
 /// same multiple for neighbouring quads, so that a primitive stays continuous.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Quantiser {
+pub(crate) struct Quantiser {
     shift: [f64; 2],
 }
 

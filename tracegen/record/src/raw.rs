@@ -1,10 +1,10 @@
 //! What a capturer hands over.
 
 /// Bytes of one raw record.
-pub const RECORD_BYTES: u64 = 44;
+pub const RECORD_BYTES: u64 = size_of::<RawRecord>() as u64;
 
 /// Bytes of one raw depth.
-pub const DEPTH_BYTES: u64 = 20;
+pub const DEPTH_BYTES: u64 = size_of::<RawDepth>() as u64;
 
 /// One covered quad in one uv group as the instrumented shader writes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]

@@ -1,6 +1,7 @@
 //! From a tile's raw records to the trace's `Tile`.
 
-use super::bin::{Bins, sort_key};
+use super::bins::{Bins, sort_key};
+use super::error::RecordError;
 use super::masked::MaskedDepth;
 use super::quantise::{GroupScale, Quantiser};
 use super::raw::{RawRecord, RawRecords};
@@ -36,7 +37,7 @@ impl AddAssign for CaptureCounts {
 }
 
 /// What building tiles needs to know about the draws.
-pub struct TileRules {
+pub(crate) struct TileRules {
     /// By draw and group.
     scales: Vec<Vec<GroupScale>>,
     /// By draw: its quads carry depths.
@@ -45,7 +46,7 @@ pub struct TileRules {
 
 /// Memory that building a tile reuses.
 #[derive(Default)]
-pub struct Scratch {
+pub(crate) struct Scratch {
     order: Vec<(u64, u32)>,
     depth: MaskedDepth,
     quantisers: [Quantiser; 16],
@@ -55,7 +56,6 @@ pub struct Scratch {
 
 impl TileRules {
     /// Rules for the draws of `tables`; `masked` tells of each whether its quads carry depths.
-    #[must_use]
     pub fn new(tables: &Tables, masked: Vec<bool>) -> Self {
         Self {
             scales: tables
@@ -73,13 +73,16 @@ impl TileRules {
     }
 
     /// Builds tile `tile` of the bins into `scratch.tile`.
+    ///
+    /// # Errors
+    /// A record whose draw or group the tables lack.
     pub fn build(
         &self,
         records: RawRecords<'_>,
         bins: &Bins,
         tile: usize,
         scratch: &mut Scratch,
-    ) -> CaptureCounts {
+    ) -> Result<CaptureCounts, RecordError> {
         scratch.order.clear();
         bins.visit(tile, |i| {
             scratch
@@ -92,14 +95,14 @@ impl TileRules {
         let mut counts = CaptureCounts::default();
         let order = std::mem::take(&mut scratch.order);
         for quad in order.chunk_by(|a, b| a.0 >> 8 == b.0 >> 8) {
-            self.add_quad(records, quad, scratch, &mut counts);
+            self.add_quad(records, quad, scratch, &mut counts)?;
         }
         scratch.order = order;
         if scratch.tile.runs.last().is_some_and(|run| run.count == 0) {
             scratch.tile.runs.pop();
         }
         counts.records = scratch.tile.records.len() as u64;
-        counts
+        Ok(counts)
     }
 
     /// Adds the records of one quad of one primitive.
@@ -109,10 +112,10 @@ impl TileRules {
         quad: &[(u64, u32)],
         scratch: &mut Scratch,
         counts: &mut CaptureCounts,
-    ) {
+    ) -> Result<(), RecordError> {
         let of = |entry: &(u64, u32)| &records.quads[entry.1 as usize];
         let Some(first) = quad.first().map(of) else {
-            return;
+            return Ok(());
         };
         let (x, y) = ((first.qx() & 7) as u8, (first.qy() & 7) as u8);
         let mut alive = 15;
@@ -145,12 +148,9 @@ impl TileRules {
             };
             self.open_run(record, scratch);
             if record.group() != NO_GROUP {
-                let rule = self
-                    .scales
-                    .get(record.draw as usize)
-                    .and_then(|g| g.get(usize::from(record.group())));
+                let rule = self.rule(record)?;
                 let quantiser = &mut scratch.quantisers[usize::from(record.group())];
-                let Some(fixed) = rule.and_then(|rule| quantiser.quantise(rule, record)) else {
+                let Some(fixed) = quantiser.quantise(rule, record) else {
                     counts.not_finite += 1;
                     continue;
                 };
@@ -163,6 +163,23 @@ impl TileRules {
         }
         counts.quads += u64::from(lanes != 0);
         counts.fragments += u64::from(lanes.count_ones());
+        Ok(())
+    }
+
+    /// How the coordinates of a record's group become fixed point.
+    fn rule(&self, record: &RawRecord) -> Result<&GroupScale, RecordError> {
+        let invalid = |expected: String, found: u32| RecordError::Invalid {
+            expected,
+            found: found.to_string(),
+        };
+        let groups = self
+            .scales
+            .get(record.draw as usize)
+            .ok_or_else(|| invalid(format!("a draw below {}", self.scales.len()), record.draw))?;
+        groups.get(usize::from(record.group())).ok_or_else(|| {
+            let expected = format!("a group below {} of draw {}", groups.len(), record.draw);
+            invalid(expected, record.group().into())
+        })
     }
 
     /// Starts the run of the record's primitive unless it is the one under way.

@@ -31,7 +31,7 @@ pub fn shade(a: Rgb, factor: f32) -> Rgb {
 /// The linear-light value of an sRGB colour, for material factors.
 #[must_use]
 pub fn linear(color: Rgb) -> glam::Vec3 {
-    glam::Vec3::from(color.map(|c| srgb::decode(c.into()) as f32))
+    glam::Vec3::from(color.map(srgb::decode_f32))
 }
 
 /// What a surface looks like at one point.

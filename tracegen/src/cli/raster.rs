@@ -4,9 +4,10 @@ use super::cache_args::CacheArgs;
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::picture;
 use anyhow::{Context, ensure};
-use clap::Args;
-use formats::textrace::{Tables, TextraceWriter, TraceMeta};
-use raster::backend::CaptureBackend;
+use clap::{Args, ValueEnum};
+use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
+use formats::view::Eye;
+use raster::backend::{CaptureBackend, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
 use raster::lavapipe::Lavapipe;
@@ -31,7 +32,7 @@ pub struct RasterArgs {
     /// Trace to write.
     #[arg(short, long, value_name = "FILE.textrace")]
     output: PathBuf,
-    /// Picture of both eyes side by side.
+    /// Picture of all views side by side.
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
     /// Frames along a slow walk: 0.4 m/s ahead with a sideways sway of 5 cm, at 72 frames a second.
@@ -41,6 +42,9 @@ pub struct RasterArgs {
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     shadows: bool,
+    /// Views of each frame.
+    #[arg(long, value_enum, default_value_t = Views::Stereo, help_heading = "Camera")]
+    views: Views,
     /// Skip the render without capture that times and pictures are compared with.
     #[arg(long)]
     no_plain: bool,
@@ -52,6 +56,27 @@ pub struct RasterArgs {
     cache: CacheArgs,
     #[command(flatten)]
     threads: Threads,
+}
+
+/// Views of a frame.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Views {
+    /// Both eyes, left before right.
+    Stereo,
+    /// The left eye alone.
+    Left,
+    /// The right eye alone.
+    Right,
+}
+
+impl Views {
+    fn eyes(self) -> &'static [Eye] {
+        match self {
+            Self::Stereo => &[Eye::Left, Eye::Right],
+            Self::Left => &[Eye::Left],
+            Self::Right => &[Eye::Right],
+        }
+    }
 }
 
 /// Runs `tracegen raster`.
@@ -77,13 +102,13 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
-    let mut job = CaptureJob {
+    let job = CaptureJob {
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
         shadow_range_m: shadow_range_m(&setup, bounds),
         size_px,
-        parts: 1,
+        views: args.views.eyes(),
     };
     let seen = job.seen_images(&setup.scene, &setup.frames);
     let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache.as_ref())?;
@@ -92,10 +117,25 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         shell::warn(note);
     }
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
-    let tables = tables(&setup, &args.scene.scene, &draws, &uploads, &backend);
+    let passes = job.passes(setup.frames.len() as u32);
+    let tables = tables(
+        &setup,
+        &args.scene.scene,
+        &draws,
+        &uploads,
+        &backend,
+        passes,
+    );
     let (total, cached, unseen) = (uploads.textures.len(), uploads.cached, uploads.unseen());
     drop(uploads);
-    job.warm_up(&mut backend, &setup.frames[0])?;
+    let mut summary = Summary::default();
+    let first = job.frame(&setup.frames[0]);
+    summary.shadows += job.light(&mut backend, &first)?;
+    if !args.no_plain {
+        job.warm_up(&mut backend, &first)?;
+    }
+    let mut first = Some(first);
+    let mut recorder = job.recorder(&tables);
     let ready = started.elapsed();
     note(&format!(
         "{}: ready in {:.2} s (scene {:.2} s; textures {:.2} s: {} compressed, {cached} from the cache, {unseen} seen by no view; driver {:.2} s)",
@@ -109,19 +149,27 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     progress.stage("capturing", setup.frames.len() as u64, "frames");
 
     let mut writer = TextraceWriter::create(&args.output, &tables)?;
-    let mut summary = Summary::default();
     let mut first_pictures: Option<Pictures> = None;
-    for (frame, views) in setup.frames.iter().enumerate() {
+    for (number, views) in setup.frames.iter().enumerate() {
+        let frame = match first.take() {
+            Some(first) => first,
+            None => {
+                let frame = job.frame(views);
+                summary.shadows += job.light(&mut backend, &frame)?;
+                frame
+            }
+        };
         let plain = if args.no_plain {
             None
         } else {
-            let (pictures, time) = job.plain_frame(&mut backend, views)?;
+            let (pictures, time) = job.plain_frame(&mut backend, &frame)?;
             summary.plain += time;
             Some(pictures)
         };
         let start = Instant::now();
+        let first_pass = number * job.views.len();
         let (pictures, counts, sorting) =
-            job.capture_frame(&mut backend, views, 2 * frame, &tables, &mut writer)?;
+            job.capture_frame(&mut backend, &frame, first_pass, &mut recorder, &mut writer)?;
         summary.sorting += sorting;
         summary.captured += start.elapsed();
         summary.counts += counts;
@@ -154,7 +202,8 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
-    summary.print(setup.frames.len(), size_px, file_bytes);
+    let views = [setup.frames.len(), job.views.len()];
+    summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
 }
 
@@ -174,6 +223,7 @@ fn tables(
     draws: &DrawList,
     uploads: &TextureSet,
     backend: &dyn CaptureBackend,
+    passes: Vec<Pass>,
 ) -> Tables {
     let textures = draws.textures(uploads);
     let (samplers, draw_table) = draws.tables(&setup.scene, uploads, &textures);
@@ -193,12 +243,13 @@ fn tables(
         textures,
         samplers,
         draws: draw_table,
-        passes: CaptureJob::passes(setup.hmd.eye_size_px, setup.frames.len() as u32),
+        passes,
     }
 }
 
 #[derive(Default)]
 struct Summary {
+    shadows: Duration,
     plain: Duration,
     captured: Duration,
     sorting: Duration,
@@ -207,7 +258,7 @@ struct Summary {
 }
 
 impl Summary {
-    fn print(&self, frames: usize, size_px: [u32; 2], file_bytes: u64) {
+    fn print(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64, work: &Work) {
         let CaptureCounts {
             quads,
             fragments,
@@ -217,9 +268,9 @@ impl Summary {
             tile_bytes,
         } = self.counts;
         let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
-        let pixels = 2.0 * frames as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
+        let pixels = (views * frames) as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
         note(&format!(
-            "{frames} frame(s), 2 x {}x{}: {quads} quads, {fragments} fragments ({:.2} a pixel), {records} records",
+            "{frames} frame(s), {views} x {}x{}: {quads} quads, {fragments} fragments ({:.2} a pixel), {records} records",
             size_px[0],
             size_px[1],
             fragments as f64 / pixels
@@ -239,8 +290,18 @@ impl Summary {
             per(tile_bytes, quads),
             per(tile_bytes, records)
         ));
+        note(&format!(
+            "{} draws in {} draw calls, {} regions, {} shadow maps in {:.3} s, {} pipelines, {} samplers",
+            work.draws,
+            work.calls,
+            work.regions,
+            work.shadow_maps,
+            self.shadows.as_secs_f64(),
+            work.pipelines,
+            work.samplers
+        ));
         let captured = self.captured.as_secs_f64();
-        let includes = "shadow maps, both eyes, reading the pictures back";
+        let includes = "all views, reading the pictures back";
         if let Some(identical) = self.identical {
             let plain = self.plain.as_secs_f64();
             note(&format!("plain render   {plain:.3} s ({includes})"));

@@ -4,11 +4,12 @@ use super::compare::{Agreement, compare, lanes};
 use super::reference;
 use formats::textrace::{SUBTEXELS, Tables, Textrace, TextraceWriter, Tile, TraceMeta};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
-use formats::view::{FrameViews, Hmd};
+use formats::view::{Eye, FrameViews, Hmd};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
-use raster::backend::{CaptureBackend, View};
+use raster::backend::{CaptureBackend, View, Work};
 use raster::capture::CaptureJob;
 use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
+use raster::error::RasterError;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
@@ -24,7 +25,10 @@ struct Captured {
     tiles: Vec<Vec<Tile>>,
     pictures_match: bool,
     killed: u64,
+    work: Work,
 }
+
+const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
 
 fn display(size_px: [u32; 2]) -> Hmd {
     let mut hmd = hmd::preset("symmetric-100").unwrap();
@@ -39,24 +43,41 @@ fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
         .remove(0)
 }
 
-fn job<'a>(scene: &Scene, draws: &'a DrawList, size_px: [u32; 2]) -> CaptureJob<'a> {
+fn job<'a>(
+    scene: &Scene,
+    draws: &'a DrawList,
+    size_px: [u32; 2],
+    views: &'a [Eye],
+) -> CaptureJob<'a> {
     CaptureJob {
         draws,
         lighting: Lighting::new(scene),
         bounds: scene.bounds().unwrap_or_default(),
         shadow_range_m: [0.1, 40.0],
         size_px,
-        parts: 1,
+        views,
     }
 }
 
 /// Captures one stereo frame; fails, naming the packages, where there is no lavapipe.
 fn capture(scene: &Scene, size_px: [u32; 2], cascades: u32, budget: u64) -> Captured {
+    try_capture(scene, size_px, cascades, budget, BOTH, true).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Captures one frame of `eyes`, after a plain picture of it where one is wanted.
+fn try_capture(
+    scene: &Scene,
+    size_px: [u32; 2],
+    cascades: u32,
+    budget: u64,
+    eyes: &[Eye],
+    plain: bool,
+) -> Result<Captured, RasterError> {
     let draws = DrawList::new(scene, cascades).unwrap();
     let set = TextureSet::compress(scene).unwrap();
-    let mut backend =
-        Lavapipe::new(scene, &draws, &set, size_px, budget).unwrap_or_else(|e| panic!("{e}"));
+    let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
     let views = views(scene, size_px);
+    let job = job(scene, &draws, size_px, eyes);
     let textures = draws.textures(&set);
     let (samplers, draw_table) = draws.tables(scene, &set, &textures);
     let tables = Tables {
@@ -75,17 +96,20 @@ fn capture(scene: &Scene, size_px: [u32; 2], cascades: u32, budget: u64) -> Capt
         textures,
         samplers,
         draws: draw_table,
-        passes: CaptureJob::passes(size_px, 1),
+        passes: job.passes(1),
     };
-    let mut job = job(scene, &draws, size_px);
-    let (plain, _) = job.plain_frame(&mut backend, &views).unwrap();
+    let frame = job.frame(&views);
+    job.light(&mut backend, &frame)?;
+    let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
-    let (pictures, counts, _) = job
-        .capture_frame(&mut backend, &views, 0, &tables, &mut writer)
-        .unwrap_or_else(|e| panic!("{e}"));
+    let mut recorder = job.recorder(&tables);
+    let before = backend.work();
+    let (pictures, counts, _) =
+        job.capture_frame(&mut backend, &frame, 0, &mut recorder, &mut writer)?;
+    let after = backend.work();
     let trace = writer.into_bytes().unwrap();
     let reader = Textrace::from_bytes(trace.clone()).unwrap();
-    let tiles = (0..2)
+    let tiles = (0..eyes.len())
         .map(|pass| {
             (0..tables.passes[pass].tile_count() as usize)
                 .map(|index| {
@@ -96,13 +120,22 @@ fn capture(scene: &Scene, size_px: [u32; 2], cascades: u32, budget: u64) -> Capt
                 .collect()
         })
         .collect();
-    Captured {
+    Ok(Captured {
         trace,
         tables,
         tiles,
-        pictures_match: plain == pictures,
+        pictures_match: match plain {
+            Some(plain) => plain?.0 == pictures,
+            None => true,
+        },
         killed: counts.masked_lanes_killed,
-    }
+        work: Work {
+            draws: after.draws - before.draws,
+            calls: after.calls - before.calls,
+            regions: after.regions - before.regions,
+            ..after
+        },
+    })
 }
 
 /// Agreement of one eye's pass with the reference.
@@ -318,6 +351,96 @@ fn a_small_record_budget_gives_the_same_trace() {
     }
 }
 
+/// Small meshes side by side over the view, each placed eight times in a row.
+fn many_instances(alpha: AlphaMode) -> Scene {
+    let meshes = (0..12).map(|mesh| triangles(3, 70 + mesh, 0)).collect();
+    let mut scene = scene(meshes, vec![textured(alpha, true)], vec![checker()]);
+    scene.instances = (0..96)
+        .map(|i| {
+            let place = Vec3::new((i % 12) as f32 - 5.5, (i / 12) as f32 - 3.5, -5.5) * 1.6;
+            let transform =
+                Affine3A::from_translation(place) * Affine3A::from_scale(Vec3::splat(0.4));
+            Instance {
+                mesh: i / 8,
+                transform,
+            }
+        })
+        .collect();
+    scene
+}
+
+#[test]
+fn instances_in_one_draw_call_are_recorded_as_if_they_were_drawn_one_by_one() {
+    for alpha in [AlphaMode::Opaque, AlphaMode::Blend] {
+        let scene = many_instances(alpha);
+        let captured = capture(&scene, SIZE_PX, 0, BUDGET);
+        assert_eq!([captured.work.draws, captured.work.calls], [2 * 96, 2 * 12]);
+        for pass in 0..2 {
+            let a = agreement(&scene, &captured, pass, &|_, _| true);
+            assert!(a.both > 500, "{a:?}");
+            assert!(a.coverage_iou() >= 0.999, "{a:?}");
+        }
+        assert!(captured.pictures_match);
+    }
+}
+
+#[test]
+fn a_region_after_an_overflow_draws_only_what_may_touch_it() {
+    let scene = many_instances(AlphaMode::Opaque);
+    let whole = capture(&scene, SIZE_PX, 0, BUDGET);
+    let parts = capture(&scene, SIZE_PX, 0, 8 << 10);
+    assert!(parts.trace == whole.trace);
+    let (draws, regions) = (parts.work.draws, parts.work.regions);
+    println!(
+        "{draws} draws in {regions} regions, {} in one a view",
+        whole.work.draws
+    );
+    assert_eq!(whole.work.regions, 2);
+    assert!(regions >= 6, "{regions}");
+    // One view's draws in each region would be 96.
+    assert!(
+        draws < 96 * regions * 3 / 4,
+        "{draws} draws in {regions} regions"
+    );
+}
+
+#[test]
+fn a_lone_view_has_the_records_that_it_has_in_a_stereo_pair() {
+    let meshes = vec![triangles(60, 81, 0), triangles(60, 82, 1)];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Mask(0.5), true),
+    ];
+    let scene = scene(meshes, materials, vec![checker()]);
+    let both = capture(&scene, SIZE_PX, 2, BUDGET);
+    for (pass, eye) in [Eye::Left, Eye::Right].into_iter().enumerate() {
+        let alone = try_capture(&scene, SIZE_PX, 2, BUDGET, &[eye], true).unwrap();
+        assert_eq!(alone.tables.passes.len(), 1);
+        assert_eq!(alone.tiles[0], both.tiles[pass]);
+    }
+}
+
+#[test]
+fn work_that_a_frame_does_not_need_is_not_done() {
+    let meshes = vec![triangles(60, 81, 0), triangles(60, 82, 1)];
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Mask(0.5), true),
+    ];
+    let scene = scene(meshes, materials, vec![checker()]);
+    let capture = |plain| try_capture(&scene, SIZE_PX, 2, BUDGET, BOTH, plain).unwrap();
+    let (with, without) = (capture(true).work, capture(false).work);
+    // Rendered once for the plain pictures and the captured ones: one a cascade.
+    assert_eq!(with.shadow_maps, 2);
+    // The textures' state and that of the slots without a texture.
+    assert_eq!(with.samplers, 2);
+    // Two casters, the opaque draw, the masked draw's records and its colour; the plain opaque
+    // draw is a pipeline of its own.
+    assert_eq!([without.pipelines, with.pipelines], [5, 6]);
+    let captured = capture(false);
+    assert!(captured.trace == capture(true).trace);
+}
+
 #[test]
 fn a_budget_below_one_tile_is_refused() {
     let scene = scene(
@@ -325,23 +448,10 @@ fn a_budget_below_one_tile_is_refused() {
         vec![textured(AlphaMode::Blend, true)],
         vec![checker()],
     );
-    let draws = DrawList::new(&scene, 0).unwrap();
-    let set = TextureSet::compress(&scene).unwrap();
-    let mut backend =
-        Lavapipe::new(&scene, &draws, &set, SIZE_PX, 4096).unwrap_or_else(|e| panic!("{e}"));
-    let lighting = Lighting::new(&scene);
-    let mut view = View {
-        eye: views(&scene, SIZE_PX).eyes[0],
-        lighting: &lighting,
-        visible: &[],
-    };
-    let visible = draws.visible(view.clip_from_world());
-    view.visible = &visible;
-    let refused =
-        raster::regions::capture_view(&mut backend, &draws, &view, SIZE_PX, 1, &mut |_, _| Ok(()));
-    let message = refused.unwrap_err().to_string();
+    let captured = try_capture(&scene, SIZE_PX, 0, 4096, BOTH, true);
+    let message = captured.err().unwrap().to_string();
     assert!(
-        message.contains("alone needs") && message.contains("--record-budget"),
+        message.contains("alone needs") && message.contains("record budget"),
         "{message}"
     );
 }

@@ -15,6 +15,26 @@ pub fn visible(bounds: impl IntoIterator<Item = [Vec3; 2]>, clip_from_world: Mat
         .collect()
 }
 
+/// Narrows clip space to a region of a view of `size_px`: `crop(..) * clip_from_world` is the clip
+/// matrix of the region and a pixel around it, for the rounding of vertices to the raster's grid.
+#[must_use]
+pub fn crop(origin_px: [u32; 2], region_px: [u32; 2], size_px: [u32; 2]) -> Mat4 {
+    let axis = |axis: usize| {
+        let ndc = |px: f32| 2.0 * px / size_px[axis] as f32 - 1.0;
+        let low = ndc(origin_px[axis] as f32 - 1.0);
+        let high = ndc((origin_px[axis] + region_px[axis]) as f32 + 1.0);
+        [2.0 / (high - low), -(high + low) / (high - low)]
+    };
+    let ([x_scale, x_shift], [y_scale, y_shift]) = (axis(0), axis(1));
+    // Rows of pixels count downwards, clip space upwards.
+    Mat4::from_cols(
+        Vec4::new(x_scale, 0.0, 0.0, 0.0),
+        Vec4::new(0.0, y_scale, 0.0, 0.0),
+        Vec4::Z,
+        Vec4::new(x_shift, -y_shift, 0.0, 1.0),
+    )
+}
+
 /// Planes whose positive side is inside, from the rows of the matrix (Gribb and Hartmann 2001).
 pub(crate) fn frustum_planes(clip_from_world: Mat4) -> [Vec4; 6] {
     let row = |i| clip_from_world.row(i);
@@ -53,6 +73,35 @@ mod tests {
             [Vec3::splat(f32::NAN), Vec3::splat(f32::NAN)],
         ];
         assert_eq!(visible(boxes, clip), [1, 4, 5]);
+    }
+
+    #[test]
+    fn a_point_in_a_region_is_seen_by_the_region_and_not_by_one_far_from_it() {
+        let clip = glam::camera::rh::proj::directx::perspective(1.2, 1.5, 0.1, 50.0);
+        let size_px = [300, 200];
+        let mut state = 5_u32;
+        let mut random = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % below
+        };
+        for _ in 0..2000 {
+            let pixel = [random(300), random(200)];
+            let center = [0, 1].map(|axis| (pixel[axis] as f32 + 0.5) / size_px[axis] as f32);
+            let ndc = Vec3::new(2.0 * center[0] - 1.0, 1.0 - 2.0 * center[1], 0.9);
+            let point = clip.inverse().project_point3(ndc);
+            let seen = |origin_px: [u32; 2], region_px: [u32; 2]| {
+                let cropped = crop(origin_px, region_px, size_px) * clip;
+                visible([[point; 2]], cropped) == [0]
+            };
+            assert!(seen(pixel, [1, 1]), "{pixel:?}");
+            assert!(seen([0, pixel[1]], [300, 1]), "{pixel:?}");
+            assert_eq!(seen([0, 0], [300, 16]), pixel[1] <= 16, "{pixel:?}");
+            assert_eq!(
+                seen([100, 0], [300 - 100, 200]),
+                pixel[0] >= 99,
+                "{pixel:?}"
+            );
+        }
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! Charts of reprojection results.
 
 use super::Entry;
+use crate::paper::sgrt::PaperValues;
 use crate::report::html::figures;
 use crate::report::plots::bars::{BarChart, BarGroup};
 use crate::report::plots::lines::{Axis, LineChart, LineSeries, Mark};
 use crate::report::plots::{PlotError, SeriesStyle};
 use crate::sgrt::compose::Reuse;
-use crate::sgrt::result::{Outcome, PaperValues, Report};
+use crate::sgrt::result::{Outcome, Report};
 use maud::Markup;
 
 /// The paper's figure 3: relative performance and relative energy, its values as marks.

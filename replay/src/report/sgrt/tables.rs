@@ -1,22 +1,16 @@
 //! Tables of reprojection results.
 
 use super::Entry;
-use crate::report::csv::Csv;
-use crate::report::html::table::{Column, Table};
-use crate::report::theme::group_thousands;
-use crate::sgrt::accuracy::ClassCounts;
+use crate::report::columns::{Column, Row, Show, pick};
+use crate::report::table::Table;
+use crate::sgrt::accuracy::{Accuracy, ClassCounts};
 use crate::sgrt::compose::Reuse;
-use crate::sgrt::result::{Outcome, Report};
+use crate::sgrt::energy::EnergyPj;
+use crate::sgrt::result::{CurvePoint, Outcome, Report, Sensitivity};
 
-/// A scene's name without folder and extension.
+/// The name of a trace in tables.
 pub fn scene_name(report: &Report) -> String {
-    let name = report.trace.scene.rsplit('/').next().unwrap_or_default();
-    name.split('.').next().unwrap_or(name).to_owned()
-}
-
-/// Short names of the two runs: rules can be long, and [`rule_line`] says which one it is.
-fn both(report: &Report) -> [(&'static str, &Outcome); 2] {
-    [("chosen", &report.result), ("plain", &report.plain)]
+    crate::result::scene_name(&report.trace.scene).to_owned()
 }
 
 /// Which rule and level of reuse the rows called "chosen" have.
@@ -32,7 +26,7 @@ pub fn rule_line(entries: &[Entry]) -> String {
     })
 }
 
-/// Mean reuse over the traces that stand for scenes of the paper, chosen and plain.
+/// Mean reuse over the traces that are set beside scenes of the paper, chosen and plain.
 #[must_use]
 pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
     let of_paper: Vec<&Report> = entries
@@ -45,13 +39,32 @@ pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
         |pct: fn(&Report) -> f64| of_paper.iter().map(|r| pct(r)).sum::<f64>() / count as f64;
     (count > 0).then(|| {
         format!(
-            "right pixels reused, mean of {count} stand-ins: {:.2} % chosen, {:.2} % plain; \
-             paper {:.2} %",
+            "right pixels reused, mean of {count} scenes beside the paper's: {:.2} % chosen, \
+             {:.2} % plain; paper {:.2} %",
             mean(|r| r.result.reuse_pct),
             mean(|r| r.plain.reuse_pct),
-            crate::sgrt::paper::REUSE_PCT
+            crate::paper::sgrt::REUSE_PCT
         )
     })
+}
+
+/// What to know of traces whose eyes the paper's row test is not made for.
+#[must_use]
+pub fn row_notes(entries: &[Entry]) -> Vec<String> {
+    let reports = entries.iter().map(|e| &e.report);
+    reports
+        .filter(|report| !report.rows.row_test_applies)
+        .map(|report| {
+            format!(
+                "{}: the paper's row test does not apply to these eyes: {:.1} % of the left pixels \
+                 arrive in a row of another number, and a right row needs {:.1} left rows; all \
+                 rows that are needed are fetched and charged",
+                scene_name(report),
+                report.rows.other_row_pct,
+                report.rows.left_rows_per_right_row
+            )
+        })
+        .collect()
 }
 
 fn reuse_name(reuse: Reuse) -> &'static str {
@@ -62,364 +75,412 @@ fn reuse_name(reuse: Reuse) -> &'static str {
     }
 }
 
-fn whole(n: u64) -> String {
-    group_thousands(&n.to_string())
+/// A trace under one of the two rules that every report has.
+struct RuleRow<'a> {
+    report: &'a Report,
+    /// Rules can be long: tables call them "chosen" and "plain", and [`rule_line`] says which one
+    /// was chosen.
+    run: &'static str,
+    outcome: &'a Outcome,
 }
 
-fn mega(n: u64) -> String {
-    format!("{:.2}", n as f64 * 1e-6)
+fn rule_rows(entries: &[Entry]) -> Vec<RuleRow<'_>> {
+    let both = |entry| {
+        let report: &Report = entry;
+        [("chosen", &report.result), ("plain", &report.plain)].map(|(run, outcome)| RuleRow {
+            report,
+            run,
+            outcome,
+        })
+    };
+    entries.iter().flat_map(|e| both(&e.report)).collect()
 }
 
-/// Rows of a scene and rule under the given columns.
-fn by_rule(
-    entries: &[Entry],
-    columns: Vec<Column>,
-    cells: impl Fn(&Report, &Outcome) -> Vec<String>,
-) -> Table {
-    let mut all = vec![Column::text("scene"), Column::text("rule")];
-    all.extend(columns);
-    let mut table = Table::new(all);
-    for entry in entries {
-        table.begin_group();
-        for (rule, outcome) in both(&entry.report) {
-            let mut row = vec![scene_name(&entry.report), rule.to_owned()];
-            row.extend(cells(&entry.report, outcome));
-            table.push(row);
+impl Row for RuleRow<'_> {
+    fn columns() -> Vec<Column<'static, Self>> {
+        fn pct<'a>(
+            key: &'static str,
+            name: &'static str,
+            decimals: usize,
+            value: fn(&Outcome) -> f64,
+        ) -> Column<'static, RuleRow<'a>> {
+            Column::real(key, name, "%", decimals, move |r: &RuleRow| {
+                value(r.outcome)
+            })
         }
+        fn ratio<'a>(
+            key: &'static str,
+            name: &'static str,
+            value: fn(&Outcome) -> f64,
+        ) -> Column<'static, RuleRow<'a>> {
+            Column::real(key, name, "ratio", 3, move |r: &RuleRow| value(r.outcome))
+        }
+        fn millions<'a>(
+            key: &'static str,
+            name: &'static str,
+            unit: &'static str,
+            value: fn(&Outcome) -> u64,
+        ) -> Column<'static, RuleRow<'a>> {
+            let show = Show::Millions(2);
+            Column::new(key, name, unit, show, move |r: &RuleRow| value(r.outcome))
+        }
+        fn text<'a>(
+            key: &'static str,
+            name: &'static str,
+            value: fn(&RuleRow) -> String,
+        ) -> Column<'static, RuleRow<'a>> {
+            Column::text(key, name, move |r: &RuleRow| value(r))
+        }
+        vec![
+            text("scene", "scene", |r| scene_name(r.report)),
+            text("checksum", "checksum", |r| r.report.trace.checksum.clone()),
+            text("run", "rule", |r| r.run.to_owned()),
+            text("rule", "rule", |r| match r.run {
+                "chosen" => r.report.config.rule.to_string(),
+                _ => "none".to_owned(),
+            }),
+            text("reuse", "reused", |r| {
+                reuse_name(r.report.config.reuse).to_owned()
+            }),
+            pct("reuse_pct", "reuse", 2, |o| o.reuse_pct),
+            pct("wrong_object_pct", "wrong object", 3, |o| {
+                o.wrong_object_pct
+            }),
+            pct("wrong_primitive_pct", "wrong triangle", 3, |o| {
+                o.wrong_primitive_pct
+            }),
+            pct("position_over_1px_pct", "off > 1 px", 3, |o| {
+                o.position_over_1px_pct
+            }),
+            pct("position_over_2px_pct", "off > 2 px", 3, |o| {
+                o.position_over_2px_pct
+            }),
+            ratio("relative_performance", "performance", |o| {
+                o.relative_performance
+            }),
+            ratio("tni_relative_performance", "units alone", |o| {
+                o.tni_relative_performance
+            }),
+            Column::real(
+                "paper_relative_performance",
+                "paper",
+                "ratio",
+                2,
+                |r: &Self| r.report.paper.as_ref().map(|p| p.relative_performance),
+            )
+            .published(),
+            ratio("relative_energy", "energy", |o| o.relative_energy),
+            Column::real("paper_relative_energy", "paper", "ratio", 2, |r: &Self| {
+                r.report.paper.as_ref().map(|p| p.relative_energy)
+            })
+            .published(),
+            pct("primary_steps_pct", "primary steps", 1, |o| {
+                o.primary_steps_pct
+            }),
+            pct("tni_reduction_pct", "unit cycles saved", 1, |o| {
+                o.tni_reduction_pct
+            }),
+            pct("right_tni_reduction_pct", "of the right eye's", 1, |o| {
+                o.right_tni_reduction_pct
+            }),
+            pct("srp_overhead_pct", "core cycles added", 1, |o| {
+                o.srp_overhead_pct
+            }),
+            millions("tni_cycles", "unit cycles", "M", |o| o.tni_cycles),
+            millions("reference_tni_cycles", "both eyes in full", "M", |o| {
+                o.reference_tni_cycles
+            }),
+            millions("srp_cycles", "core cycles", "M", |o| o.srp_cycles),
+            millions("reference_srp_cycles", "both eyes in full", "M", |o| {
+                o.reference_srp_cycles
+            }),
+            text("tni_bottleneck", "unit bottleneck", |r| {
+                r.outcome.tni_bottleneck.clone()
+            }),
+            millions("rays", "rays", "M", |o| o.work.rays),
+            millions("reference_rays", "both eyes in full", "M", |o| {
+                o.reference_work.rays
+            }),
+            millions("steps", "steps", "M", |o| o.work.steps),
+            millions("reference_steps", "both eyes in full", "M", |o| {
+                o.reference_work.steps
+            }),
+            millions("retests", "re-tests", "M", |o| o.work.retests),
+            Column::real("flip_mean", "FLIP mean", "", 5, |r: &Self| {
+                r.outcome.flip_mean
+            }),
+            Column::real("flip_p99", "FLIP p99", "", 4, |r: &Self| r.outcome.flip_p99),
+            Column::real("pixels_per_degree", "ppd", "px/deg", 1, |r: &Self| {
+                r.outcome.pixels_per_degree
+            }),
+            Column::real("psnr_db", "PSNR", "dB", 1, |r: &Self| r.outcome.psnr_db),
+            Column::real("ssim", "SSIM", "", 4, |r: &Self| r.outcome.ssim),
+            Column::new("detection_bytes", "detection reads", "B/px", Show::Whole, {
+                |r: &Self| {
+                    let reads = r.outcome.detection_reads;
+                    reads.pixel_bytes(&r.report.config.model.gbuffer)
+                }
+            }),
+            millions("on_chip_bytes", "tile buffers", "MB", |o| o.on_chip_bytes),
+            millions("gbuffer_dram_bytes", "G-buffer in DRAM", "MB", |o| {
+                o.dram.gbuffer_bytes
+            }),
+            millions("dram_bytes", "all DRAM", "MB", |o| o.dram.total()),
+            millions("reference_dram_bytes", "both eyes in full", "MB", |o| {
+                o.reference_dram.total()
+            }),
+            millions("whole_screen_dram_bytes", "whole screen: DRAM", "MB", |o| {
+                o.whole_screen.dram.total()
+            }),
+            ratio("whole_screen_relative_performance", "performance", |o| {
+                o.whole_screen.relative_performance
+            }),
+            ratio("whole_screen_relative_energy", "energy", |o| {
+                o.whole_screen.relative_energy
+            }),
+            text("row_test_applies", "row test applies", |r| {
+                r.report.rows.row_test_applies.to_string()
+            }),
+        ]
     }
-    table
+}
+
+fn by_rule(entries: &[Entry], keys: &[&str]) -> Table {
+    let columns = pick::<RuleRow>(&[&["scene", "run"], keys].concat());
+    Table::new(&columns, &rule_rows(entries)).grouped_by(1)
 }
 
 /// The ratios beside the paper's.
 pub fn performance(entries: &[Entry]) -> Table {
-    let columns = vec![
-        Column::number("reuse", "%"),
-        Column::number("performance", "ratio"),
-        Column::number("units alone", "ratio"),
-        Column::published("paper", "ratio"),
-        Column::number("energy", "ratio"),
-        Column::published("paper", "ratio"),
-        Column::number("primary steps", "%"),
-        Column::number("unit cycles saved", "%"),
-        Column::number("of the right eye's", "%"),
-        Column::number("core cycles added", "%"),
+    let keys = [
+        "reuse_pct",
+        "relative_performance",
+        "tni_relative_performance",
+        "paper_relative_performance",
+        "relative_energy",
+        "paper_relative_energy",
+        "primary_steps_pct",
+        "tni_reduction_pct",
+        "right_tni_reduction_pct",
+        "srp_overhead_pct",
     ];
-    by_rule(entries, columns, |report, o| {
-        let paper = report.paper.as_ref();
-        let or_dash = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2}"));
-        vec![
-            format!("{:.2}", o.reuse_pct),
-            format!("{:.2}", o.relative_performance),
-            format!("{:.2}", o.tni_relative_performance),
-            or_dash(paper.map(|p| p.relative_performance)),
-            format!("{:.2}", o.relative_energy),
-            or_dash(paper.map(|p| p.relative_energy)),
-            format!("{:.1}", o.primary_steps_pct),
-            format!("{:.1}", o.tni_reduction_pct),
-            format!("{:.1}", o.right_tni_reduction_pct),
-            format!("{:.1}", o.srp_overhead_pct),
-        ]
-    })
+    by_rule(entries, &keys).without_empty_columns()
 }
 
 /// Reuse with its error.
 pub fn accuracy(entries: &[Entry]) -> Table {
-    let columns = vec![
-        Column::number("reuse", "%"),
-        Column::number("wrong object", "%"),
-        Column::number("wrong triangle", "%"),
-        Column::number("off > 1 px", "%"),
-        Column::number("off > 2 px", "%"),
-        Column::number("FLIP mean", ""),
-        Column::number("FLIP p99", ""),
-        Column::number("ppd", "px/deg"),
-        Column::number("PSNR", "dB"),
-        Column::number("SSIM", ""),
-    ];
-    by_rule(entries, columns, |_, o| {
-        vec![
-            format!("{:.2}", o.reuse_pct),
-            format!("{:.3}", o.wrong_object_pct),
-            format!("{:.3}", o.wrong_primitive_pct),
-            format!("{:.3}", o.position_over_1px_pct),
-            format!("{:.3}", o.position_over_2px_pct),
-            format!("{:.5}", o.flip_mean),
-            format!("{:.4}", o.flip_p99),
-            format!("{:.1}", o.pixels_per_degree),
-            format!("{:.1}", o.psnr_db),
-            format!("{:.4}", o.ssim),
-        ]
-    })
-}
-
-/// Pixels by class, and what is wrong with those reused.
-pub fn classes(entries: &[Entry]) -> Table {
-    let mut table = Table::new(vec![
-        Column::text("scene"),
-        Column::text("rule"),
-        Column::text("class"),
-        Column::number("pixels", ""),
-        Column::number("share", "%"),
-        Column::number("wrong object", "px"),
-        Column::number("wrong triangle", "px"),
-        Column::number("off > 1 px", "px"),
-        Column::number("off > 2 px", "px"),
-    ]);
-    for entry in entries {
-        for (rule, o) in both(&entry.report) {
-            table.begin_group();
-            let c = &o.classes;
-            let rows: [(&str, &ClassCounts); 4] = [
-                ("reused", &c.reused),
-                ("overlapped, nearest reused", &c.overlapped),
-                ("missing, traced", &c.missing),
-                ("bad, traced", &c.bad),
-            ];
-            for (class, counts) in rows {
-                table.push(vec![
-                    scene_name(&entry.report),
-                    rule.to_owned(),
-                    class.to_owned(),
-                    whole(counts.pixels),
-                    format!("{:.2}", c.pct(counts.pixels)),
-                    whole(counts.wrong_object),
-                    whole(counts.wrong_primitive),
-                    whole(counts.position_over[0]),
-                    whole(counts.position_over[1]),
-                ]);
-            }
-        }
-    }
-    table
-}
-
-/// Cycles and work.
-pub fn work(entries: &[Entry]) -> Table {
-    let columns = vec![
-        Column::number("unit cycles", "M"),
-        Column::number("both eyes in full", "M"),
-        Column::number("core cycles", "M"),
-        Column::number("both eyes in full", "M"),
-        Column::text("unit bottleneck"),
-        Column::number("rays", "M"),
-        Column::number("both eyes in full", "M"),
-        Column::number("steps", "M"),
-        Column::number("both eyes in full", "M"),
-        Column::number("re-tests", "M"),
-    ];
-    by_rule(entries, columns, |_, o| {
-        vec![
-            mega(o.tni_cycles),
-            mega(o.reference_tni_cycles),
-            mega(o.srp_cycles),
-            mega(o.reference_srp_cycles),
-            o.tni_bottleneck.clone(),
-            mega(o.work.rays),
-            mega(o.reference_work.rays),
-            mega(o.work.steps),
-            mega(o.reference_work.steps),
-            mega(o.work.retests),
-        ]
-    })
-}
-
-/// G-buffer bytes with and without tiling.
-pub fn traffic(entries: &[Entry]) -> Table {
-    let columns = vec![
-        Column::number("on chip, tiled", "MB"),
-        Column::number("DRAM, tiled", "MB"),
-        Column::number("DRAM, whole screen", "MB"),
-        Column::number("energy, tiled", "ratio"),
-        Column::number("energy, whole screen", "ratio"),
-    ];
-    by_rule(entries, columns, |_, o| {
-        vec![
-            mega(o.gbuffer_tiled.on_chip_bytes),
-            mega(o.gbuffer_tiled.dram_bytes),
-            mega(o.gbuffer_whole_screen.dram_bytes),
-            format!("{:.3}", o.relative_energy),
-            format!("{:.3}", o.whole_screen_relative_energy),
-        ]
-    })
-}
-
-/// Energy by component over the reference's total.
-pub fn energy(entries: &[Entry]) -> Table {
-    let mut table = Table::new(vec![
-        Column::text("scene"),
-        Column::text("run"),
-        Column::number("units", "%"),
-        Column::number("cores", "%"),
-        Column::number("caches", "%"),
-        Column::number("tile buffers", "%"),
-        Column::number("DRAM", "%"),
-        Column::number("static", "%"),
-        Column::number("sum", "%"),
-    ]);
-    table.caption = "Energy by component, % of tracing both eyes in full".to_owned();
-    for entry in entries {
-        table.begin_group();
-        let o = &entry.report.result;
-        let whole = o.reference_energy.total();
-        for (name, e) in [
-            ("both eyes in full", &o.reference_energy),
-            ("chosen", &o.energy),
-        ] {
-            let mut row = vec![scene_name(&entry.report), name.to_owned()];
-            let parts = [
-                e.tni_pj,
-                e.srp_pj,
-                e.caches_pj,
-                e.sram_pj,
-                e.dram_pj,
-                e.static_pj,
-                e.total(),
-            ];
-            row.extend(parts.map(|p| format!("{:.1}", 100.0 * p / whole)));
-            table.push(row);
-        }
-    }
-    table
-}
-
-/// The points of the curve.
-pub fn curve(report: &Report) -> Table {
-    let mut table = Table::new(vec![
-        Column::text("rule"),
-        Column::text("reused"),
-        Column::number("reuse", "%"),
-        Column::number("wrong object", "%"),
-        Column::number("unit cycles saved", "%"),
-        Column::number("performance", "ratio"),
-        Column::number("FLIP mean", ""),
-        Column::number("FLIP p99", ""),
-    ]);
-    let mut last = None;
-    for p in &report.curve {
-        if last != Some(p.rule) {
-            table.begin_group();
-            last = Some(p.rule);
-        }
-        table.push(vec![
-            p.rule.to_string(),
-            reuse_name(p.reuse).to_owned(),
-            format!("{:.2}", p.reuse_pct),
-            format!("{:.3}", p.wrong_object_pct),
-            format!("{:.1}", p.tni_reduction_pct),
-            format!("{:.2}", p.relative_performance),
-            format!("{:.5}", p.flip_mean),
-            format!("{:.4}", p.flip_p99),
-        ]);
-    }
-    table
-}
-
-/// Parameters by their effect on the ratios.
-pub fn sensitivity(report: &Report) -> Table {
-    let mut table = Table::new(vec![
-        Column::text("parameter"),
-        Column::number("value", ""),
-        Column::number("performance, half", "ratio"),
-        Column::number("twice", "ratio"),
-        Column::number("energy, half", "ratio"),
-        Column::number("twice", "ratio"),
-    ]);
-    let o = &report.result;
-    let effect = |s: &crate::sgrt::result::Sensitivity| {
-        let off = |pair: [f64; 2], base: f64| pair.map(|v| (v - base).abs()).into_iter().sum();
-        let performance: f64 = off(s.relative_performance, o.relative_performance);
-        let energy: f64 = off(s.relative_energy, o.relative_energy);
-        performance + energy
-    };
-    let mut rows: Vec<_> = report.sensitivity.iter().collect();
-    rows.sort_by(|a, b| effect(b).total_cmp(&effect(a)));
-    for s in rows {
-        table.push(vec![
-            s.parameter.clone(),
-            s.value.to_string(),
-            format!("{:.3}", s.relative_performance[0]),
-            format!("{:.3}", s.relative_performance[1]),
-            format!("{:.3}", s.relative_energy[0]),
-            format!("{:.3}", s.relative_energy[1]),
-        ]);
-    }
-    table
-}
-
-/// A row for the rule and one for plain reuse, per trace.
-#[must_use]
-pub fn csv(entries: &[Entry]) -> String {
-    let mut csv = Csv::new(&[
-        "scene",
-        "checksum",
-        "rule",
-        "reuse",
+    let keys = [
         "reuse_pct",
         "wrong_object_pct",
         "wrong_primitive_pct",
         "position_over_1px_pct",
         "position_over_2px_pct",
-        "relative_performance",
-        "tni_relative_performance",
-        "primary_steps_pct",
-        "paper_relative_performance",
-        "relative_energy",
-        "paper_relative_energy",
-        "tni_cycles",
-        "reference_tni_cycles",
-        "srp_cycles",
-        "reference_srp_cycles",
-        "tni_reduction_pct",
-        "srp_overhead_pct",
         "flip_mean",
         "flip_p99",
         "pixels_per_degree",
         "psnr_db",
         "ssim",
+    ];
+    by_rule(entries, &keys)
+}
+
+/// Cycles and work.
+pub fn work(entries: &[Entry]) -> Table {
+    let keys = [
+        "tni_cycles",
+        "reference_tni_cycles",
+        "srp_cycles",
+        "reference_srp_cycles",
+        "tni_bottleneck",
+        "rays",
+        "reference_rays",
+        "steps",
+        "reference_steps",
+        "retests",
+    ];
+    by_rule(entries, &keys)
+}
+
+/// Bytes moved, with the G-buffer in tiles and without.
+pub fn traffic(entries: &[Entry]) -> Table {
+    let keys = [
+        "detection_bytes",
         "on_chip_bytes",
+        "gbuffer_dram_bytes",
         "dram_bytes",
+        "reference_dram_bytes",
         "whole_screen_dram_bytes",
-    ]);
-    for entry in entries {
-        let report = &entry.report;
-        for (rule, o) in [
-            (report.config.rule.to_string(), &report.result),
-            ("none".to_owned(), &report.plain),
-        ] {
-            let paper = report.paper.as_ref();
-            drop(
-                csv.row()
-                    .text(&report.trace.scene)
-                    .text(&report.trace.checksum)
-                    .text(&rule)
-                    .text(reuse_name(report.config.reuse))
-                    .value(o.reuse_pct)
-                    .value(o.wrong_object_pct)
-                    .value(o.wrong_primitive_pct)
-                    .value(o.position_over_1px_pct)
-                    .value(o.position_over_2px_pct)
-                    .value(o.relative_performance)
-                    .value(o.tni_relative_performance)
-                    .value(o.primary_steps_pct)
-                    .maybe(paper.map(|p| p.relative_performance))
-                    .value(o.relative_energy)
-                    .maybe(paper.map(|p| p.relative_energy))
-                    .value(o.tni_cycles)
-                    .value(o.reference_tni_cycles)
-                    .value(o.srp_cycles)
-                    .value(o.reference_srp_cycles)
-                    .value(o.tni_reduction_pct)
-                    .value(o.srp_overhead_pct)
-                    .value(o.flip_mean)
-                    .value(o.flip_p99)
-                    .value(o.pixels_per_degree)
-                    .value(o.psnr_db)
-                    .value(o.ssim)
-                    .value(o.gbuffer_tiled.on_chip_bytes)
-                    .value(o.gbuffer_tiled.dram_bytes)
-                    .value(o.gbuffer_whole_screen.dram_bytes),
-            );
-        }
+        "whole_screen_relative_performance",
+        "whole_screen_relative_energy",
+    ];
+    by_rule(entries, &keys)
+}
+
+/// A row for the rule and one for plain reuse, per trace.
+#[must_use]
+pub fn csv(entries: &[Entry]) -> String {
+    Table::new(&RuleRow::columns(), &rule_rows(entries)).csv()
+}
+
+/// Pixels of a class.
+struct ClassRow<'a> {
+    run: &'a RuleRow<'a>,
+    class: &'static str,
+    counts: &'a ClassCounts,
+}
+
+impl ClassRow<'_> {
+    fn accuracy(&self) -> &Accuracy {
+        &self.run.outcome.classes
     }
-    csv.finish()
+}
+
+/// Pixels by class, and what is wrong with those reused.
+pub fn classes(entries: &[Entry]) -> Table {
+    let runs = rule_rows(entries);
+    let pixels = |key, name, value: fn(&ClassCounts) -> u64| {
+        Column::new(key, name, "px", Show::Whole, move |r: &ClassRow| {
+            value(r.counts)
+        })
+    };
+    let columns = [
+        Column::text("scene", "scene", |r: &ClassRow| scene_name(r.run.report)),
+        Column::text("run", "rule", |r: &ClassRow| r.run.run),
+        Column::text("class", "class", |r: &ClassRow| r.class),
+        pixels("pixels", "pixels", |c| c.pixels),
+        Column::real("share_pct", "share", "%", 2, |r: &ClassRow| {
+            r.accuracy().pct(r.counts.pixels)
+        }),
+        pixels("wrong_object", "wrong object", |c| c.wrong_object),
+        pixels("wrong_primitive", "wrong triangle", |c| c.wrong_primitive),
+        pixels("over_1px", "off > 1 px", |c| c.position_over[0]),
+        pixels("over_2px", "off > 2 px", |c| c.position_over[1]),
+    ];
+    let rows: Vec<ClassRow> = runs
+        .iter()
+        .flat_map(|run| {
+            let c = &run.outcome.classes;
+            [
+                ("reused", &c.reused),
+                ("overlapped, nearest reused", &c.overlapped),
+                ("missing, traced", &c.missing),
+                ("bad, traced", &c.bad),
+            ]
+            .map(|(class, counts)| ClassRow { run, class, counts })
+        })
+        .collect();
+    Table::new(&columns, &rows).grouped_by(2)
+}
+
+/// Energy of a way of rendering.
+struct EnergyRow<'a> {
+    scene: String,
+    run: &'static str,
+    energy: &'a EnergyPj,
+    whole_pj: f64,
+}
+
+/// Energy by component over the reference's total.
+pub fn energy(entries: &[Entry]) -> Table {
+    let part = |key, name, value: fn(&EnergyPj) -> f64| {
+        Column::real(key, name, "%", 1, move |r: &EnergyRow| {
+            100.0 * value(r.energy) / r.whole_pj
+        })
+    };
+    let columns = [
+        Column::text("scene", "scene", |r: &EnergyRow| r.scene.clone()),
+        Column::text("run", "run", |r: &EnergyRow| r.run),
+        part("tni_pct", "units", |e| e.tni_pj),
+        part("srp_pct", "cores", |e| e.srp_pj),
+        part("caches_pct", "caches", |e| e.caches_pj),
+        part("sram_pct", "tile buffers", |e| e.sram_pj),
+        part("dram_pct", "DRAM", |e| e.dram_pj),
+        part("static_pct", "static", |e| e.static_pj),
+        part("sum_pct", "sum", EnergyPj::total),
+    ];
+    let both = |report| {
+        let report: &Report = report;
+        let o = &report.result;
+        let runs = [
+            ("both eyes in full", &o.reference_energy),
+            ("chosen", &o.energy),
+        ];
+        runs.map(|(run, energy)| EnergyRow {
+            scene: scene_name(report),
+            run,
+            energy,
+            whole_pj: o.reference_energy.total(),
+        })
+    };
+    let rows: Vec<EnergyRow> = entries.iter().flat_map(|e| both(&e.report)).collect();
+    let mut table = Table::new(&columns, &rows).grouped_by(1);
+    table.caption = "Energy by component, % of tracing both eyes in full";
+    table
+}
+
+/// The points of the curve.
+pub fn curve(report: &Report) -> Table {
+    let columns = [
+        Column::text("rule", "rule", |p: &CurvePoint| p.rule.to_string()),
+        Column::text("reuse", "reused", |p: &CurvePoint| reuse_name(p.reuse)),
+        Column::real("reuse_pct", "reuse", "%", 2, |p: &CurvePoint| p.reuse_pct),
+        Column::real(
+            "wrong_object_pct",
+            "wrong object",
+            "%",
+            3,
+            |p: &CurvePoint| p.wrong_object_pct,
+        ),
+        Column::real(
+            "tni_reduction_pct",
+            "unit cycles saved",
+            "%",
+            1,
+            |p: &CurvePoint| p.tni_reduction_pct,
+        ),
+        Column::real(
+            "relative_performance",
+            "performance",
+            "ratio",
+            3,
+            |p: &CurvePoint| p.relative_performance,
+        ),
+        Column::real("relative_energy", "energy", "ratio", 3, |p: &CurvePoint| {
+            p.relative_energy
+        }),
+        Column::real("flip_mean", "FLIP mean", "", 5, |p: &CurvePoint| {
+            p.flip_mean
+        }),
+        Column::real("flip_p99", "FLIP p99", "", 4, |p: &CurvePoint| p.flip_p99),
+    ];
+    Table::new(&columns, &report.curve).grouped_by(1)
+}
+
+/// Parameters by their effect on the ratios.
+pub fn sensitivity(report: &Report) -> Table {
+    let ratio = |key, name, value: fn(&Sensitivity) -> f64| {
+        Column::real(key, name, "ratio", 3, move |s: &Sensitivity| value(s))
+    };
+    let columns = [
+        Column::text("parameter", "parameter", |s: &Sensitivity| {
+            s.parameter.clone()
+        }),
+        Column::new("value", "value", "", Show::Text, |s: &Sensitivity| s.value),
+        ratio("performance_half", "performance, half", |s| {
+            s.relative_performance[0]
+        }),
+        ratio("performance_twice", "twice", |s| s.relative_performance[1]),
+        ratio("energy_half", "energy, half", |s| s.relative_energy[0]),
+        ratio("energy_twice", "twice", |s| s.relative_energy[1]),
+    ];
+    let o = &report.result;
+    let effect = |s: &Sensitivity| {
+        let off = |pair: [f64; 2], base: f64| pair.map(|v| (v - base).abs()).into_iter().sum();
+        let performance: f64 = off(s.relative_performance, o.relative_performance);
+        let energy: f64 = off(s.relative_energy, o.relative_energy);
+        performance + energy
+    };
+    let mut rows: Vec<&Sensitivity> = report.sensitivity.iter().collect();
+    rows.sort_by(|a, b| effect(b).total_cmp(&effect(a)));
+    Table::new(&columns, rows)
 }

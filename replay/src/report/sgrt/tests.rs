@@ -1,20 +1,26 @@
 use super::*;
+use crate::paper::sgrt::PaperValues;
 use crate::result::TraceId;
-use crate::sgrt::analyse::{Analysis, curve_rules};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::SgrtConfig;
-use crate::sgrt::reject::Rule;
-use crate::sgrt::result::{Config, PaperValues, SCHEMA};
+use crate::sgrt::loaded::LoadedTrace;
+use crate::sgrt::result::{Config, SCHEMA};
+use crate::sgrt::rules::Rule;
 use crate::sgrt::synthetic::{View, globe, trace, wall};
+use crate::sgrt::variations::curve_rules;
 
 fn entry() -> Entry {
+    entry_of(View::default())
+}
+
+fn entry_of(view: View) -> Entry {
     let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
     scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
-    let source = trace(&scene, View::default());
-    let analysis = Analysis::load(&source).expect("loads");
+    let source = trace(&scene, view);
+    let loaded = LoadedTrace::load(&source).expect("loads");
     let model = SgrtConfig::default();
     let rule: Rule = crate::sgrt::DEFAULT_RULE.parse().expect("a rule");
-    let run = |rule: &Rule| analysis.run(rule, Reuse::Primary, &model).expect("runs");
+    let run = |rule: &Rule| loaded.run(rule, Reuse::Primary, &model).expect("runs");
     let (ours, plain) = (run(&rule), run(&Rule::default()));
     let png = crate::image::png::encode(&ours.picture).expect("a picture");
     Entry {
@@ -27,13 +33,14 @@ fn entry() -> Entry {
             },
             scene_triangles: 1,
             eye_size_px: [72, 40],
+            rows: loaded.rows().summary,
             paper: Some(PaperValues {
                 scene: "Teapot".to_owned(),
                 relative_performance: 1.64,
                 relative_energy: 0.96,
             }),
-            curve: analysis.curve(&curve_rules()[..3], &model),
-            sensitivity: analysis
+            curve: loaded.curve(&curve_rules()[..3], &model),
+            sensitivity: loaded
                 .sensitivity(&ours, Reuse::Primary, &model)
                 .expect("runs"),
             config: Config {
@@ -83,7 +90,7 @@ fn csv_has_as_many_cells_in_each_row_as_in_its_heading() {
 #[test]
 fn json_holds_the_agreed_fields() {
     let json = serde_json::to_value(entry().report).expect("json");
-    assert_eq!(json["schema"], "replay.reproject/1");
+    assert_eq!(json["schema"], "replay.reproject/2");
     for field in [
         "reuse_pct",
         "wrong_object_pct",
@@ -97,6 +104,29 @@ fn json_holds_the_agreed_fields() {
         assert!(json["result"][field].is_number(), "{field}");
     }
     assert_eq!(json["config"]["rule"], crate::sgrt::DEFAULT_RULE);
+}
+
+#[test]
+fn eyes_that_the_row_test_is_not_made_for_are_named_everywhere() {
+    let canted = entry_of(View {
+        cant_deg: 10.0,
+        ..View::default()
+    });
+    let needle = "the paper's row test does not apply";
+    assert!(text(std::slice::from_ref(&canted)).contains(needle));
+    let html = page(std::slice::from_ref(&canted)).expect("a page");
+    assert!(html.contains("row test does not apply"));
+    let json = serde_json::to_value(&canted.report).expect("json");
+    assert_eq!(json["rows"]["row_test_applies"], false);
+    assert!(
+        csv(&[canted])
+            .lines()
+            .nth(1)
+            .expect("a row")
+            .ends_with("false")
+    );
+
+    assert!(!text(&[entry()]).contains(needle));
 }
 
 #[test]

@@ -1,6 +1,10 @@
 use super::*;
 use crate::sgrt::work::RayWork;
 
+fn cycles(work: &BatchWork, misses: &Misses, config: &SgrtConfig) -> TniCycles {
+    super::cycles(work, misses, TraversalKind::Bvh2, config)
+}
+
 fn batch(rays: u64, steps: u64, tests: u64) -> BatchWork {
     let mut work = BatchWork::default();
     work.by_class[0] = RayWork {
@@ -22,7 +26,7 @@ fn steps_over_pipelines_is_the_time_of_a_traversal_bound_batch() {
 }
 
 #[test]
-fn twice_the_units_halve_everything_but_the_memory() {
+fn twice_the_units_halve_everything() {
     let mut config = SgrtConfig::default();
     let misses = Misses {
         l1: 50.0,
@@ -35,21 +39,16 @@ fn twice_the_units_halve_everything_but_the_memory() {
     assert_eq!(two.traversal * 2.0, one.traversal);
     assert_eq!(two.intersection * 2.0, one.intersection);
     assert_eq!(two.latency * 2.0, one.latency);
-    assert_eq!(two.bandwidth, one.bandwidth);
 }
 
 #[test]
-fn bytes_over_bandwidth_is_the_time_of_a_memory_bound_batch() {
+fn a_wide_step_takes_its_own_cycles() {
     let config = SgrtConfig::default();
-    let misses = Misses {
-        l1: 0.0,
-        l2: 0.0,
-        dram_bytes: 5_120_000.0,
-    };
-    let c = cycles(&batch(1, 1, 1), &misses, &config);
-    // 25.6 GB/s at 500 MHz are 51.2 bytes a cycle.
-    assert!((c.total() - 100_000.0).abs() < 1e-6);
-    assert_eq!(c.bottleneck(), "bandwidth");
+    let of = |tree| super::cycles(&batch(10, 64_000, 0), &Misses::default(), tree, &config);
+    let (narrow, wide) = (of(TraversalKind::Bvh2), of(TraversalKind::Bvh8));
+    let ratio = config.tni.trv_cycles_per_wide_step / config.tni.trv_cycles_per_step;
+    assert_eq!(wide.traversal, ratio * narrow.traversal);
+    assert!(wide.latency > narrow.latency);
 }
 
 /// A ray of the cycle-by-cycle twin: steps, and a triangle test after every `steps_per_test`.

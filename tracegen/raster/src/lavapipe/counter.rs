@@ -1,40 +1,33 @@
 //! Counts fragments per pixel by additive blending: a check of the capture that shares neither
 //! ballots nor atomics nor post-processing with it.
 
-use super::pipelines::{DEPTH_FORMAT, PipelineKey, Role};
-use super::uniforms::ViewData;
-use super::{Lavapipe, PassState};
+use super::Lavapipe;
+use super::pipelines::DEPTH_FORMAT;
 use crate::backend::View;
 use crate::draws::{DrawList, DrawMode};
 use crate::error::RasterError;
+use crate::roles::Purpose;
+use crate::uniforms::ViewData;
 
 impl Lavapipe {
-    /// Fragments of opaque and blended draws that pass the early depth test, by pixel.
+    /// Fragments of all opaque and blended draws that pass the early depth test, by pixel.
+    ///
+    /// # Errors
+    /// Driver errors.
+    ///
+    /// # Panics
+    /// Where a draw is alpha-masked.
     pub fn count_fragments(
         &mut self,
         draws: &DrawList,
         view: &View<'_>,
     ) -> Result<Vec<u32>, RasterError> {
-        let keys: Vec<PipelineKey> = draws
-            .calls
-            .iter()
-            .map(|call| {
-                assert_ne!(
-                    call.mode,
-                    DrawMode::Masked,
-                    "alpha tests need the in-order replay"
-                );
-                let role = if call.mode == DrawMode::Blended {
-                    Role::CountBlended
-                } else {
-                    Role::Count
-                };
-                self.key(call, role, false, 0)
-            })
-            .collect();
-        for key in &keys {
-            self.pipelines.prepare(&self.gpu, *key)?;
-        }
+        assert!(
+            draws.calls.iter().all(|c| c.mode != DrawMode::Masked),
+            "alpha tests need the in-order replay"
+        );
+        let every: Vec<u32> = (0..draws.calls.len() as u32).collect();
+        let plan = self.plan(draws, &every, Purpose::Count)?;
         let [width, height] = self.targets.size_px;
         let size = wgpu::Extent3d {
             width,
@@ -89,10 +82,7 @@ impl Lavapipe {
             ..Default::default()
         });
         pass.set_bind_group(0, &self.eye_bindings, &[]);
-        let mut state = PassState::default();
-        for ((index, call), key) in (0..).zip(&draws.calls).zip(keys) {
-            self.issue(&mut pass, &mut state, index, call, key);
-        }
+        self.issue(&mut pass, draws, &plan);
         drop(pass);
         encoder.copy_texture_to_buffer(
             counts.as_image_copy(),

@@ -4,20 +4,22 @@ mod counter;
 mod device;
 mod pipelines;
 mod targets;
-mod uniforms;
 mod upload;
 
-use super::backend::{CaptureBackend, Region, Rendered, View};
-use super::draws::{DrawCall, DrawList, DrawMode};
+use super::backend::{CaptureBackend, View, Work};
+use super::batches::{Batch, batches};
+use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
-use super::lighting::Lighting;
+use super::frame::Frame;
+use super::roles::{MaterialState, PipelineKey, Purpose, roles};
+use super::shader::VIEW_BINDINGS;
+use super::uniforms::ViewData;
 use device::Gpu;
-use pipelines::{PipelineKey, Pipelines, Role};
-use record::{DEPTH_BYTES, RECORD_BYTES, RawRecords};
+use pipelines::Pipelines;
+use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
 use scene::Scene;
 use targets::{ShadowMaps, Targets};
 use textures::TextureSet;
-use uniforms::ViewData;
 use upload::SceneBuffers;
 use wgpu::util::DeviceExt;
 
@@ -32,13 +34,7 @@ pub struct Lavapipe {
     eye_bindings: wgpu::BindGroup,
     /// How each material is drawn.
     materials: Vec<MaterialState>,
-}
-
-#[derive(Clone, Copy)]
-struct MaterialState {
-    double_sided: bool,
-    textures: u32,
-    leaders: u32,
+    work: Work,
 }
 
 impl Lavapipe {
@@ -70,17 +66,14 @@ impl Lavapipe {
             &targets.view_uniform,
             &shadow_maps.sampled,
         );
-        let materials = scene
-            .materials
-            .iter()
-            .zip(&draws.groups)
-            .map(|(material, groups)| MaterialState {
-                double_sided: material.double_sided,
-                textures: groups.present,
-                leaders: groups.leaders,
-            })
+        let materials = (scene.materials.iter().zip(&draws.groups))
+            .map(|(material, groups)| MaterialState::new(material, groups))
             .collect();
-        let mut lavapipe = Self {
+        let work = Work {
+            samplers: buffers.samplers as u64,
+            ..Work::default()
+        };
+        Ok(Self {
             gpu,
             pipelines,
             scene: buffers,
@@ -88,106 +81,66 @@ impl Lavapipe {
             shadow_maps,
             eye_bindings,
             materials,
-        };
-        for call in &draws.calls {
-            for key in lavapipe.keys_of(call, draws.cascades) {
-                lavapipe.pipelines.prepare(&lavapipe.gpu, key)?;
+            work,
+        })
+    }
+
+    /// Batches a list of draws and makes the pipelines that they need and that are not there yet.
+    /// The list stays in the instance buffer until the next plan's submission.
+    fn plan(
+        &mut self,
+        draws: &DrawList,
+        visible: &[u32],
+        purpose: Purpose,
+    ) -> Result<Vec<(Batch, PipelineKey)>, RasterError> {
+        let mut plan = Vec::new();
+        for batch in batches(draws, visible, purpose) {
+            let call = &draws.calls[batch.draw as usize];
+            let material = &self.materials[call.material];
+            for &role in roles(call.mode, purpose) {
+                let key = PipelineKey::new(call, material, role, purpose, draws.cascades);
+                self.pipelines.prepare(&self.gpu, key)?;
+                self.work.draws += u64::from(batch.range.end - batch.range.start);
+                self.work.calls += 1;
+                plan.push((batch.clone(), key));
             }
         }
-        Ok(lavapipe)
+        self.gpu
+            .queue
+            .write_buffer(&self.scene.instance_draws, 0, bytemuck::cast_slice(visible));
+        Ok(plan)
     }
 
-    fn key(&self, call: &DrawCall, role: Role, capture: bool, cascades: u32) -> PipelineKey {
-        let material = &self.materials[call.material];
-        let shadow = matches!(role, Role::Shadow | Role::ShadowMasked);
-        PipelineKey {
-            role,
-            capture,
-            // A shadow caster without alpha test is drawn alike whatever its material.
-            textures: if role == Role::Shadow {
-                0
-            } else {
-                material.textures
-            },
-            leaders: if shadow || !capture {
-                0
-            } else {
-                material.leaders
-            },
-            cascades: if shadow { 0 } else { cascades },
-            double_sided: shadow || material.double_sided,
-            mirrored: !shadow && call.mirrored,
-        }
-    }
-
-    /// Pipelines of a draw in the order in which it uses them.
-    fn roles(call: &DrawCall, capture: bool) -> &'static [(Role, bool)] {
-        match (call.mode, capture) {
-            (DrawMode::Opaque, false) => &[(Role::Opaque, false)],
-            (DrawMode::Opaque, true) => &[(Role::Opaque, true)],
-            (DrawMode::Blended, false) => &[(Role::Blended, false)],
-            (DrawMode::Blended, true) => &[(Role::Blended, true)],
-            (DrawMode::Masked, false) => &[(Role::Masked, false)],
-            (DrawMode::Masked, true) => &[(Role::MaskedRecord, true), (Role::Masked, false)],
-        }
-    }
-
-    fn shadow_role(call: &DrawCall) -> Option<Role> {
-        match call.mode {
-            DrawMode::Opaque => Some(Role::Shadow),
-            DrawMode::Masked => Some(Role::ShadowMasked),
-            DrawMode::Blended => None,
-        }
-    }
-
-    fn keys_of(&self, call: &DrawCall, cascades: u32) -> Vec<PipelineKey> {
-        let roles = [false, true]
-            .into_iter()
-            .flat_map(|capture| Self::roles(call, capture));
-        let mut keys: Vec<PipelineKey> = roles
-            .map(|&(role, capture)| self.key(call, role, capture, cascades))
-            .collect();
-        if cascades > 0 {
-            keys.extend(Self::shadow_role(call).map(|role| self.key(call, role, false, cascades)));
-        }
-        keys
-    }
-
-    /// Issues one draw through one pipeline, setting only the state that changes.
+    /// Issues a plan, setting only the state that changes.
     fn issue(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        state: &mut PassState,
-        index: u32,
-        call: &DrawCall,
-        key: PipelineKey,
+        draws: &DrawList,
+        plan: &[(Batch, PipelineKey)],
     ) {
-        let (Some(mesh), Some(pipeline)) =
-            (&self.scene.meshes[call.mesh], self.pipelines.get(&key))
-        else {
-            // Every draw's mesh is uploaded and its pipelines prepared when the backend is made.
-            return;
-        };
-        if state.key.replace(key) != Some(key) {
-            pass.set_pipeline(pipeline);
+        let (mut last_key, mut last_material, mut last_mesh) = (None, None, None);
+        pass.set_vertex_buffer(1, self.scene.instance_draws.slice(..));
+        for (batch, key) in plan {
+            let call = &draws.calls[batch.draw as usize];
+            let (Some(mesh), Some(pipeline)) =
+                (&self.scene.meshes[call.mesh], self.pipelines.get(key))
+            else {
+                // Every draw's mesh is uploaded, and a plan prepares its pipelines.
+                continue;
+            };
+            if last_key.replace(*key) != Some(*key) {
+                pass.set_pipeline(pipeline);
+            }
+            if last_material.replace(call.material) != Some(call.material) {
+                pass.set_bind_group(1, &self.scene.materials[call.material], &[]);
+            }
+            if last_mesh.replace(call.mesh) != Some(call.mesh) {
+                pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+                pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+            }
+            pass.draw_indexed(0..mesh.index_count, 0, batch.range.clone());
         }
-        if state.material.replace(call.material) != Some(call.material) {
-            pass.set_bind_group(1, &self.scene.materials[call.material], &[]);
-        }
-        if state.mesh.replace(call.mesh) != Some(call.mesh) {
-            pass.set_vertex_buffer(0, mesh.vertices.slice(..));
-            pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        }
-        pass.draw_indexed(0..mesh.index_count, 0, index..index + 1);
     }
-}
-
-/// State that the last draw of a pass left.
-#[derive(Default)]
-struct PassState {
-    key: Option<PipelineKey>,
-    material: Option<usize>,
-    mesh: Option<usize>,
 }
 
 impl CaptureBackend for Lavapipe {
@@ -203,10 +156,24 @@ impl CaptureBackend for Lavapipe {
         self.targets.capacity.into()
     }
 
-    fn render_shadows(&mut self, draws: &DrawList, lighting: &Lighting) -> Result<(), RasterError> {
+    fn work(&self) -> Work {
+        Work {
+            pipelines: self.pipelines.count(),
+            ..self.work
+        }
+    }
+
+    fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError> {
+        let lighting = &frame.lighting;
+        if lighting.cascades.is_empty() {
+            return Ok(());
+        }
         // The map cannot be bound while it is rendered: the casters get a stand-in.
         let stand_in = ShadowMaps::new(&self.gpu, 0);
-        for (cascade, layer) in lighting.cascades.iter().zip(&self.shadow_maps.layers) {
+        for (number, (cascade, visible)) in lighting.cascades.iter().zip(&frame.casters).enumerate()
+        {
+            let plan = self.plan(draws, visible, Purpose::Shadow)?;
+            self.work.shadow_maps += 1;
             let uniform = self
                 .gpu
                 .device
@@ -223,12 +190,11 @@ impl CaptureBackend for Lavapipe {
                 &uniform,
                 &stand_in.sampled,
             );
-            let visible = draws.visible(cascade.clip_from_world);
             self.gpu.checked("rendering a shadow cascade", || {
                 let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                        view: layer,
+                        view: &self.shadow_maps.layers[number],
                         depth_ops: Some(wgpu::Operations {
                             load: wgpu::LoadOp::Clear(1.0),
                             store: wgpu::StoreOp::Store,
@@ -238,14 +204,7 @@ impl CaptureBackend for Lavapipe {
                     ..Default::default()
                 });
                 pass.set_bind_group(0, &bindings, &[]);
-                let mut state = PassState::default();
-                for &index in &visible {
-                    let call = &draws.calls[index as usize];
-                    if let Some(role) = Self::shadow_role(call) {
-                        let key = self.key(call, role, false, 0);
-                        self.issue(&mut pass, &mut state, index, call, key);
-                    }
-                }
+                self.issue(&mut pass, draws, &plan);
                 drop(pass);
                 self.gpu.queue.submit([encoder.finish()]);
             })?;
@@ -258,9 +217,15 @@ impl CaptureBackend for Lavapipe {
         draws: &DrawList,
         view: &View<'_>,
         region: Region,
-        capture: bool,
-        sink: &mut dyn FnMut(RawRecords<'_>) -> Result<(), RasterError>,
-    ) -> Result<Rendered, RasterError> {
+        sink: Option<&mut Sink<'_>>,
+    ) -> Result<Captured, RasterError> {
+        let purpose = if sink.is_some() {
+            Purpose::Capture
+        } else {
+            Purpose::Plain
+        };
+        let plan = self.plan(draws, view.visible, purpose)?;
+        self.work.regions += 1;
         let gpu = &self.gpu;
         let targets = &self.targets;
         let data = ViewData::of_eye(view, targets.capacity);
@@ -303,26 +268,19 @@ impl CaptureBackend for Lavapipe {
             }
             pass.set_pipeline(&self.pipelines.background);
             pass.draw(0..3, 0..1);
-            let mut state = PassState::default();
-            for &index in view.visible {
-                let call = &draws.calls[index as usize];
-                for &(role, capture) in Self::roles(call, capture) {
-                    let key = self.key(call, role, capture, draws.cascades);
-                    self.issue(&mut pass, &mut state, index, call, key);
-                }
-            }
+            self.issue(&mut pass, draws, &plan);
             drop(pass);
             gpu.queue.submit([encoder.finish()]);
         })?;
-        if !capture {
+        let Some(sink) = sink else {
             gpu.wait("rendering a view")?;
-            return Ok(Rendered::Complete { records: 0 });
-        }
+            return Ok(Captured::Complete);
+        };
         let needed = u64::from(gpu.read(&targets.counter, 0..4, |bytes| {
             Ok(bytemuck::pod_read_unaligned::<u32>(bytes))
         })?);
         if needed > u64::from(targets.capacity) {
-            return Ok(Rendered::Overflow { needed });
+            return Ok(Captured::Overflow { needed });
         }
         if needed > 0 {
             let depths = if targets.has_depths {
@@ -333,15 +291,15 @@ impl CaptureBackend for Lavapipe {
             gpu.read(&targets.records, 0..needed * RECORD_BYTES, |quads| {
                 let quads = records_of(quads)?;
                 if depths == 0 {
-                    return sink(RawRecords { quads, depths: &[] });
+                    return Ok(sink(RawRecords { quads, depths: &[] })?);
                 }
                 gpu.read(&targets.depths, 0..depths, |depths| {
                     let depths = records_of(depths)?;
-                    sink(RawRecords { quads, depths })
+                    Ok(sink(RawRecords { quads, depths })?)
                 })
             })?;
         }
-        Ok(Rendered::Complete { records: needed })
+        Ok(Captured::Complete)
     }
 
     fn picture(&mut self) -> Result<Vec<u8>, RasterError> {
@@ -370,7 +328,7 @@ fn bind_view(
         compare: Some(wgpu::CompareFunction::LessEqual),
         ..Default::default()
     });
-    let resources = [
+    let resources: [_; VIEW_BINDINGS.len()] = [
         uniform.as_entire_binding(),
         scene.instances.as_entire_binding(),
         targets.counter.as_entire_binding(),

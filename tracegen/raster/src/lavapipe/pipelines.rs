@@ -1,8 +1,10 @@
 //! The pipelines that a scene's draws need, all from one shader source.
 
 use super::device::Gpu;
-use super::upload::VERTEX_STRIDE;
 use crate::error::RasterError;
+use crate::roles::{PipelineKey, Role};
+use crate::shader::{self, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
+use crate::vertices::VERTEX_STRIDE;
 use std::collections::BTreeMap;
 
 /// Format of the picture.
@@ -21,46 +23,6 @@ const ADDITIVE: wgpu::BlendState = {
         alpha: add,
     }
 };
-
-/// What a pipeline does with a draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
-    /// Colour and depth with forced early depth test.
-    Opaque,
-    /// Colour blended over what is there; depth tested early, not written.
-    Blended,
-    /// Colour and late depth of an alpha-masked draw.
-    Masked,
-    /// Records of an alpha-masked draw; writes neither colour nor depth.
-    MaskedRecord,
-    /// Depth of a shadow caster.
-    Shadow,
-    /// Depth of an alpha-masked shadow caster.
-    ShadowMasked,
-    /// Fragments of an opaque draw, added up.
-    Count,
-    /// Fragments of a blended draw, added up.
-    CountBlended,
-}
-
-/// What distinguishes pipelines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct PipelineKey {
-    /// What the pipeline does.
-    pub role: Role,
-    /// Records are written.
-    pub capture: bool,
-    /// Bit per texture.
-    pub textures: u32,
-    /// Bit per texture that leads its uv group.
-    pub leaders: u32,
-    /// Shadow cascades.
-    pub cascades: u32,
-    /// Both faces are drawn.
-    pub double_sided: bool,
-    /// Front faces wind clockwise.
-    pub mirrored: bool,
-}
 
 /// Bind group layouts of the shader.
 pub struct Layouts {
@@ -91,10 +53,8 @@ impl Pipelines {
             let module = gpu
                 .device
                 .create_shader_module(wgpu::ShaderModuleDescriptor {
-                    label: Some("capture.wgsl"),
-                    source: wgpu::ShaderSource::Wgsl(
-                        include_str!("../shaders/capture.wgsl").into(),
-                    ),
+                    label: Some("capture"),
+                    source: wgpu::ShaderSource::Wgsl(shader::source().into()),
                 });
             let layouts = Layouts {
                 view: gpu
@@ -141,9 +101,13 @@ impl Pipelines {
     }
 
     /// A prepared pipeline.
-    #[must_use]
     pub fn get(&self, key: &PipelineKey) -> Option<&wgpu::RenderPipeline> {
         self.made.get(key)
+    }
+
+    /// Pipelines made.
+    pub fn count(&self) -> u64 {
+        self.made.len() as u64
     }
 
     fn make(&self, gpu: &Gpu, key: &PipelineKey) -> wgpu::RenderPipeline {
@@ -160,7 +124,8 @@ impl Pipelines {
             ..Default::default()
         };
         let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4];
-        let shadow = matches!(key.role, Role::Shadow | Role::ShadowMasked);
+        let draw = wgpu::vertex_attr_array![4 => Uint32];
+        let shadow = key.role.casts();
         let entry_point = match key.role {
             Role::Opaque | Role::Blended => Some("fragment_early"),
             Role::Masked => Some("fragment_masked"),
@@ -173,11 +138,6 @@ impl Pipelines {
             Role::Blended => (COLOR_FORMAT, Some(wgpu::BlendState::ALPHA_BLENDING)),
             Role::Count | Role::CountBlended => (wgpu::TextureFormat::R16Float, Some(ADDITIVE)),
             _ => (COLOR_FORMAT, None),
-        };
-        let read_only = match key.role {
-            Role::Blended | Role::MaskedRecord => true,
-            Role::CountBlended => true,
-            _ => false,
         };
         let color = [Some(wgpu::ColorTargetState {
             format,
@@ -196,11 +156,18 @@ impl Pipelines {
                     module: &self.module,
                     entry_point: Some("vertex_main"),
                     compilation_options: compilation_options.clone(),
-                    buffers: &[Some(wgpu::VertexBufferLayout {
-                        array_stride: VERTEX_STRIDE,
-                        step_mode: wgpu::VertexStepMode::Vertex,
-                        attributes: &attributes,
-                    })],
+                    buffers: &[
+                        Some(wgpu::VertexBufferLayout {
+                            array_stride: VERTEX_STRIDE,
+                            step_mode: wgpu::VertexStepMode::Vertex,
+                            attributes: &attributes,
+                        }),
+                        Some(wgpu::VertexBufferLayout {
+                            array_stride: 4,
+                            step_mode: wgpu::VertexStepMode::Instance,
+                            attributes: &draw,
+                        }),
+                    ],
                 },
                 primitive: wgpu::PrimitiveState {
                     front_face: if key.mirrored {
@@ -208,13 +175,12 @@ impl Pipelines {
                     } else {
                         wgpu::FrontFace::Ccw
                     },
-                    // Shadow maps hold both faces: walls that are modelled from one side block light.
-                    cull_mode: (!key.double_sided && !shadow).then_some(wgpu::Face::Back),
+                    cull_mode: (!key.double_sided).then_some(wgpu::Face::Back),
                     ..wgpu::PrimitiveState::default()
                 },
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: DEPTH_FORMAT,
-                    depth_write_enabled: Some(!read_only),
+                    depth_write_enabled: Some(!key.role.keeps_depth()),
                     depth_compare: Some(wgpu::CompareFunction::Less),
                     stencil: wgpu::StencilState::default(),
                     bias: if shadow {
@@ -296,34 +262,30 @@ fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     }
 }
 
-fn view_entries() -> [wgpu::BindGroupLayoutEntry; 7] {
+/// In the order of [`shader::VIEW_BINDINGS`].
+fn view_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
     let fragment = wgpu::ShaderStages::FRAGMENT;
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
-    [
-        entry(
-            0,
-            wgpu::ShaderStages::VERTEX_FRAGMENT,
-            buffer(wgpu::BufferBindingType::Uniform),
-        ),
-        entry(1, wgpu::ShaderStages::VERTEX, storage(true)),
-        entry(2, fragment, storage(false)),
-        entry(3, fragment, storage(false)),
-        entry(
-            4,
-            fragment,
-            wgpu::BindingType::Texture {
-                sample_type: wgpu::TextureSampleType::Depth,
-                view_dimension: wgpu::TextureViewDimension::D2Array,
-                multisampled: false,
-            },
-        ),
-        entry(
-            5,
-            fragment,
-            wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
-        ),
-        entry(6, fragment, storage(false)),
-    ]
+    let shadow_map = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Depth,
+        view_dimension: wgpu::TextureViewDimension::D2Array,
+        multisampled: false,
+    };
+    let view = buffer(wgpu::BufferBindingType::Uniform);
+    let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
+    let entries: [_; shader::VIEW_BINDINGS.len()] = [
+        (wgpu::ShaderStages::VERTEX_FRAGMENT, view),
+        (wgpu::ShaderStages::VERTEX, storage(true)),
+        (fragment, storage(false)),
+        (fragment, storage(false)),
+        (fragment, shadow_map),
+        (fragment, comparison),
+        (fragment, storage(false)),
+    ];
+    (0..)
+        .zip(entries)
+        .map(|(binding, (visibility, ty))| entry(binding, visibility, ty))
+        .collect()
 }
 
 fn material_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
@@ -334,8 +296,11 @@ fn material_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
         multisampled: false,
     };
     let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    let mut entries = vec![entry(0, fragment, buffer(wgpu::BufferBindingType::Uniform))];
-    entries.extend((1..7).map(|binding| entry(binding, fragment, texture)));
-    entries.extend((7..13).map(|binding| entry(binding, fragment, sampler)));
+    let uniform = buffer(wgpu::BufferBindingType::Uniform);
+    let textures = TEXTURES_BINDING..SAMPLERS_BINDING;
+    let samplers = SAMPLERS_BINDING..SAMPLERS_BINDING + textures.len() as u32;
+    let mut entries = vec![entry(MATERIAL_BINDING, fragment, uniform)];
+    entries.extend(textures.map(|binding| entry(binding, fragment, texture)));
+    entries.extend(samplers.map(|binding| entry(binding, fragment, sampler)));
     entries
 }

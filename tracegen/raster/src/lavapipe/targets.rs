@@ -2,9 +2,9 @@
 
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
-use super::uniforms::ViewData;
 use crate::draws::SHADOW_SIZE;
 use crate::error::RasterError;
+use crate::uniforms::ViewData;
 use record::{DEPTH_BYTES, RECORD_BYTES};
 
 /// Attachments, record buffer and read-back buffer of a view.

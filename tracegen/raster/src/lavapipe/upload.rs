@@ -4,44 +4,13 @@ use super::device::Gpu;
 use super::pipelines::Layouts;
 use crate::draws::DrawList;
 use crate::error::RasterError;
-use crate::groups::MATERIAL_TEXTURES;
+use crate::shader::{MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
+use crate::uniforms::MaterialData;
+use crate::vertices::{self, VERTEX_STRIDE};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
-use glam::{Mat4, Vec4};
-use scene::{AlphaMode, Material, Mesh, Scene};
+use scene::{Material, Mesh, Scene};
 use textures::{CompressedTexture, TextureSet};
 use wgpu::util::DeviceExt;
-
-/// Interleaved vertex of the shader's `Vertex`.
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct VertexData {
-    position: [f32; 3],
-    normal: [f32; 3],
-    tangent: [f32; 4],
-    uv: [f32; 4],
-}
-
-/// Bytes between two vertices.
-pub const VERTEX_STRIDE: u64 = size_of::<VertexData>() as u64;
-
-/// The shader's `Instance`.
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct InstanceData {
-    world_from_object: [[f32; 4]; 4],
-    normal_from_object: [[f32; 4]; 4],
-}
-
-/// The shader's `Material`.
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct MaterialData {
-    base_color: [f32; 4],
-    emissive: [f32; 4],
-    specular: [f32; 4],
-    surface: [f32; 4],
-    uv_rows: [[f32; 4]; 2 * MATERIAL_TEXTURES],
-}
 
 /// A mesh's buffers.
 pub struct MeshBuffers {
@@ -61,6 +30,10 @@ pub struct SceneBuffers {
     pub materials: Vec<wgpu::BindGroup>,
     /// One row a draw.
     pub instances: wgpu::Buffer,
+    /// Draw numbers by instance, written before each pass.
+    pub instance_draws: wgpu::Buffer,
+    /// Distinct samplers.
+    pub samplers: usize,
 }
 
 impl SceneBuffers {
@@ -94,12 +67,13 @@ impl SceneBuffers {
                 _ => upload_texture(gpu, t),
             })
             .collect::<Result<Vec<_>, _>>()?;
+        let mut samplers = Samplers::default();
         let materials = scene
             .materials
             .iter()
-            .map(|m| bind_material(gpu, layouts, m, textures, &views, &absent))
+            .map(|m| bind_material(gpu, layouts, m, textures, &views, &absent, &mut samplers))
             .collect();
-        let instances = instance_rows(draws);
+        let instances = vertices::instances(draws);
         let instances = gpu
             .device
             .create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -107,10 +81,18 @@ impl SceneBuffers {
                 contents: bytemuck::cast_slice(&instances),
                 usage: wgpu::BufferUsages::STORAGE,
             });
+        let instance_draws = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("draws by instance"),
+            size: 4 * draws.calls.len().max(1) as u64,
+            usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
         Ok(Self {
             meshes,
             materials,
             instances,
+            instance_draws,
+            samplers: samplers.made.len(),
         })
     }
 }
@@ -124,31 +106,7 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
             limit,
         });
     }
-    let at2 = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
-    let vertices: Vec<VertexData> = mesh
-        .positions
-        .iter()
-        .enumerate()
-        .map(|(i, position)| {
-            let (uv0, uv1) = (at2(&mesh.uv0, i), at2(&mesh.uv1, i));
-            VertexData {
-                position: position.to_array(),
-                normal: mesh
-                    .normals
-                    .get(i)
-                    .copied()
-                    .unwrap_or(glam::Vec3::Y)
-                    .to_array(),
-                tangent: mesh
-                    .tangents
-                    .get(i)
-                    .copied()
-                    .unwrap_or(Vec4::new(1.0, 0.0, 0.0, 1.0))
-                    .to_array(),
-                uv: [uv0.x, uv0.y, uv1.x, uv1.y],
-            }
-        })
-        .collect();
+    let vertices = vertices::pack(mesh);
     let buffer = |contents: &[u8], usage| {
         gpu.device
             .create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -166,33 +124,6 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
         ),
         index_count: mesh.triangles() as u32 * 3,
     })
-}
-
-fn instance_rows(draws: &DrawList) -> Vec<InstanceData> {
-    let mut rows: Vec<InstanceData> = (0_u32..)
-        .zip(&draws.calls)
-        .map(|(draw, call)| {
-            let matrix = glam::Mat3::from(call.transform.matrix3);
-            let inverse = matrix.inverse().transpose();
-            // A flattened instance has no inverse; its normals keep the object's direction.
-            let normal = if inverse.is_finite() { inverse } else { matrix };
-            let mut normal_from_object = Mat4::from_mat3(normal);
-            normal_from_object.w_axis = Vec4::new(
-                f32::from_bits(draw),
-                f32::from_bits(call.first_primitive),
-                0.0,
-                1.0,
-            );
-            InstanceData {
-                world_from_object: Mat4::from(call.transform).to_cols_array_2d(),
-                normal_from_object: normal_from_object.to_cols_array_2d(),
-            }
-        })
-        .collect();
-    if rows.is_empty() {
-        rows.push(bytemuck::Zeroable::zeroed());
-    }
-    rows
 }
 
 /// Stands for the textures that a material lacks; the pipelines never sample it.
@@ -270,13 +201,13 @@ fn bind_material(
     set: &TextureSet,
     views: &[wgpu::TextureView],
     absent: &wgpu::TextureView,
+    samplers: &mut Samplers,
 ) -> wgpu::BindGroup {
     let textures = material.textures();
-    let samplers = textures.map(|t| {
-        let state = t.map_or(Sampler::TRILINEAR_REPEAT, |t| t.sampler);
-        gpu.device.create_sampler(&sampler_descriptor(&state))
-    });
-    let data = material_data(material);
+    let samplers = textures
+        .map(|t| samplers.index(gpu, &t.map_or(Sampler::TRILINEAR_REPEAT, |t| t.sampler)))
+        .map(|index| &samplers.made[index].1);
+    let data = MaterialData::new(material);
     let uniform = gpu
         .device
         .create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -285,10 +216,10 @@ fn bind_material(
             usage: wgpu::BufferUsages::UNIFORM,
         });
     let mut entries = vec![wgpu::BindGroupEntry {
-        binding: 0,
+        binding: MATERIAL_BINDING,
         resource: uniform.as_entire_binding(),
     }];
-    for (binding, texture) in (1..).zip(&textures) {
+    for (binding, texture) in (TEXTURES_BINDING..).zip(&textures) {
         let view = texture
             .and_then(|t| (*set.of_image.get(t.image)?).and_then(|i| views.get(i)))
             .unwrap_or(absent);
@@ -297,7 +228,7 @@ fn bind_material(
             resource: wgpu::BindingResource::TextureView(view),
         });
     }
-    for (binding, sampler) in (1 + MATERIAL_TEXTURES as u32..).zip(&samplers) {
+    for (binding, sampler) in (SAMPLERS_BINDING..).zip(samplers) {
         entries.push(wgpu::BindGroupEntry {
             binding,
             resource: wgpu::BindingResource::Sampler(sampler),
@@ -310,24 +241,20 @@ fn bind_material(
     })
 }
 
-fn material_data(material: &Material) -> MaterialData {
-    let mut uv_rows = [[0.0; 4]; 2 * MATERIAL_TEXTURES];
-    for (slot, texture) in material.textures().iter().enumerate() {
-        let Some(t) = texture else { continue };
-        for (row, m) in t.uv_transform.iter().enumerate() {
-            uv_rows[2 * slot + row] = [m[0], m[1], m[2], t.uv_set as f32];
-        }
-    }
-    let cutoff = match material.alpha {
-        AlphaMode::Mask(cutoff) => cutoff,
-        AlphaMode::Opaque | AlphaMode::Blend => 0.0,
-    };
-    MaterialData {
-        base_color: material.base_color.to_array(),
-        emissive: material.emissive.extend(material.normal_scale).to_array(),
-        specular: material.specular.extend(cutoff).to_array(),
-        surface: [material.metallic, material.roughness, 0.0, 0.0],
-        uv_rows,
+/// The samplers made so far, one a state.
+#[derive(Default)]
+struct Samplers {
+    made: Vec<(Sampler, wgpu::Sampler)>,
+}
+
+impl Samplers {
+    fn index(&mut self, gpu: &Gpu, state: &Sampler) -> usize {
+        let known = self.made.iter().position(|(made, _)| made == state);
+        known.unwrap_or_else(|| {
+            let sampler = gpu.device.create_sampler(&sampler_descriptor(state));
+            self.made.push((*state, sampler));
+            self.made.len() - 1
+        })
     }
 }
 

@@ -21,8 +21,8 @@ pub(super) struct Lookup {
 }
 
 impl Lookup {
-    /// The first of `names` that is there: as it stands, else in another letter case, else its last
-    /// part beside the file that names it. Backslashes separate folders.
+    /// The first of `names` that is there: as it stands, else in another letter case, else without
+    /// its first folders. Backslashes separate folders.
     pub fn find(&mut self, folder: &Path, names: &[String]) -> Option<Found> {
         let paths: Vec<PathBuf> = names
             .iter()
@@ -36,17 +36,11 @@ impl Lookup {
             let inexact = false;
             return Some(Found { path, inexact });
         }
-        let last_parts: Vec<PathBuf> = (paths.iter())
-            .filter_map(|path| path.file_name())
-            .map(PathBuf::from)
-            .collect();
-        let mut any_case = |paths: &[PathBuf]| {
-            let mut paths = paths.iter().filter_map(|path| self.walk(folder, path));
-            paths.find(|path| is_no_folder(path))
-        };
-        let path = any_case(&paths)
-            .or_else(|| exact(&last_parts))
-            .or_else(|| any_case(&last_parts))?;
+        let mut any_case =
+            |path: &PathBuf| self.walk(folder, path).filter(|path| is_no_folder(path));
+        // The folders of another machine are left off, one by one.
+        let path = (paths.iter().flat_map(|path| endings(path)))
+            .find_map(|ending| exact(&[ending.clone()]).or_else(|| any_case(&ending)))?;
         let inexact = true;
         Some(Found { path, inexact })
     }
@@ -67,6 +61,15 @@ impl Lookup {
                 other => Some(at.join(other)),
             })
     }
+}
+
+/// The path without its first parts, from all of it to the last one.
+fn endings(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let mut parts = path.components();
+    std::iter::once(path.to_owned()).chain(std::iter::from_fn(move || {
+        parts.next();
+        Some(parts.as_path().to_owned()).filter(|rest| rest.file_name().is_some())
+    }))
 }
 
 fn is_no_folder(path: &Path) -> bool {
@@ -123,6 +126,11 @@ mod tests {
             ("C:\\Users\\me\\wood.png", "wood.png", true),
             ("/nowhere/GRÖSSE.png", "", false),
             ("/nowhere/GRÖßE.png", "größe.png", true),
+            (
+                "D:\\work\\MAPS\\Brick Wall.PNG",
+                "Maps/Brick Wall.PNG",
+                true,
+            ),
             ("maps", "", false),
         ] {
             let expected = Some((path.into(), inexact)).filter(|_| !path.is_empty());

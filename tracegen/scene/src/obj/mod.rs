@@ -42,6 +42,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let mut scene = Scene::default();
     // The last material of a name counts.
     let mut by_name: HashMap<String, usize> = HashMap::new();
+    // Names may hold ` #`, which may as well begin a comment.
+    let mut by_start: HashMap<String, usize> = HashMap::new();
     let libraries = libraries(&elements, &origin, &mut lookup, &mut warnings);
     for file in &libraries {
         let library = Origin::new(file);
@@ -56,19 +58,18 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
                 warnings: &mut warnings,
             };
             scene.materials.push(maker.material(&entry));
-            by_name.insert(entry.name, scene.materials.len() - 1);
+            let index = scene.materials.len() - 1;
+            by_start.insert(without_comment(&entry.name).to_owned(), index);
+            by_name.insert(entry.name, index);
         }
     }
 
     let meshes = meshes::build(&elements, |run| {
         let name = run.material.as_deref()?;
-        let found = (by_name.get(name)).or_else(|| by_name.get(without_comment(name)));
+        let found = (by_name.get(name)).or_else(|| by_start.get(without_comment(name)));
         if found.is_none() && !libraries.is_empty() {
             warnings.count("unknown material", || {
-                format!(
-                    "{}: no library has a material '{name}'; a default is used",
-                    path.display()
-                )
+                format!("no library has a material '{name}'; a default is used")
             });
         }
         found.copied()
@@ -130,7 +131,7 @@ fn libraries(
             None => split_names(without_comment(text)),
         };
         for names in names {
-            let place = || format!("{}: line {line}, mtllib", origin.file.display());
+            let place = || format!("line {line}, mtllib");
             match lookup.find(origin.folder(), &names) {
                 Some(found) => {
                     if found.inexact {

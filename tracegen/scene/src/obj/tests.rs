@@ -290,6 +290,23 @@ fn libraries_are_found_however_they_are_named() {
 }
 
 #[test]
+fn material_names_may_hold_a_hash_and_be_followed_by_a_comment() {
+    let folder = tempfile::tempdir().unwrap();
+    let mtl = "newmtl brick # red\nnewmtl brick #2\nnewmtl wood\n";
+    for (name, expected) in [
+        ("brick", "brick #2"),
+        ("brick # red", "brick # red"),
+        ("brick #2", "brick #2"),
+        ("wood # oak", "wood"),
+    ] {
+        let obj = QUAD.replace("usemtl brick", &format!("usemtl {name}"));
+        let scene = load(folder.path(), &obj, Some(mtl)).unwrap().scene;
+        let material = &scene.materials[scene.meshes[0].material];
+        assert_eq!(material.name, expected, "{name}");
+    }
+}
+
+#[test]
 fn a_library_statement_that_cannot_be_read_costs_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let mtl = "Kd 9\nnewmtl brick\nKd 0.8 0.8\nKs spectral file.rfl\nNs\nillum glass\nd -halo 0.5\n\

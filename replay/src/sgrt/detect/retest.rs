@@ -1,4 +1,48 @@
-//! The right-eye ray against one triangle.
+//! The right-eye ray against the triangles that arrived around it.
+
+use super::{Decision, PixelClass};
+use crate::sgrt::frame::SKY;
+use crate::sgrt::place::{Offset, Place};
+use formats::view::Eye;
+
+/// Intersects the right-eye ray with the candidate's triangle and those that arrived at the
+/// neighbours: the decision takes over the nearest hit, or is bad where there is none.
+pub fn retest(at: Place, offsets: &'static [Offset], decision: &mut Decision) {
+    let frame = at.frame;
+    let eye = frame.tables.camera(Eye::Right);
+    let direction = eye.direction(frame.position_px(at.index));
+
+    let mut tested = [SKY; 9];
+    let mut tests = 0usize;
+    let mut nearest: Option<(f32, u32, u32)> = None;
+    for place in std::iter::once(at).chain(at.arrived_neighbours(offsets)) {
+        let primitive = place.source().primitive;
+        if primitive == SKY || tested[..tests].contains(&primitive) {
+            continue;
+        }
+        let Some(triangle) = frame.tables.triangle(primitive) else {
+            continue;
+        };
+        tested[tests] = primitive;
+        tests += 1;
+        if let Some(t) = intersect(eye.position, direction, &triangle.vertices)
+            && nearest.is_none_or(|(best, ..)| t < best)
+        {
+            nearest = Some((t, place.candidate().source, primitive));
+        }
+    }
+    decision.tests = tests as u8;
+    match nearest {
+        Some((t, source, primitive)) => {
+            decision.source = source;
+            decision.primitive = primitive;
+            decision.exact = Some(eye.at(direction, t));
+        }
+        // The sky has no triangle; it stands where nothing around it was hit.
+        None if decision.primitive == SKY => {}
+        None => decision.class = PixelClass::Bad,
+    }
+}
 
 /// Distance at which a ray from `origin` along `direction` meets a triangle, from either side.
 ///

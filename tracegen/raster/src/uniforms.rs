@@ -1,16 +1,19 @@
-//! The shader's `View`, and the buffer that holds one per view.
+//! The shader's `View` and `Material`.
 
 use crate::backend::View;
 use crate::cascades::Cascade;
+use crate::groups::MATERIAL_TEXTURES;
 use crate::lighting::{Lighting, MAX_POINT_LIGHTS};
 use glam::{Mat4, Vec3, Vec4};
+use scene::{AlphaMode, Material};
 
-const MAX_CASCADES: usize = 4;
+/// Shadow cascades that the shader holds.
+pub(crate) const MAX_CASCADES: usize = 4;
 
 /// The shader's `View`.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub struct ViewData {
+pub(crate) struct ViewData {
     clip_from_world: [[f32; 4]; 4],
     world_from_clip: [[f32; 4]; 4],
     eye: [f32; 4],
@@ -71,4 +74,38 @@ fn clip_to_uv() -> Mat4 {
         Vec4::Z,
         Vec4::new(0.5, 0.5, 0.0, 1.0),
     )
+}
+
+/// The shader's `Material`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct MaterialData {
+    base_color: [f32; 4],
+    emissive: [f32; 4],
+    specular: [f32; 4],
+    surface: [f32; 4],
+    uv_rows: [[f32; 4]; 2 * MATERIAL_TEXTURES],
+}
+
+impl MaterialData {
+    pub fn new(material: &Material) -> Self {
+        let mut uv_rows = [[0.0; 4]; 2 * MATERIAL_TEXTURES];
+        for (slot, texture) in material.textures().iter().enumerate() {
+            let Some(t) = texture else { continue };
+            for (row, m) in t.uv_transform.iter().enumerate() {
+                uv_rows[2 * slot + row] = [m[0], m[1], m[2], t.uv_set as f32];
+            }
+        }
+        let cutoff = match material.alpha {
+            AlphaMode::Mask(cutoff) => cutoff,
+            AlphaMode::Opaque | AlphaMode::Blend => 0.0,
+        };
+        Self {
+            base_color: material.base_color.to_array(),
+            emissive: material.emissive.extend(material.normal_scale).to_array(),
+            specular: material.specular.extend(cutoff).to_array(),
+            surface: [material.metallic, material.roughness, 0.0, 0.0],
+            uv_rows,
+        }
+    }
 }

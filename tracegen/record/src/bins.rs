@@ -4,50 +4,13 @@
 //! record of a region uniquely, so the result does not.
 
 use super::raw::RawRecord;
+use super::regions::TileRect;
 use formats::textrace::quad_morton;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// A rectangle of tiles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TileRect {
-    /// First column and row.
-    pub origin: [u32; 2],
-    /// Columns and rows.
-    pub size: [u32; 2],
-}
-
-impl TileRect {
-    /// Number of tiles.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.size[0] as usize * self.size[1] as usize
-    }
-
-    /// Column and row of the `index`th tile, row by row.
-    #[must_use]
-    pub fn tile(&self, index: usize) -> [u32; 2] {
-        let index = index as u32;
-        [
-            self.origin[0] + index % self.size[0],
-            self.origin[1] + index / self.size[0],
-        ]
-    }
-
-    /// Position of the tile that holds a record's quad, or `None` where it is outside.
-    fn index(&self, record: &RawRecord) -> Option<usize> {
-        let column = (record.qx() / 8)
-            .checked_sub(self.origin[0])
-            .filter(|c| *c < self.size[0])?;
-        let row = (record.qy() / 8)
-            .checked_sub(self.origin[1])
-            .filter(|r| *r < self.size[1])?;
-        Some((row * self.size[0] + column) as usize)
-    }
-}
-
 /// Indices of a region's records by tile, in no order within a tile.
-pub struct Bins {
+pub(crate) struct Bins {
     chunks: Vec<Chunk>,
 }
 
@@ -60,7 +23,6 @@ struct Chunk {
 impl Bins {
     /// Counting sort by tile, in parallel over chunks of the records. Records outside `rect` are
     /// left out.
-    #[must_use]
     pub fn new(records: &[RawRecord], rect: &TileRect) -> Self {
         let chunk_len = records
             .len()
@@ -112,8 +74,7 @@ impl Chunk {
 
 /// Sort key within a tile: primitive, Morton position of the quad, group, mask. A primitive that
 /// was clipped into several triangles may cover one quad twice, with disjoint masks.
-#[must_use]
-pub fn sort_key(record: &RawRecord) -> u64 {
+pub(crate) fn sort_key(record: &RawRecord) -> u64 {
     let morton = quad_morton((record.qx() & 7) as u8, (record.qy() & 7) as u8);
     u64::from(record.primitive) << 32
         | u64::from(morton) << 8

@@ -1,90 +1,94 @@
-//! Renders a view in regions whose records fit the record buffer.
+//! A view in regions whose records fit the capturer's memory.
 //!
-//! Pixels of different tiles do not depend on each other, so an overflowing region is rendered
+//! Pixels of different tiles do not depend on each other, so an overflowing region is captured
 //! again in parts, each with a scissor rectangle of its own: first bands of tile rows, then parts
 //! of a row. Memory stays bounded by one region's records however large the frame, and each
 //! region's tiles are complete, so they can be written at once.
 
-use super::backend::{CaptureBackend, Region, Rendered, View};
-use super::draws::DrawList;
-use super::error::RasterError;
+use super::capturer::{Captured, Capturer, Region};
+use super::error::RecordError;
+use super::raw::{RawRecord, RawRecords};
 use formats::view::TILE_SIZE_PX;
-use record::{RawRecords, TileRect};
 
-/// Renders a whole view with capture; `sink` gets each region's tiles with its records, tiles in
-/// ascending order over the calls. `parts` is the number of bands to start with; the number that
-/// was needed is returned, as a first guess for the next view.
+/// A rectangle of tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TileRect {
+    /// First column and row.
+    pub origin: [u32; 2],
+    /// Columns and rows.
+    pub size: [u32; 2],
+}
+
+impl TileRect {
+    /// Number of tiles.
+    pub fn count(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
+    }
+
+    /// Column and row of the `index`th tile, row by row.
+    pub fn tile(&self, index: usize) -> [u32; 2] {
+        let index = index as u32;
+        [
+            self.origin[0] + index % self.size[0],
+            self.origin[1] + index / self.size[0],
+        ]
+    }
+
+    /// Position of the tile that holds a record's quad, or `None` where it is outside.
+    pub fn index(&self, record: &RawRecord) -> Option<usize> {
+        let column = (record.qx() / 8)
+            .checked_sub(self.origin[0])
+            .filter(|c| *c < self.size[0])?;
+        let row = (record.qy() / 8)
+            .checked_sub(self.origin[1])
+            .filter(|r| *r < self.size[1])?;
+        Some((row * self.size[0] + column) as usize)
+    }
+}
+
+/// Captures a whole view of `size_px`; `sink` gets each region's tiles with its records, tiles in
+/// ascending order over the calls. `parts` is the number of bands to start with; the number of
+/// regions that were needed is returned, as a first guess for the next view.
 ///
 /// # Errors
-/// [`RasterError::Budget`] where a single tile overflows, driver errors, and what `sink` returns.
-pub fn capture_view(
-    backend: &mut dyn CaptureBackend,
-    draws: &DrawList,
-    view: &View<'_>,
+/// [`RecordError::Budget`] where a single tile overflows, the capturer's errors, and what `sink`
+/// returns.
+pub(crate) fn capture_view<C: Capturer>(
+    capturer: &mut C,
     size_px: [u32; 2],
     parts: u32,
-    sink: &mut dyn FnMut(&TileRect, RawRecords<'_>) -> Result<(), RasterError>,
-) -> Result<u32, RasterError> {
+    sink: &mut dyn FnMut(&TileRect, RawRecords<'_>) -> Result<(), RecordError>,
+) -> Result<u32, C::Error> {
     let whole = TileRect {
         origin: [0, 0],
         size: size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
     };
-    let capacity = backend.record_capacity();
+    let capacity = capturer.record_capacity();
     // A stack, the next region on top.
     let mut open = split(&whole, parts);
-    let mut rendered = 0;
+    let mut captured = 0;
     while let Some(rect) = open.pop() {
-        let mut handed_over = false;
-        let mut pass_on = |records: RawRecords<'_>| {
-            handed_over = true;
-            sink(&rect, records)
-        };
-        match backend.render(draws, view, region(&rect, size_px), true, &mut pass_on)? {
-            Rendered::Complete { .. } => {
-                if !handed_over {
-                    let nothing = RawRecords {
-                        quads: &[],
-                        depths: &[],
-                    };
-                    sink(&rect, nothing)?;
-                }
-                rendered += 1;
-            }
-            Rendered::Overflow { needed } if rect.count() == 1 => {
-                return Err(RasterError::Budget {
+        let region = region(&rect, size_px);
+        match capturer.capture(region, &mut |records| sink(&rect, records))? {
+            Captured::Complete => captured += 1,
+            Captured::Overflow { needed } if rect.count() == 1 => {
+                return Err(C::Error::from(RecordError::Budget {
                     tx: rect.origin[0],
                     ty: rect.origin[1],
                     needed,
                     capacity,
-                });
+                }));
             }
-            Rendered::Overflow { needed } => {
+            Captured::Overflow { needed } => {
                 // Records are spread unevenly: a quarter more parts than an even spread needs.
-                let parts = (needed * 5 / 4).div_ceil(capacity).max(2);
+                let parts = (needed.saturating_mul(5) / 4)
+                    .div_ceil(capacity.max(1))
+                    .max(2);
                 open.extend(split(&rect, parts.min(u64::from(u32::MAX)) as u32));
             }
         }
     }
-    Ok(rendered)
-}
-
-/// Renders a whole view without capture.
-///
-/// # Errors
-/// Driver errors.
-pub fn render_view(
-    backend: &mut dyn CaptureBackend,
-    draws: &DrawList,
-    view: &View<'_>,
-    size_px: [u32; 2],
-) -> Result<(), RasterError> {
-    let whole = Region {
-        origin_px: [0, 0],
-        size_px,
-    };
-    backend
-        .render(draws, view, whole, false, &mut |_| Ok(()))
-        .map(|_| ())
+    Ok(captured)
 }
 
 /// Cuts a rectangle into up to `parts` bands of whole rows, or a single row into runs of tiles;

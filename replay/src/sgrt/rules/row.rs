@@ -1,7 +1,40 @@
-//! Surfaces between adjacent pixels of a left row, as the right eye sees them.
+//! `row`: behind a surface of its row.
 
-use crate::sgrt::frame::Frame;
+use super::{RuleKind, Test};
+use crate::sgrt::frame::{Frame, Sample};
+use crate::sgrt::place::Place;
+use crate::sgrt::reads::{Around, Reads};
 use crate::sgrt::reproject::Reprojection;
+
+pub static RULE: RuleKind = RuleKind {
+    name: "row",
+    title: "behind a surface of its row",
+    help: "behind a surface that two adjacent left pixels of one object span across it in the row, \
+           by more than SHARE of the surface's depth",
+    takes_share: true,
+    reads: Reads {
+        position: Some(Around::Next),
+        object: Some(Around::Next),
+        ..Reads::NOTHING
+    },
+    test: Some(|frame, arrived, share| {
+        let nearest = spans(frame, arrived);
+        Box::new(Row { nearest, share })
+    }),
+    retests: None,
+};
+
+struct Row {
+    /// Depth of the nearest surface by right sample.
+    nearest: Vec<f32>,
+    share: f32,
+}
+
+impl Test for Row {
+    fn rejects(&self, at: Place, _: &Sample) -> bool {
+        at.candidate().depth > self.nearest[at.index] * (1.0 + self.share)
+    }
+}
 
 /// Two adjacent left pixels belong to one surface only where their depths differ by less.
 const SAME_SURFACE_SHARE: f32 = 0.05;
@@ -11,7 +44,7 @@ const SAME_SURFACE_SHARE: f32 = 0.05;
 ///
 /// A near surface that the right eye sees stretched leaves gaps between its splats; the segments
 /// close them.
-pub fn spans(frame: &Frame, arrived: &Reprojection) -> Vec<f32> {
+fn spans(frame: &Frame, arrived: &Reprojection) -> Vec<f32> {
     let (width, spp) = (frame.size_px[0] as usize, frame.samples_per_px as usize);
     let mut nearest = vec![f32::INFINITY; frame.sample_count()];
     let samples = &frame.left().samples;

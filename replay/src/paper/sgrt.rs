@@ -1,0 +1,113 @@
+//! Lee, Hwang, Shin, Yoo, Ryu, "Fast Stereoscopic Rendering on Mobile Ray Tracing GPU for Virtual
+//! Reality Applications", 2017: figure 3 and section IV.
+
+use serde::{Deserialize, Serialize};
+
+/// A scene of the paper.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PaperScene {
+    /// Name for `--as`.
+    pub id: &'static str,
+    /// Name in the figures.
+    pub title: &'static str,
+    /// Frames per second over the reference's.
+    pub relative_performance: f64,
+    /// Energy over the reference's.
+    pub relative_energy: f64,
+}
+
+/// What is printed of the paper beside a trace.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PaperValues {
+    /// Scene in the paper.
+    pub scene: String,
+    /// Frames per second over the reference's.
+    pub relative_performance: f64,
+    /// Energy over the reference's.
+    pub relative_energy: f64,
+}
+
+/// Right pixels that could be shaded with the left image's results, average over the six scenes.
+pub const REUSE_PCT: f64 = 91.54;
+/// Work that the units were spared.
+pub const TNI_REDUCTION_PCT: f64 = 68.0;
+/// Work that the kernels added.
+pub const SRP_OVERHEAD_PCT: f64 = 10.0;
+
+const fn scene(
+    id: &'static str,
+    title: &'static str,
+    relative_performance: f64,
+    relative_energy: f64,
+) -> PaperScene {
+    PaperScene {
+        id,
+        title,
+        relative_performance,
+        relative_energy,
+    }
+}
+
+/// Figure 3.
+pub const SCENES: [PaperScene; 6] = [
+    scene("teapot", "Teapot", 1.64, 0.96),
+    scene("chess", "Chess", 1.13, 1.02),
+    scene("bmw", "BMW", 1.42, 0.97),
+    scene("chemical-lab", "Chemical lab", 1.11, 0.99),
+    scene("music-box", "Music box", 1.28, 0.98),
+    scene("provence", "Provence", 1.51, 0.80),
+];
+
+/// Built-in scenes of another name than the paper's scene that they stand for.
+const STAND_INS: [(&str, &str); 3] = [
+    ("car", "bmw"),
+    ("lab", "chemical-lab"),
+    ("meadow", "provence"),
+];
+
+/// The paper's values for a trace: of the scene that the values of `--as` give to its label, else
+/// of the scene of its very name or whose stand-in it is.
+///
+/// # Errors
+/// A value of `--as` that names no scene of the paper.
+pub fn values(
+    scene: &str,
+    label: &str,
+    asked: &[String],
+) -> Result<Option<PaperValues>, super::UnknownScene> {
+    let ids = SCENES.map(|s| s.id);
+    let named = || super::stand_in(scene, &ids.map(|id| (id, id))).copied();
+    let id = super::asked(asked, label, &ids)?
+        .unwrap_or_else(|| super::stand_in(scene, &STAND_INS).copied().or_else(named));
+    let found = SCENES.iter().find(|s| Some(s.id) == id);
+    Ok(found.map(|s| PaperValues {
+        scene: s.title.to_owned(),
+        relative_performance: s.relative_performance,
+        relative_energy: s.relative_energy,
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_scenes_of_the_very_name_or_asked_for_stand_beside_the_paper() {
+        let found = |scene, label, asked: &[&str]| {
+            let asked: Vec<String> = asked.iter().map(|&a| a.to_owned()).collect();
+            let values = values(scene, label, &asked).expect("known scenes");
+            values.map(|v| v.scene)
+        };
+        assert_eq!(found("car", "car", &[]).as_deref(), Some("BMW"));
+        assert_eq!(
+            found("provence", "provence", &[]).as_deref(),
+            Some("Provence")
+        );
+        for other in ["scarf.gltf", "labyrinth.obj", "cars/car.gltf", "teapot_16k"] {
+            assert_eq!(found(other, other, &[]), None, "{other}");
+        }
+        let asked = found("a/bmw_55k.gltf", "bmw_55k", &["bmw_55k=bmw"]);
+        assert_eq!(asked.as_deref(), Some("BMW"));
+        assert_eq!(found("chess", "chess", &["none"]), None);
+    }
+}

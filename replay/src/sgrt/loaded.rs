@@ -1,0 +1,284 @@
+//! A trace in memory, and one rule run on it: decisions, right image, its error, and what the
+//! hardware saves.
+
+use super::accuracy::count_errors;
+use super::compose::{Reuse, compose};
+use super::config::SgrtConfig;
+use super::detect::{Decision, decide};
+use super::frame::{Frame, FrameError, RaySource};
+use super::hardware::{
+    Comparison, TileMisses, TileWork, compare, misses_by_addresses, misses_by_rates, tile_work,
+};
+use super::reads::Reads;
+use super::reproject::{Reprojection, reproject};
+use super::result::{ImageError, Outcome};
+use super::rows::RowNeeds;
+use super::rules::Rule;
+use crate::image::flip::{FlipMap, Prepared};
+use crate::image::{Picture, pixels_per_degree, psnr, ssim};
+use formats::view::Eye;
+
+/// A loaded trace, ready for any number of rules.
+pub struct LoadedTrace<'a> {
+    source: &'a dyn RaySource,
+    pub(super) frame: Frame,
+    pub(super) arrived: Reprojection,
+    rows: RowNeeds,
+    truth: Picture,
+    truth_prepared: Prepared,
+    ppd: f32,
+}
+
+/// A rule's result with its pictures.
+pub struct RuleRun {
+    /// The figures.
+    pub outcome: Outcome,
+    /// Decision on every right sample.
+    pub decisions: Vec<Decision>,
+    /// The right image.
+    pub picture: Picture,
+    /// Its error.
+    pub flip: FlipMap,
+    pub(super) reads: Reads,
+    pub(super) work: Vec<TileWork>,
+    pub(super) misses: Vec<TileMisses>,
+}
+
+impl<'a> LoadedTrace<'a> {
+    /// Loads and reprojects a trace.
+    ///
+    /// # Errors
+    /// [`FrameError`] where a tile cannot be read.
+    pub fn load(source: &'a dyn RaySource) -> Result<Self, FrameError> {
+        let frame = Frame::load(source)?;
+        let arrived = reproject(&frame);
+        let rows = RowNeeds::new(&frame, &arrived);
+        let camera = frame.tables.camera(Eye::Right);
+        let ppd = pixels_per_degree(camera.size_px[0], &camera.fov);
+        let truth = traced(&frame, Eye::Right);
+        let truth_prepared = Prepared::new(&truth, ppd);
+        Ok(Self {
+            source,
+            frame,
+            arrived,
+            rows,
+            truth,
+            truth_prepared,
+            ppd,
+        })
+    }
+
+    /// The loaded frame.
+    #[must_use]
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Left rows that the right image needs.
+    #[must_use]
+    pub fn rows(&self) -> &RowNeeds {
+        &self.rows
+    }
+
+    /// The left image.
+    #[must_use]
+    pub fn left(&self) -> Picture {
+        traced(&self.frame, Eye::Left)
+    }
+
+    /// Where cache misses come from.
+    #[must_use]
+    pub fn cache_misses(&self) -> &'static str {
+        if self.frame.tables.meta.has_visits {
+            "addresses"
+        } else {
+            "rates"
+        }
+    }
+
+    /// Runs a rule and a level of reuse through the model.
+    ///
+    /// # Errors
+    /// [`FrameError`] where a tile cannot be read again for its addresses.
+    pub fn run(
+        &self,
+        rule: &Rule,
+        reuse: Reuse,
+        config: &SgrtConfig,
+    ) -> Result<RuleRun, FrameError> {
+        let decisions = decide(&self.frame, &self.arrived, rule);
+        let accuracy = count_errors(&self.frame, &decisions);
+        let work = tile_work(&self.frame, &decisions, reuse);
+        let misses = self.misses(&work, &decisions, reuse, config)?;
+        let reads = rule.reads();
+        let comparison = self.compare(&work, &misses, reads, config);
+        let picture = self.picture(&decisions, reuse);
+        let flip = self.flip(&picture);
+        let error = ImageError {
+            flip_mean: flip.mean(),
+            flip_p99: flip.p99(),
+            pixels_per_degree: f64::from(self.ppd),
+            psnr_db: psnr::psnr_db(&self.truth, &picture),
+            ssim: ssim::ssim(&self.truth, &picture),
+        };
+        Ok(RuleRun {
+            outcome: Outcome::new(&accuracy, &comparison, &error, reads),
+            decisions,
+            picture,
+            flip,
+            reads,
+            work,
+            misses,
+        })
+    }
+
+    pub(super) fn compare(
+        &self,
+        work: &[TileWork],
+        misses: &[TileMisses],
+        reads: Reads,
+        config: &SgrtConfig,
+    ) -> Comparison {
+        compare(&self.frame, work, misses, reads, &self.rows, config)
+    }
+
+    pub(super) fn misses(
+        &self,
+        work: &[TileWork],
+        decisions: &[Decision],
+        reuse: Reuse,
+        config: &SgrtConfig,
+    ) -> Result<Vec<TileMisses>, FrameError> {
+        if self.frame.tables.meta.has_visits {
+            misses_by_addresses(self.source, &self.frame, decisions, reuse, work, config)
+        } else {
+            Ok(misses_by_rates(work, &self.frame, config))
+        }
+    }
+
+    pub(super) fn picture(&self, decisions: &[Decision], reuse: Reuse) -> Picture {
+        let colors = compose(&self.frame, decisions, reuse);
+        Picture::from_linear(self.frame.size_px, &self.frame.resolve(&colors))
+    }
+
+    pub(super) fn flip(&self, picture: &Picture) -> FlipMap {
+        self.truth_prepared
+            .compare(&Prepared::new(picture, self.ppd))
+    }
+}
+
+fn traced(frame: &Frame, eye: Eye) -> Picture {
+    let samples = &frame.eyes[eye as usize].samples;
+    let colors: Vec<[f32; 3]> = samples.iter().map(super::frame::Sample::color).collect();
+    Picture::from_linear(frame.size_px, &frame.resolve(&colors))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{
+        DIFFUSE, LEAF, MIRROR, Placed, Synthetic, View, globe, trace, wall,
+    };
+    use super::*;
+    use proptest::prelude::*;
+
+    fn outcome(source: &Synthetic, rule: &str) -> Outcome {
+        let rule = rule.parse().expect("a rule");
+        let loaded = LoadedTrace::load(source).expect("loads");
+        let run = loaded.run(&rule, Reuse::Primary, &SgrtConfig::default());
+        run.expect("runs").outcome
+    }
+
+    fn room() -> Vec<Placed> {
+        let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
+        scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
+        scene
+    }
+
+    #[test]
+    fn the_default_rule_is_nearly_free_of_error_and_beats_plain_reuse() {
+        let source = trace(&room(), View::default());
+        let ours = outcome(&source, super::super::DEFAULT_RULE);
+        let plain = outcome(&source, "none");
+        assert!(ours.flip_mean < 0.01, "{}", ours.flip_mean);
+        assert!(ours.flip_mean < plain.flip_mean && ours.psnr_db > plain.psnr_db);
+        assert!(ours.reuse_pct <= plain.reuse_pct);
+        assert!(ours.relative_performance > 1.0);
+    }
+
+    #[test]
+    fn four_samples_a_pixel_reuse_what_one_reuses() {
+        let mut near = room();
+        near.extend(wall(0.8, [0.2, 0.3], -0.3, 3));
+        for scene in [room(), near] {
+            let of = |samples_per_px, rule| {
+                let view = View {
+                    size_px: [160, 96],
+                    samples_per_px,
+                    ..View::default()
+                };
+                outcome(&trace(&scene, view), rule)
+            };
+            let (one, four) = (of(1, "none").reuse_pct, of(4, "none").reuse_pct);
+            assert!(
+                (one - four).abs() < 2.0,
+                "{one} % with 1 sample, {four} % with 4"
+            );
+            let careful = of(4, super::super::DEFAULT_RULE);
+            assert!(careful.flip_mean < 0.01, "{}", careful.flip_mean);
+        }
+    }
+
+    #[test]
+    fn the_sky_is_reused_wherever_the_scene_lies() {
+        let view = View {
+            center: [1e6, -3e6, 2e6],
+            ..View::default()
+        };
+        let sky = outcome(&trace(&[], view), "none");
+        assert_eq!((sky.reuse_pct, sky.flip_mean), (100.0, 0.0));
+    }
+
+    /// A scene around the origin: walls and globes of some material.
+    fn placed() -> impl Strategy<Value = Vec<Placed>> {
+        let thing = (
+            prop::array::uniform3(-1.0f32..1.0),
+            0.2f32..1.0,
+            prop::sample::select(vec![DIFFUSE, MIRROR, LEAF]),
+            any::<bool>(),
+        );
+        prop::collection::vec(thing, 0..4).prop_map(|things| {
+            let mut scene = Vec::new();
+            for (object, ([x, y, z], size, material, is_flat)) in (1u32..).zip(things) {
+                let mut shapes = if is_flat {
+                    wall(2.5 - z, [size, size], x, object)
+                } else {
+                    globe([x, y, z - 2.5], size, object)
+                };
+                shapes.iter_mut().for_each(|s| s.material = material);
+                scene.extend(shapes);
+            }
+            scene
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        #[test]
+        fn without_eye_separation_all_is_reused_and_the_image_is_the_traced_one(
+            scene in placed(),
+            size_px in prop::array::uniform2(1u32..70),
+            right_of_center in -5.0f32..5.0,
+        ) {
+            let view = View {
+                size_px,
+                ipd_m: 0.0,
+                center: [right_of_center * 0.1, 0.0, 0.0],
+                ..View::default()
+            };
+            let source = trace(&scene, view);
+            let plain = outcome(&source, "none");
+            prop_assert_eq!((plain.reuse_pct, plain.flip_mean), (100.0, 0.0));
+            prop_assert_eq!(outcome(&source, super::super::DEFAULT_RULE).flip_mean, 0.0);
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! What error detection reads of the left pixels: its DMA, its share of a G-buffer record and its
+//! look-ups in the row buffers follow from it.
+
+use super::config::Gbuffer;
+use serde::{Deserialize, Serialize};
+
+/// Left pixels, around the one that arrived, of which detection reads a field for one right pixel.
+/// Each choice holds those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Around {
+    /// That pixel.
+    Own,
+    /// And the next one of its row.
+    Next,
+    /// And its four neighbours.
+    Cross,
+    /// And its eight neighbours.
+    Square,
+}
+
+impl Around {
+    /// Pixels read for one right pixel.
+    #[must_use]
+    pub fn pixels(self) -> u64 {
+        match self {
+            Self::Own => 1,
+            Self::Next => 2,
+            Self::Cross => 5,
+            Self::Square => 9,
+        }
+    }
+
+    /// True where rows above and below are read, too.
+    #[must_use]
+    pub fn has_neighbour_rows(self) -> bool {
+        self >= Self::Cross
+    }
+}
+
+/// Fields that detection reads, and of which pixels; `None` for a field that it does not read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reads {
+    /// Hit position.
+    pub position: Option<Around>,
+    /// Object number, which gives the material as well.
+    pub object: Option<Around>,
+    /// Triangle number.
+    pub triangle: Option<Around>,
+}
+
+impl Reads {
+    /// No field.
+    pub const NOTHING: Self = Self {
+        position: None,
+        object: None,
+        triangle: None,
+    };
+
+    /// What every rule reads: where the left pixels of a row are seen decides which one arrives.
+    pub const ARRIVALS: Self = Self {
+        position: Some(Around::Own),
+        ..Self::NOTHING
+    };
+
+    /// All that two tests read which run together.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            position: self.position.max(other.position),
+            object: self.object.max(other.object),
+            triangle: self.triangle.max(other.triangle),
+        }
+    }
+
+    /// Bytes and pixels of each field read.
+    fn fields(self, g: &Gbuffer) -> impl Iterator<Item = (u64, Around)> {
+        [
+            (g.position_bytes, self.position),
+            (g.object_bytes, self.object),
+            (g.triangle_bytes, self.triangle),
+        ]
+        .into_iter()
+        .filter_map(|(bytes, around)| Some((u64::from(bytes), around?)))
+    }
+
+    /// Bytes of a left pixel that detection reads, hence that go through DRAM.
+    #[must_use]
+    pub fn pixel_bytes(self, g: &Gbuffer) -> u64 {
+        self.fields(g).map(|(bytes, _)| bytes).sum()
+    }
+
+    /// Bytes that DMA fetches for a band of rows of which `rows` hold what arrives in the band, and
+    /// `with_neighbours` what arrives in the band and the rows beside it, `row_px` pixels each.
+    #[must_use]
+    pub fn fetched_bytes(self, g: &Gbuffer, rows: u64, with_neighbours: u64, row_px: u64) -> u64 {
+        self.fields(g)
+            .map(|(bytes, around)| {
+                let rows = if around.has_neighbour_rows() {
+                    with_neighbours
+                } else {
+                    rows
+                };
+                bytes * rows * row_px
+            })
+            .sum()
+    }
+
+    /// Bytes that detection of one right pixel reads from the row buffers.
+    #[must_use]
+    pub fn looked_up_bytes(self, g: &Gbuffer) -> u64 {
+        self.fields(g)
+            .map(|(bytes, around)| bytes * around.pixels())
+            .sum()
+    }
+
+    /// Bytes of a G-buffer record: the paper's fields and the numbers that detection reads.
+    #[must_use]
+    pub fn record_bytes(self, g: &Gbuffer) -> u64 {
+        let numbers = [
+            (g.object_bytes, self.object),
+            (g.triangle_bytes, self.triangle),
+        ];
+        let read = numbers.into_iter().filter(|(_, around)| around.is_some());
+        [
+            g.color_bytes,
+            g.normal_bytes,
+            g.texcoord_bytes,
+            g.position_bytes,
+        ]
+        .into_iter()
+        .chain(read.map(|(bytes, _)| bytes))
+        .map(u64::from)
+        .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::config::SgrtConfig;
+    use super::super::rules::Rule;
+    use super::*;
+
+    fn reads(rule: &str) -> Reads {
+        rule.parse::<Rule>().expect("a rule").reads()
+    }
+
+    #[test]
+    fn a_rule_is_charged_for_the_fields_and_the_rows_that_it_reads() {
+        let g = SgrtConfig::default().gbuffer;
+        // Bytes a left pixel, bytes of a record, and whether rows beside the own are fetched.
+        for (rule, pixel, record, rows_beside) in [
+            ("none", 12, 28, false),
+            ("depth", 12, 28, true),
+            ("row", 16, 32, false),
+            ("object", 16, 32, true),
+            ("opaque", 16, 32, false),
+            ("silhouette", 16, 32, true),
+            ("triangle", 16, 32, false),
+            ("triangles", 16, 32, true),
+            (crate::sgrt::DEFAULT_RULE, 20, 36, true),
+        ] {
+            let r = reads(rule);
+            assert_eq!(r.pixel_bytes(&g), pixel, "{rule}");
+            assert_eq!(r.record_bytes(&g), record, "{rule}");
+            let band = r.fetched_bytes(&g, 16, 18, 10);
+            assert_eq!(band > pixel * 160, rows_beside, "{rule}");
+        }
+        assert_eq!(
+            reads(crate::sgrt::DEFAULT_RULE).fetched_bytes(&g, 16, 18, 1),
+            20 * 18
+        );
+    }
+
+    #[test]
+    fn tests_that_run_together_read_a_pixel_once() {
+        let g = SgrtConfig::default().gbuffer;
+        assert_eq!(reads("depth+row").looked_up_bytes(&g), 5 * 12 + 2 * 4);
+        assert_eq!(reads("none").looked_up_bytes(&g), 12);
+    }
+}

@@ -1,0 +1,151 @@
+//! Which rows of the left image error detection needs.
+//!
+//! For parallel eyes that look through like frusta, what arrives in a right row comes from the left
+//! row of that number, and the paper prefetches just that one. Eyes that are canted or see farther
+//! up or down than each other bend a right row's sources over many left rows; DMA then fetches each
+//! of them, whole, for every band of tiles that needs it.
+
+use super::frame::Frame;
+use super::reproject::Reprojection;
+use formats::view::TILE_SIZE_PX;
+use serde::{Deserialize, Serialize};
+
+/// A shift below this is rounding.
+const STILL_PX: f32 = 1.0 / 64.0;
+
+/// A right row whose sources are in more left rows than this is no epipolar line any more: a shift
+/// that is not a whole number of rows spreads them over two, and only a rotation over more.
+const LINE_ROWS: f64 = 2.0;
+
+/// Left rows that the right image needs.
+#[derive(Clone, Debug)]
+pub struct RowNeeds {
+    /// By band of tiles: left rows of which a pixel arrives in the band.
+    band: Vec<u64>,
+    /// The same for the band and the row on either side of it.
+    band_and_beside: Vec<u64>,
+    /// What the rows say about the eyes.
+    pub summary: RowSummary,
+}
+
+/// Whether a right row's sources are a left row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RowSummary {
+    /// Left pixels seen by the right eye that arrive in a row of another number.
+    pub other_row_pct: f64,
+    /// Left rows that the pixels of one right row come from, on average.
+    pub left_rows_per_right_row: f64,
+    /// False where the paper's row test does not apply: a right row's sources are not one left row
+    /// (nor two, of a shift by part of a row). All rows that are needed are fetched and charged.
+    pub row_test_applies: bool,
+}
+
+impl RowNeeds {
+    /// Looks where every left sample arrives.
+    #[must_use]
+    pub fn new(frame: &Frame, arrived: &Reprojection) -> Self {
+        let [width, height] = frame.size_px.map(|s| s as usize);
+        let spp = frame.samples_per_px as usize;
+        let words = height.div_ceil(64);
+        // A bit for each left row, by right row.
+        let mut sources = vec![0u64; height * words];
+        let (mut seen, mut elsewhere) = (0u64, 0u64);
+        for (source, projected) in arrived.projected.iter().enumerate() {
+            let Some([_, landed]) = projected.pixel(frame.size_px) else {
+                continue;
+            };
+            let [_, own] = frame.position_px(source);
+            let y = source / spp / width;
+            let is_still = (projected.at_px[1] - own).abs() < STILL_PX;
+            let row = if is_still { y } else { landed as usize };
+            seen += 1;
+            elsewhere += u64::from(row != y);
+            sources[row * words + y / 64] |= 1 << (y % 64);
+        }
+        let count = |first: usize, end: usize| -> u64 {
+            let rows = &sources[first * words..end.min(height) * words];
+            let union = |word: usize| rows.iter().skip(word).step_by(words).fold(0, |a, b| a | b);
+            (0..words).map(|w| u64::from(union(w).count_ones())).sum()
+        };
+        let tile = TILE_SIZE_PX as usize;
+        let bands = || (0..height).step_by(tile);
+        let per_row: Vec<u64> = (0..height)
+            .map(|y| count(y, y + 1))
+            .filter(|n| *n > 0)
+            .collect();
+        let left_rows_per_right_row =
+            per_row.iter().sum::<u64>() as f64 / per_row.len().max(1) as f64;
+        Self {
+            band: bands().map(|y| count(y, y + tile)).collect(),
+            band_and_beside: bands()
+                .map(|y| count(y.saturating_sub(1), y + tile + 1))
+                .collect(),
+            summary: RowSummary {
+                other_row_pct: 100.0 * elsewhere as f64 / seen.max(1) as f64,
+                left_rows_per_right_row,
+                row_test_applies: left_rows_per_right_row <= LINE_ROWS,
+            },
+        }
+    }
+
+    /// Left rows that a tile's band needs: what arrives in it, and with the rows beside it.
+    #[must_use]
+    pub fn of_tile(&self, frame: &Frame, tile: u32) -> [u64; 2] {
+        let band = (tile / frame.tables.tiles()[0]) as usize;
+        [self.band[band], self.band_and_beside[band]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sgrt::reproject::reproject;
+    use crate::sgrt::synthetic::{View, frame, wall};
+
+    fn needs(view: View) -> (Frame, RowNeeds) {
+        let frame = frame(&wall(3.0, [50.0, 50.0], 0.0, 1), view);
+        let needs = RowNeeds::new(&frame, &reproject(&frame));
+        (frame, needs)
+    }
+
+    #[test]
+    fn parallel_eyes_need_the_row_itself_and_its_neighbours() {
+        for samples_per_px in [1, 4] {
+            let (frame, needs) = needs(View {
+                samples_per_px,
+                ..View::default()
+            });
+            assert_eq!(needs.summary.other_row_pct, 0.0);
+            assert_eq!(needs.summary.left_rows_per_right_row, 1.0);
+            assert!(needs.summary.row_test_applies);
+            let tiles_a_band = frame.tables.tiles()[0];
+            // 40 rows: two whole bands and half a one.
+            let bands = [0, 1, 2].map(|band| needs.of_tile(&frame, band * tiles_a_band));
+            assert_eq!(bands, [[16, 17], [16, 18], [8, 9]]);
+        }
+    }
+
+    #[test]
+    fn a_frustum_shifted_by_whole_rows_needs_no_more_of_them() {
+        // 1.2 of tangent are 40 rows: 0.06 are two.
+        let (_, needs) = needs(View {
+            right_tilt: 0.06,
+            ..View::default()
+        });
+        assert!(needs.summary.other_row_pct > 99.0);
+        assert!(needs.summary.row_test_applies, "{:?}", needs.summary);
+    }
+
+    #[test]
+    fn canted_eyes_need_many_rows_and_the_row_test_does_not_apply() {
+        let (frame, needs) = needs(View {
+            cant_deg: 10.0,
+            ..View::default()
+        });
+        let summary = needs.summary;
+        assert!(summary.other_row_pct > 50.0, "{summary:?}");
+        assert!(summary.left_rows_per_right_row > 2.0, "{summary:?}");
+        assert!(!summary.row_test_applies);
+        assert!(needs.of_tile(&frame, frame.tables.tiles()[0])[0] > 16);
+    }
+}

@@ -1,0 +1,29 @@
+//! `silhouette`: at the edge of an object.
+
+use super::{RuleKind, Test};
+use crate::sgrt::frame::Sample;
+use crate::sgrt::place::{EIGHT, Place};
+use crate::sgrt::reads::{Around, Reads};
+
+pub static RULE: RuleKind = RuleKind {
+    name: "silhouette",
+    title: "a neighbour of another object",
+    help: "one of the 8 neighbours is missing or of another object",
+    takes_share: false,
+    reads: Reads {
+        object: Some(Around::Square),
+        ..Reads::NOTHING
+    },
+    test: Some(|_, _, _| Box::new(Silhouette)),
+    retests: None,
+};
+
+struct Silhouette;
+
+impl Test for Silhouette {
+    fn rejects(&self, at: Place, _: &Sample) -> bool {
+        let other =
+            |n: Place| n.candidate().is_missing() || n.source().object != at.source().object;
+        at.neighbours(&EIGHT).any(other)
+    }
+}

@@ -1,0 +1,179 @@
+//! `info`, `dump`, `diff` and `convert` serve ray traces, and every command reads pipes.
+
+use parallax_tests::{program, root, run_ok, traces};
+use serde_json::Value;
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::{Output, Stdio};
+
+fn made_up(folder: &tempfile::TempDir, name: &str, seed: u64) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, traces::ray_trace(1, true, seed)).expect("temporary file");
+    path
+}
+
+fn text(output: Output) -> String {
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// Runs replay with a golden trace on its standard input, a pipe.
+fn piped(arguments: &[&str], bytes: &[u8]) -> Output {
+    let mut child = program("replay")
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("replay starts");
+    let mut input = child.stdin.take().expect("a pipe was asked for");
+    let bytes = bytes.to_vec();
+    let writer = std::thread::spawn(move || {
+        // A reader that refuses early closes the pipe.
+        let _closed = input.write_all(&bytes);
+    });
+    let output = child.wait_with_output().expect("replay ends");
+    writer.join().expect("the writer ends");
+    output
+}
+
+#[test]
+fn info_tells_the_hierarchy_and_the_rays_by_kind() {
+    let golden = root().join("traces/chess-rays.raytrace");
+    let shown = text(run_ok(program("replay").arg("info").arg(&golden)));
+    for part in [
+        "128x128 px",
+        "SAH cost 12.96",
+        "8731 nodes",
+        "shadow",
+        "reflection",
+    ] {
+        assert!(shown.contains(part), "no {part:?} in:\n{shown}");
+    }
+    let json = text(run_ok(
+        program("replay").args(["info", "--json"]).arg(&golden),
+    ));
+    let info: Value = serde_json::from_str(&json).expect("JSON");
+    let rays = |eye: &str| {
+        let kinds = info["totals"][eye]["rays"].as_object().expect("kinds");
+        kinds.values().filter_map(Value::as_u64).sum::<u64>()
+    };
+    assert_eq!(info["totals"]["left"]["samples"], 128 * 128);
+    assert_eq!(rays("left") + rays("right"), 112_631, "as validate counts");
+}
+
+#[test]
+fn the_first_different_sample_of_two_ray_traces_is_shown() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (a, b) = (
+        made_up(&folder, "a.raytrace", 7),
+        made_up(&folder, "b.raytrace", 8),
+    );
+    run_ok(program("replay").arg("diff").args([&a, &a]));
+    let output = program("replay").arg("diff").args([&a, &b]).output();
+    let output = output.expect("replay starts");
+    assert_eq!(output.status.code(), Some(1));
+    let shown = text(output);
+    assert!(
+        shown.starts_with("left eye tile 0 sample 0 differs\n< {"),
+        "{shown}"
+    );
+}
+
+#[test]
+fn a_ray_trace_encoded_anew_has_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let again = folder.path().join("again.raytrace");
+    for name in ["chess-rays.raytrace", "teapot-rays.raytrace"] {
+        let golden = root().join("traces").join(name);
+        let to = ["convert", "--to", "raytrace", "-o"];
+        run_ok(program("replay").args(to).arg(&again).arg(&golden));
+        assert!(
+            fs::read(&again).expect("written") == fs::read(&golden).expect("golden"),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn visits_become_addresses_in_every_text_format() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = made_up(&folder, "a.raytrace", 7);
+    let dumped = text(run_ok(program("replay").arg("dump").arg(&path)));
+    let mut addresses = Vec::new();
+    for line in dumped.lines() {
+        let sample: Value = serde_json::from_str(line).expect("JSON");
+        for ray in sample["rays"].as_array().expect("rays") {
+            let visits = ray["visits"].as_array().expect("visits");
+            addresses.extend(visits.iter().filter_map(|visit| visit["address"].as_u64()));
+        }
+    }
+    assert!(addresses.len() > 1000);
+    let convert = |to: &str, granularity: &str| {
+        let options = ["convert", "--to", to, "--granularity", granularity];
+        text(run_ok(program("replay").args(options).arg(&path)))
+    };
+    let hexadecimal = |digits: &str| u64::from_str_radix(digits, 16).expect("hexadecimal");
+    let din = convert("din", "texel");
+    let din = din
+        .lines()
+        .map(|line| hexadecimal(line.strip_prefix("0 ").expect("a read")));
+    assert!(din.eq(addresses.iter().copied()));
+    let csv = convert("csv", "texel");
+    let csv = csv.lines().skip(1).map(|line| {
+        let address = line.split(',').next().expect("a field");
+        hexadecimal(address.strip_prefix("0x").expect("0x"))
+    });
+    assert!(csv.eq(addresses.iter().copied()));
+    assert_eq!(convert("jsonl", "texel").lines().count(), addresses.len());
+    // Nodes have 64 bytes and triangles 40, so lines of 16 bytes are several a visit.
+    assert!(convert("din", "line").lines().count() > 2 * addresses.len());
+}
+
+#[test]
+fn a_ray_trace_without_visits_has_no_addresses_and_says_so() {
+    let golden = root().join("traces/teapot-rays.raytrace");
+    let output = program("replay")
+        .args(["convert", "--to", "din"])
+        .arg(golden)
+        .output();
+    let output = output.expect("replay starts");
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.contains("lists no visits"), "{message}");
+}
+
+#[test]
+fn traces_are_read_from_pipes() {
+    for (name, commands) in [
+        (
+            "atrium-shadows.textrace",
+            &["info", "validate", "dump", "run"][..],
+        ),
+        (
+            "teapot-rays.raytrace",
+            &["info", "validate", "dump", "reproject"][..],
+        ),
+    ] {
+        let path = root().join("traces").join(name);
+        let bytes = fs::read(&path).expect("golden trace");
+        for command in commands {
+            let output = piped(&[command, "/dev/stdin"], &bytes);
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{command} {name}: {message}");
+        }
+        for refused in [
+            &bytes[..bytes.len() - 1],
+            &[&bytes[..], &[0]].concat(),
+            b"PNG",
+            b"",
+        ] {
+            assert_eq!(
+                piped(&["info", "/dev/stdin"], refused).status.code(),
+                Some(2)
+            );
+        }
+    }
+    let endless = program("replay").args(["info", "/dev/zero"]).output();
+    assert_eq!(endless.expect("replay starts").status.code(), Some(2));
+}

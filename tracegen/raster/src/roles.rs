@@ -1,0 +1,137 @@
+//! What a draw does in each pass, and what distinguishes the pipelines that do it.
+
+use crate::draws::{DrawCall, DrawMode};
+use crate::groups::MaterialGroups;
+use scene::Material;
+
+/// What a pipeline does with a draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Role {
+    /// Colour and depth with forced early depth test.
+    Opaque,
+    /// Colour blended over what is there; depth tested early, not written.
+    Blended,
+    /// Colour and late depth of an alpha-masked draw.
+    Masked,
+    /// Records of an alpha-masked draw; writes neither colour nor depth.
+    MaskedRecord,
+    /// Depth of a shadow caster.
+    Shadow,
+    /// Depth of an alpha-masked shadow caster.
+    ShadowMasked,
+    /// Fragments of an opaque draw, added up.
+    Count,
+    /// Fragments of a blended draw, added up.
+    CountBlended,
+}
+
+impl Role {
+    /// It renders into a shadow map.
+    pub fn casts(self) -> bool {
+        matches!(self, Self::Shadow | Self::ShadowMasked)
+    }
+
+    /// Depth is tested and stays.
+    pub fn keeps_depth(self) -> bool {
+        matches!(
+            self,
+            Self::Blended | Self::MaskedRecord | Self::CountBlended
+        )
+    }
+}
+
+/// What all draws of a pass are drawn for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// The picture alone.
+    Plain,
+    /// The picture and the records.
+    Capture,
+    /// A shadow map.
+    Shadow,
+    /// The additive count of fragments.
+    Count,
+}
+
+/// Roles of a draw in the order in which it takes them.
+pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
+    match (mode, purpose) {
+        (DrawMode::Opaque, Purpose::Plain | Purpose::Capture) => &[Role::Opaque],
+        (DrawMode::Blended, Purpose::Plain | Purpose::Capture) => &[Role::Blended],
+        (DrawMode::Masked, Purpose::Plain) => &[Role::Masked],
+        (DrawMode::Masked, Purpose::Capture) => &[Role::MaskedRecord, Role::Masked],
+        (DrawMode::Opaque, Purpose::Shadow) => &[Role::Shadow],
+        (DrawMode::Masked, Purpose::Shadow) => &[Role::ShadowMasked],
+        (DrawMode::Opaque, Purpose::Count) => &[Role::Count],
+        (DrawMode::Blended, Purpose::Count) => &[Role::CountBlended],
+        // Blended draws cast no shadow, and an alpha test cannot be counted without the replay.
+        (DrawMode::Blended, Purpose::Shadow) | (DrawMode::Masked, Purpose::Count) => &[],
+    }
+}
+
+/// How a material is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MaterialState {
+    double_sided: bool,
+    textures: u32,
+    leaders: u32,
+}
+
+impl MaterialState {
+    pub fn new(material: &Material, groups: &MaterialGroups) -> Self {
+        Self {
+            double_sided: material.double_sided,
+            textures: groups.present,
+            leaders: groups.leaders,
+        }
+    }
+}
+
+/// What distinguishes pipelines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct PipelineKey {
+    /// What the pipeline does.
+    pub role: Role,
+    /// Records are written.
+    pub capture: bool,
+    /// Bit per texture.
+    pub textures: u32,
+    /// Bit per texture that leads its uv group.
+    pub leaders: u32,
+    /// Shadow cascades.
+    pub cascades: u32,
+    /// Both faces are drawn.
+    pub double_sided: bool,
+    /// Front faces wind clockwise.
+    pub mirrored: bool,
+}
+
+impl PipelineKey {
+    /// The pipeline that gives `call` its `role` in a frame with `cascades`.
+    pub fn new(
+        call: &DrawCall,
+        material: &MaterialState,
+        role: Role,
+        purpose: Purpose,
+        cascades: u32,
+    ) -> Self {
+        // The colour pass of a masked draw records nothing: its records come from a role of their own.
+        let capture = purpose == Purpose::Capture && role != Role::Masked;
+        let lit = matches!(purpose, Purpose::Plain | Purpose::Capture);
+        Self {
+            role,
+            capture,
+            // A shadow caster without alpha test is drawn alike whatever its material.
+            textures: if role == Role::Shadow {
+                0
+            } else {
+                material.textures
+            },
+            leaders: if capture { material.leaders } else { 0 },
+            cascades: if lit { cascades } else { 0 },
+            // Shadow maps hold both faces: walls that are modelled from one side block light.
+            double_sided: role.casts() || material.double_sided,
+            mirrored: !role.casts() && call.mirrored,
+        }
+    }
+}

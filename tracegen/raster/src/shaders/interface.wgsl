@@ -1,0 +1,118 @@
+// What the host hands to the shader, and the vertex stage. Overrides choose what a pipeline keeps;
+// the colour is the same with and without CAPTURE, bit for bit. Constants that the host uses as
+// well stand before this text: see shader.rs.
+
+// Append a record per covered quad and uv group.
+override CAPTURE: bool = false;
+// Bit per texture of the material: base colour, normal, metallic-roughness, specular, occlusion,
+// emissive.
+override TEXTURES: u32 = 0u;
+// Bit per texture that is the first of its uv group.
+override LEADERS: u32 = 0u;
+// Shadow cascades, 0 to 4.
+override CASCADES: u32 = 0u;
+// Alpha reaches the target (blended materials).
+override BLENDED: bool = false;
+// The base colour texture has BC1's one-bit alpha, whose transparent texels are black.
+override MASKED: bool = false;
+
+// Index of no record.
+const NONE: u32 = 0xffffffffu;
+
+struct PointLight {
+    position: vec4<f32>,
+    intensity: vec4<f32>,
+}
+
+struct View {
+    clip_from_world: mat4x4<f32>,
+    world_from_clip: mat4x4<f32>,
+    eye: vec4<f32>,
+    to_sun: vec4<f32>,
+    sun: vec4<f32>,
+    sky: vec4<f32>,
+    ground: vec4<f32>,
+    // Edge of a shadow texel in metres, by cascade.
+    shadow_texel_m: vec4<f32>,
+    // World to shadow uv and depth.
+    cascades: array<mat4x4<f32>, MAX_CASCADES>,
+    points: array<PointLight, MAX_POINT_LIGHTS>,
+    // x: point lights, y: records that the buffer holds.
+    counts: vec4<u32>,
+}
+
+struct Instance {
+    world_from_object: mat4x4<f32>,
+    // Inverse transpose in columns 0 to 2; column 3: x = draw, y = first primitive, as bits.
+    normal_from_object: mat4x4<f32>,
+}
+
+struct Material {
+    base_color: vec4<f32>,
+    // w: scale of the normal map.
+    emissive: vec4<f32>,
+    // w: alpha cutoff.
+    specular: vec4<f32>,
+    // x: metalness, y: roughness.
+    surface: vec4<f32>,
+    // Two rows a texture; w of the first is the uv set.
+    uv_rows: array<vec4<f32>, 2u * MATERIAL_TEXTURES>,
+}
+
+@group(0) @binding(VIEW_BINDING) var<uniform> view: View;
+@group(0) @binding(INSTANCES_BINDING) var<storage, read> instances: array<Instance>;
+@group(0) @binding(COUNTER_BINDING) var<storage, read_write> counter: atomic<u32>;
+@group(0) @binding(RECORDS_BINDING) var<storage, read_write> records: array<u32>;
+@group(0) @binding(SHADOW_MAP_BINDING) var shadow_map: texture_depth_2d_array;
+@group(0) @binding(SHADOW_SAMPLER_BINDING) var shadow_sampler: sampler_comparison;
+@group(0) @binding(DEPTHS_BINDING) var<storage, read_write> depths: array<u32>;
+
+@group(1) @binding(MATERIAL_BINDING) var<uniform> material: Material;
+@group(1) @binding(TEXTURES_BINDING + BASE_COLOR) var base_color_texture: texture_2d<f32>;
+@group(1) @binding(TEXTURES_BINDING + NORMAL) var normal_texture: texture_2d<f32>;
+@group(1) @binding(TEXTURES_BINDING + METALLIC_ROUGHNESS) var metallic_roughness_texture: texture_2d<f32>;
+@group(1) @binding(TEXTURES_BINDING + SPECULAR) var specular_texture: texture_2d<f32>;
+@group(1) @binding(TEXTURES_BINDING + OCCLUSION) var occlusion_texture: texture_2d<f32>;
+@group(1) @binding(TEXTURES_BINDING + EMISSIVE) var emissive_texture: texture_2d<f32>;
+@group(1) @binding(SAMPLERS_BINDING + BASE_COLOR) var base_color_sampler: sampler;
+@group(1) @binding(SAMPLERS_BINDING + NORMAL) var normal_sampler: sampler;
+@group(1) @binding(SAMPLERS_BINDING + METALLIC_ROUGHNESS) var metallic_roughness_sampler: sampler;
+@group(1) @binding(SAMPLERS_BINDING + SPECULAR) var specular_sampler: sampler;
+@group(1) @binding(SAMPLERS_BINDING + OCCLUSION) var occlusion_sampler: sampler;
+@group(1) @binding(SAMPLERS_BINDING + EMISSIVE) var emissive_sampler: sampler;
+
+struct Vertex {
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) tangent: vec4<f32>,
+    @location(3) uv: vec4<f32>,
+    // One an instance.
+    @location(4) draw: u32,
+}
+
+struct Fragment {
+    @builtin(position) position: vec4<f32>,
+    @location(0) world: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) tangent: vec4<f32>,
+    // Set 0 in xy, set 1 in zw.
+    @location(3) uv: vec4<f32>,
+    // Draw and number of the draw's first primitive.
+    @location(4) @interpolate(flat, either) ids: vec2<u32>,
+}
+
+@vertex
+fn vertex_main(in: Vertex) -> Fragment {
+    let instance = instances[in.draw];
+    let world = instance.world_from_object * vec4(in.position, 1.0);
+    let n = instance.normal_from_object;
+    var out: Fragment;
+    out.position = view.clip_from_world * world;
+    out.world = world.xyz;
+    out.normal = mat3x3(n[0].xyz, n[1].xyz, n[2].xyz) * in.normal;
+    let w = instance.world_from_object;
+    out.tangent = vec4(mat3x3(w[0].xyz, w[1].xyz, w[2].xyz) * in.tangent.xyz, in.tangent.w);
+    out.uv = in.uv;
+    out.ids = bitcast<vec2<u32>>(n[3].xy);
+    return out;
+}

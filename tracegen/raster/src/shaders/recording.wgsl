@@ -1,0 +1,131 @@
+// What a quad covers, and its records.
+
+// Where a fragment lies in its quad, and what it belongs to.
+struct Lane {
+    // Quad column and row, 12 bits each.
+    quad: u32,
+    // 0 top left, 1 top right, 2 bottom left, 3 bottom right.
+    index: u32,
+    // First bit of the quad in a ballot.
+    shift: u32,
+    primitive: u32,
+    draw: u32,
+}
+
+fn lane_of(in: Fragment, primitive: u32, invocation: u32) -> Lane {
+    let pixel = vec2<u32>(in.position.xy);
+    var lane: Lane;
+    lane.quad = (pixel.x >> 1u) | ((pixel.y >> 1u) << 12u);
+    lane.index = (pixel.x & 1u) | ((pixel.y & 1u) << 1u);
+    lane.shift = invocation & 4u;
+    lane.primitive = in.ids.y + primitive;
+    lane.draw = in.ids.x;
+    return lane;
+}
+
+// Lanes of the quad for which `takes` holds; helper lanes never vote.
+fn quad_mask(lane: Lane, takes: bool) -> u32 {
+    return (subgroupBallot(takes).x >> lane.shift) & 15u;
+}
+
+// Appends a record and tells its index.
+fn append(lane: Lane, mask: u32, group: u32, a: vec4<f32>, b: vec4<f32>) -> u32 {
+    let index = atomicAdd(&counter, 1u);
+    if index < view.counts.y {
+        let word = index * RECORD_WORDS;
+        records[word] = lane.quad | (mask << 24u) | (group << 28u);
+        records[word + 1u] = lane.primitive;
+        records[word + 2u] = lane.draw;
+        records[word + 3u] = bitcast<u32>(a.x);
+        records[word + 4u] = bitcast<u32>(a.y);
+        records[word + 5u] = bitcast<u32>(a.z);
+        records[word + 6u] = bitcast<u32>(a.w);
+        records[word + 7u] = bitcast<u32>(b.x);
+        records[word + 8u] = bitcast<u32>(b.y);
+        records[word + 9u] = bitcast<u32>(b.z);
+        records[word + 10u] = bitcast<u32>(b.w);
+    }
+    return index;
+}
+
+// Tells the record's index to the lane that appended it. Must be called in uniform control flow:
+// the derivatives need the helper lanes.
+fn record_uv(lane: Lane, group: u32, takes: bool, uv: vec2<f32>) -> u32 {
+    let dx = dpdx(uv);
+    let dy = dpdy(uv);
+    let cross = dpdx(dy);
+    let mask = quad_mask(lane, takes);
+    var index = NONE;
+    if takes && firstTrailingBit(mask) == lane.index {
+        // Back from this lane to the top-left one, the top row and the left column.
+        let right = f32(lane.index & 1u);
+        let down = f32(lane.index >> 1u);
+        let dx_top = dx - down * cross;
+        let dy_left = dy - right * cross;
+        let top_left = uv - right * dx_top - down * dy_left - right * down * cross;
+        index = append(lane, mask, group, vec4(top_left, dx_top), vec4(dy_left, cross));
+    }
+    return index;
+}
+
+// One record a uv group of the material; tells the index of group 0's.
+fn record_material(lane: Lane, in: Fragment) -> u32 {
+    var first = NONE;
+    if LEADERS == 0u && CASCADES == 0u {
+        let mask = quad_mask(lane, true);
+        if firstTrailingBit(mask) == lane.index {
+            _ = append(lane, mask, NO_GROUP, vec4(0.0), vec4(0.0));
+        }
+    }
+    if (LEADERS & 1u) != 0u { first = record_uv(lane, 0u, true, texture_uv(0u, in.uv)); }
+    if (LEADERS & 2u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 1u), true, texture_uv(1u, in.uv)); }
+    if (LEADERS & 4u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 3u), true, texture_uv(2u, in.uv)); }
+    if (LEADERS & 8u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 7u), true, texture_uv(3u, in.uv)); }
+    if (LEADERS & 16u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 15u), true, texture_uv(4u, in.uv)); }
+    if (LEADERS & 32u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 31u), true, texture_uv(5u, in.uv)); }
+    return first;
+}
+
+// Depth of the four lanes and which of them pass the alpha test, for the in-order replay;
+// `index` is that of the quad's record in group 0.
+fn record_depth(lane: Lane, index: u32, passes: bool, depth: f32) {
+    let dx = dpdx(depth);
+    let dy = dpdy(depth);
+    let cross = dpdx(dy);
+    let passing = quad_mask(lane, passes);
+    if index < view.counts.y {
+        let right = f32(lane.index & 1u);
+        let down = f32(lane.index >> 1u);
+        let dx_top = dx - down * cross;
+        let dy_left = dy - right * cross;
+        let top_left = depth - right * dx_top - down * dy_left - right * down * cross;
+        let top = vec2(top_left, top_left + dx_top);
+        let bottom = top + vec2(dy_left, dy_left + cross);
+        let word = index * DEPTH_WORDS;
+        depths[word] = bitcast<u32>(top.x);
+        depths[word + 1u] = bitcast<u32>(top.y);
+        depths[word + 2u] = bitcast<u32>(bottom.x);
+        depths[word + 3u] = bitcast<u32>(bottom.y);
+        depths[word + 4u] = passing;
+    }
+}
+
+fn record_shadow(lane: Lane, found: ShadowLookup, world: vec3<f32>, normal: vec3<f32>) {
+    let first = countOneBits(LEADERS);
+    // Almost every subgroup lies in one cascade: visit those between its nearest and farthest.
+    // The bounds are the same for all its lanes, so that control flow stays uniform.
+    let nearest = subgroupMin(select(found.cascade, 99, found.cascade < 0));
+    let farthest = subgroupMax(found.cascade);
+    for (var k = nearest; k <= farthest; k++) {
+        let p = shadow_coordinates(u32(k), world, normal);
+        _ = record_uv(lane, first + u32(k), found.cascade == k, p.xy);
+    }
+    // Lanes outside every cascade sample nothing; without a texture they still count.
+    if LEADERS == 0u {
+        let alone = found.cascade < 0;
+        let mask = quad_mask(lane, alone);
+        if alone && firstTrailingBit(mask) == lane.index {
+            _ = append(lane, mask, NO_GROUP, vec4(0.0), vec4(0.0));
+        }
+    }
+}

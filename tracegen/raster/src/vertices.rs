@@ -1,0 +1,82 @@
+//! Vertices and instances as the shader reads them.
+
+use crate::draws::DrawList;
+use glam::{Mat4, Vec4};
+use scene::Mesh;
+
+/// Interleaved vertex of the shader's `Vertex`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct VertexData {
+    position: [f32; 3],
+    normal: [f32; 3],
+    tangent: [f32; 4],
+    uv: [f32; 4],
+}
+
+/// Bytes between two vertices.
+pub(crate) const VERTEX_STRIDE: u64 = size_of::<VertexData>() as u64;
+
+/// The shader's `Instance`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct InstanceData {
+    world_from_object: [[f32; 4]; 4],
+    normal_from_object: [[f32; 4]; 4],
+}
+
+/// Interleaves a mesh's vertices; what it lacks gets a default.
+pub(crate) fn pack(mesh: &Mesh) -> Vec<VertexData> {
+    let at2 = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
+    mesh.positions
+        .iter()
+        .enumerate()
+        .map(|(i, position)| {
+            let (uv0, uv1) = (at2(&mesh.uv0, i), at2(&mesh.uv1, i));
+            VertexData {
+                position: position.to_array(),
+                normal: mesh
+                    .normals
+                    .get(i)
+                    .copied()
+                    .unwrap_or(glam::Vec3::Y)
+                    .to_array(),
+                tangent: mesh
+                    .tangents
+                    .get(i)
+                    .copied()
+                    .unwrap_or(Vec4::new(1.0, 0.0, 0.0, 1.0))
+                    .to_array(),
+                uv: [uv0.x, uv0.y, uv1.x, uv1.y],
+            }
+        })
+        .collect()
+}
+
+/// One row a draw, at least one.
+pub(crate) fn instances(draws: &DrawList) -> Vec<InstanceData> {
+    let mut rows: Vec<InstanceData> = (0_u32..)
+        .zip(&draws.calls)
+        .map(|(draw, call)| {
+            let matrix = glam::Mat3::from(call.transform.matrix3);
+            let inverse = matrix.inverse().transpose();
+            // A flattened instance has no inverse; its normals keep the object's direction.
+            let normal = if inverse.is_finite() { inverse } else { matrix };
+            let mut normal_from_object = Mat4::from_mat3(normal);
+            normal_from_object.w_axis = Vec4::new(
+                f32::from_bits(draw),
+                f32::from_bits(call.first_primitive),
+                0.0,
+                1.0,
+            );
+            InstanceData {
+                world_from_object: Mat4::from(call.transform).to_cols_array_2d(),
+                normal_from_object: normal_from_object.to_cols_array_2d(),
+            }
+        })
+        .collect();
+    if rows.is_empty() {
+        rows.push(bytemuck::Zeroable::zeroed());
+    }
+    rows
+}

@@ -1,0 +1,313 @@
+//! Another capturer can take tracegen's place: this one has no driver. It computes the quads of
+//! an analytic scene and hands them over out of order.
+//!
+//! The view has 64x96 pixels. Draw 0 is an opaque triangle over the pixels with `x + y < 40`.
+//! Draw 1 is alpha-masked and covers the tile in column 1, row 0 twice: primitive 1 in front,
+//! whose alpha passes in even columns, and primitive 2 behind it. Texture coordinates are the
+//! pixel's centre over 64, so one pixel is one texel.
+
+use formats::textrace::{
+    Draw, Pass, PassKind, SUBTEXELS, Sample, Tables, Textrace, TextraceWriter, Tile, TraceMeta,
+    UvGroup,
+};
+use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
+use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd};
+use record::{
+    Captured, Capturer, RawDepth, RawRecord, RawRecords, RecordError, Recorder, Region, Sink,
+};
+use std::collections::BTreeMap;
+
+const SIZE_PX: [u32; 2] = [64, 96];
+/// Texels along the texture's edge.
+const EDGE: u32 = 64;
+
+fn tables() -> Tables {
+    let identity = [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    let eye = EyeView {
+        world_to_eye: identity,
+        eye_to_clip: identity,
+        position: [0.0; 3],
+    };
+    let fov = FovTangents {
+        left: 1.0,
+        right: 1.0,
+        up: 1.0,
+        down: 1.0,
+    };
+    let draw = |first_primitive, primitives| Draw {
+        material: "grid".into(),
+        first_primitive,
+        primitives,
+        groups: vec![UvGroup {
+            extent: [EDGE; 2],
+            samples: vec![Sample {
+                texture: 0,
+                sampler: 0,
+                layer: 0,
+                offset: [0, 0],
+            }],
+        }],
+    };
+    Tables {
+        meta: TraceMeta {
+            tool: "an analytic capturer".into(),
+            command_line: Vec::new(),
+            scene: "triangle".into(),
+            scene_triangles: 3,
+            camera: "default".into(),
+            backend: "analytic".into(),
+            driver: "none".into(),
+            seed: 0,
+            hmd: Hmd {
+                name: "square".into(),
+                source: "unverified".into(),
+                eye_size_px: SIZE_PX,
+                fov: [fov; 2],
+                ipd_m: 0.064,
+                cant_deg: 0.0,
+            },
+            frames: vec![FrameViews {
+                frame: 0,
+                eyes: [eye; 2],
+            }],
+        },
+        textures: vec![Texture {
+            name: "grid".into(),
+            size: [EDGE; 2],
+            levels: 7,
+            layers: 1,
+            format: TexelFormat::Rgba8,
+            color_space: ColorSpace::Linear,
+        }],
+        samplers: vec![Sampler::TRILINEAR_REPEAT],
+        draws: vec![draw(0, 1), draw(1, 2)],
+        passes: vec![Pass {
+            frame: 0,
+            kind: PassKind::Main,
+            eye: Some(Eye::Left),
+            size_px: SIZE_PX,
+            tiles: [4, 6],
+        }],
+    }
+}
+
+/// Primitive, draw and covered lanes of the quad at column `x` and row `y`, as a driver sees them.
+fn covered(x: u32, y: u32) -> Vec<(u32, u32, u8)> {
+    let mut found = Vec::new();
+    match x + y {
+        0..=18 => found.push((0, 0, 0b1111)),
+        // Of the diagonal's quads, all but the bottom right lane.
+        19 => found.push((0, 0, 0b0111)),
+        _ => {}
+    }
+    if (8..16).contains(&x) && y < 8 {
+        found.extend([(1, 1, 0b1111), (2, 1, 0b1111)]);
+    }
+    found
+}
+
+/// Renders nothing and knows everything.
+struct Analytic {
+    capacity: u64,
+    /// Hands the last quad over first.
+    backwards: bool,
+    asked: Vec<Region>,
+    empty: usize,
+    overflowed: usize,
+}
+
+impl Analytic {
+    fn new(capacity: u64, backwards: bool) -> Self {
+        Self {
+            capacity,
+            backwards,
+            asked: Vec::new(),
+            empty: 0,
+            overflowed: 0,
+        }
+    }
+}
+
+impl Capturer for Analytic {
+    type Error = RecordError;
+
+    fn record_capacity(&self) -> u64 {
+        self.capacity
+    }
+
+    fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, RecordError> {
+        self.asked.push(region);
+        let [columns, rows] = [0, 1].map(|axis| {
+            let first = region.origin_px[axis] / 2;
+            first..first + region.size_px[axis] / 2
+        });
+        let mut records: Vec<(RawRecord, RawDepth)> = Vec::new();
+        for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
+            for (primitive, draw, mask) in covered(x, y) {
+                let texel = 1.0 / EDGE as f32;
+                let record = RawRecord {
+                    header: RawRecord::pack(x, y, mask, 0),
+                    primitive,
+                    draw,
+                    uv: [x, y].map(|q| (2.0 * q as f32 + 0.5) * texel),
+                    dx: [texel, 0.0],
+                    dy: [0.0, texel],
+                    cross: [0.0; 2],
+                };
+                // Lanes 0 and 2 lie in even columns.
+                let depth = match primitive {
+                    1 => (0.5, 0b0101),
+                    _ => (0.7, 0b1111),
+                };
+                records.push((
+                    record,
+                    RawDepth {
+                        depth: [depth.0; 4],
+                        passing: depth.1,
+                    },
+                ));
+            }
+        }
+        let needed = records.len() as u64;
+        if needed > self.capacity {
+            self.overflowed += 1;
+            return Ok(Captured::Overflow { needed });
+        }
+        if records.is_empty() {
+            self.empty += 1;
+            return Ok(Captured::Complete);
+        }
+        if self.backwards {
+            records.reverse();
+        }
+        let (quads, depths): (Vec<_>, Vec<_>) = records.into_iter().unzip();
+        sink(RawRecords {
+            quads: &quads,
+            depths: &depths,
+        })?;
+        Ok(Captured::Complete)
+    }
+}
+
+fn trace(capturer: &mut Analytic) -> Result<Vec<u8>, RecordError> {
+    let tables = tables();
+    let mut writer = TextraceWriter::in_memory(&tables)?;
+    let mut recorder = Recorder::new(&tables, vec![false, true]);
+    recorder.record_pass(capturer, 0, &mut writer)?;
+    Ok(writer.into_bytes()?)
+}
+
+#[test]
+fn a_capturer_without_a_driver_writes_a_valid_trace_of_the_records_that_it_computed() {
+    let mut capturer = Analytic::new(200, true);
+    let bytes = trace(&mut capturer).unwrap();
+    assert!(capturer.overflowed > 0, "no region overflowed");
+    assert!(capturer.empty > 0, "no region was empty");
+
+    let mut expected = BTreeMap::new();
+    for (x, y) in (0..48).flat_map(|y| (0..32).map(move |x| (x, y))) {
+        for (primitive, draw, mask) in covered(x, y) {
+            // Primitive 1 hides primitive 2 where its alpha passes: in even columns.
+            let mask = if primitive == 2 { 0b1010 } else { mask };
+            expected.insert((x, y, primitive), (draw, mask));
+        }
+    }
+    let reader = Textrace::from_bytes(bytes).unwrap();
+    let mut tile = Tile::default();
+    for index in 0..24_u32 {
+        reader.decode_tile(0, index as usize, &mut tile).unwrap();
+        for run in &tile.runs {
+            for record in &tile.records[run.first as usize..(run.first + run.count) as usize] {
+                let x = index % 4 * 8 + u32::from(record.x);
+                let y = index / 4 * 8 + u32::from(record.y);
+                let found = expected.remove(&(x, y, run.primitive));
+                assert_eq!(found, Some((run.draw, record.mask)), "quad ({x}, {y})");
+                // Half a texel to the pixel's centre.
+                let texels = [x, y].map(|q| (2 * q as i32) * SUBTEXELS + SUBTEXELS / 2);
+                assert_eq!(record.uv, texels);
+                assert_eq!((record.dx, record.dy), ([SUBTEXELS, 0], [0, SUBTEXELS]));
+                assert_eq!((record.cross, record.group), ([0, 0], 0));
+            }
+        }
+    }
+    assert!(expected.is_empty(), "missing: {expected:?}");
+}
+
+#[test]
+fn neither_the_order_of_the_records_nor_the_size_of_the_buffer_reaches_the_trace() {
+    let whole = trace(&mut Analytic::new(100_000, false)).unwrap();
+    for capacity in [190, 200, 300, 100_000] {
+        let mut capturer = Analytic::new(capacity, true);
+        assert!(
+            trace(&mut capturer).unwrap() == whole,
+            "capacity {capacity}"
+        );
+    }
+}
+
+#[test]
+fn regions_after_an_overflow_cover_the_view_once() {
+    let mut capturer = Analytic::new(200, false);
+    trace(&mut capturer).unwrap();
+    let complete = capturer.asked.len() - capturer.overflowed;
+    let mut pixels = vec![0; (SIZE_PX[0] * SIZE_PX[1]) as usize];
+    for region in &capturer.asked[capturer.asked.len() - complete..] {
+        let [left, top] = region.origin_px;
+        for (dx, dy) in
+            (0..region.size_px[1]).flat_map(|y| (0..region.size_px[0]).map(move |x| (x, y)))
+        {
+            pixels[((top + dy) * SIZE_PX[0] + left + dx) as usize] += 1;
+        }
+    }
+    assert!(pixels.iter().all(|&times| times == 1));
+}
+
+#[test]
+fn a_buffer_below_one_tile_is_refused_by_name() {
+    let message = trace(&mut Analytic::new(100, false))
+        .unwrap_err()
+        .to_string();
+    assert!(message.contains("tile (1, 0) alone needs 18"), "{message}");
+}
+
+#[test]
+fn records_that_contradict_the_tables_are_refused() {
+    struct Wrong(RawRecord);
+    impl Capturer for Wrong {
+        type Error = RecordError;
+        fn record_capacity(&self) -> u64 {
+            1
+        }
+        fn capture(&mut self, _: Region, sink: &mut Sink<'_>) -> Result<Captured, RecordError> {
+            let records = RawRecords {
+                quads: &[self.0],
+                depths: &[],
+            };
+            sink(records).map(|()| Captured::Complete)
+        }
+    }
+    let record = |draw, primitive, group| RawRecord {
+        header: RawRecord::pack(0, 0, 15, group),
+        primitive,
+        draw,
+        ..RawRecord::default()
+    };
+    let cases = [
+        (record(2, 0, 0), "a draw below 2, found 2"),
+        (record(0, 0, 3), "a group below 1 of draw 0, found 3"),
+        (record(0, 7, 0), "primitive"),
+    ];
+    for (record, expected) in cases {
+        let tables = tables();
+        let mut writer = TextraceWriter::in_memory(&tables).unwrap();
+        let mut recorder = Recorder::new(&tables, vec![false, true]);
+        let refused = recorder.record_pass(&mut Wrong(record), 0, &mut writer);
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
+}
