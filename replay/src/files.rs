@@ -1,5 +1,6 @@
 //! Output files appear whole or not at all, in folders that are made for them.
 
+use anyhow::Context;
 use formats::container::AtomicFile;
 use shell::Output;
 use std::path::Path;
@@ -11,7 +12,7 @@ use std::path::Path;
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     make_folder(path)
         .and_then(|()| AtomicFile::write_whole(path, bytes))
-        .map_err(|e| anyhow::anyhow!("{}: cannot write: {e}", path.display()))
+        .with_context(|| format!("{}: cannot write", path.display()))
 }
 
 fn make_folder(path: &Path) -> std::io::Result<()> {

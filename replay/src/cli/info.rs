@@ -1,12 +1,13 @@
 //! `replay info`: what a trace holds.
 
-use super::run::plain;
 use super::tiles::{ray_tiles, tiles};
+use crate::report::columns::{Column, Show};
+use crate::report::table::Table;
 use anyhow::Result;
 use formats::Trace;
 use formats::container::Container;
 use formats::raytrace::{RayKind, RayTile, Raytrace, RaytraceTables};
-use formats::textrace::{Encoding, Textrace, TraceMeta};
+use formats::textrace::{Encoding, Pass, Textrace, TraceMeta};
 use formats::texture::Texture;
 use formats::view::Eye;
 use rayon::prelude::*;
@@ -191,10 +192,10 @@ fn texture_text(trace: &Textrace, value: &Value) -> String {
     let totals = &value["totals"];
     let mut text = heading(trace.container(), &trace.tables().meta);
     text += &pass_table(trace);
-    text += "\n\n";
+    text += "\n";
     text += &texture_table(&trace.tables().textures);
     text += &format!(
-        "\n\n{} draws, {} samplers; {} records in {} tile bytes, {:.2} bytes a record\n",
+        "\n{} draws, {} samplers; {} records in {} tile bytes, {:.2} bytes a record\n",
         trace.tables().draws.len(),
         trace.tables().samplers.len(),
         totals["records"],
@@ -204,42 +205,56 @@ fn texture_text(trace: &Textrace, value: &Value) -> String {
     text
 }
 
+/// A column of counts.
+fn count<'a, R>(name: &'static str, value: impl Fn(&R) -> u64 + 'a) -> Column<'a, R> {
+    Column::new(name, name, "", Show::Whole, value)
+}
+
 fn pass_table(trace: &Textrace) -> String {
-    let mut table = plain(&[
-        "pass", "frame", "kind", "eye", "px", "tiles", "records", "runs", "bytes",
-    ]);
-    for (index, pass) in trace.tables().passes.iter().enumerate() {
-        let of_pass = (0..pass.tile_count() as usize).map(|tile| (index, tile));
-        let counts = Counts::of(trace, of_pass);
-        table.add_row([
-            index.to_string(),
-            pass.frame.to_string(),
-            format!("{:?}", pass.kind).to_lowercase(),
-            pass.eye
-                .map_or("both".to_owned(), |eye| format!("{eye:?}").to_lowercase()),
-            format!("{}x{}", pass.size_px[0], pass.size_px[1]),
-            format!("{} of {}", counts.touched_tiles, counts.tiles),
-            counts.records.to_string(),
-            counts.runs.to_string(),
-            counts.bytes.to_string(),
-        ]);
-    }
-    table.to_string()
+    let passes = trace.tables().passes.iter().enumerate();
+    let rows: Vec<(usize, &Pass, Counts)> = passes
+        .map(|(index, pass)| {
+            let of_pass = (0..pass.tile_count() as usize).map(|tile| (index, tile));
+            (index, pass, Counts::of(trace, of_pass))
+        })
+        .collect();
+    type PassRow<'a> = (usize, &'a Pass, Counts);
+    let columns = [
+        count("pass", |r: &PassRow| r.0 as u64),
+        count("frame", |r: &PassRow| r.1.frame.into()),
+        Column::text("kind", "kind", |r: &PassRow| lower(&r.1.kind)),
+        Column::text("eye", "eye", |r: &PassRow| {
+            r.1.eye.map_or("both".to_owned(), |eye| lower(&eye))
+        }),
+        Column::text("px", "px", |r: &PassRow| {
+            format!("{}x{}", r.1.size_px[0], r.1.size_px[1])
+        }),
+        Column::text("tiles", "tiles", |r: &PassRow| {
+            format!("{} of {}", r.2.touched_tiles, r.2.tiles)
+        }),
+        count("records", |r: &PassRow| r.2.records),
+        count("runs", |r: &PassRow| r.2.runs),
+        count("bytes", |r: &PassRow| r.2.bytes),
+    ];
+    Table::new(&columns, &rows).text()
 }
 
 fn texture_table(textures: &[Texture]) -> String {
-    let mut table = plain(&["texture", "name", "size", "levels", "layers", "format"]);
-    for (index, texture) in textures.iter().enumerate() {
-        table.add_row([
-            index.to_string(),
-            texture.name.clone(),
-            format!("{}x{}", texture.size[0], texture.size[1]),
-            texture.levels.to_string(),
-            texture.layers.to_string(),
-            format!("{:?} {:?}", texture.format, texture.color_space).to_lowercase(),
-        ]);
-    }
-    table.to_string()
+    let rows: Vec<(usize, &Texture)> = textures.iter().enumerate().collect();
+    type TextureRow<'a> = (usize, &'a Texture);
+    let columns = [
+        count("texture", |r: &TextureRow| r.0 as u64),
+        Column::text("name", "name", |r: &TextureRow| r.1.name.clone()),
+        Column::text("size", "size", |r: &TextureRow| {
+            format!("{}x{}", r.1.size[0], r.1.size[1])
+        }),
+        count("levels", |r: &TextureRow| r.1.levels.into()),
+        count("layers", |r: &TextureRow| r.1.layers.into()),
+        Column::text("format", "format", |r: &TextureRow| {
+            format!("{} {}", lower(&r.1.format), lower(&r.1.color_space))
+        }),
+    ];
+    Table::new(&columns, &rows).text()
 }
 
 /// Rays of one eye and what they cost.
@@ -305,7 +320,12 @@ impl RayCounts {
 }
 
 fn kind_name(kind: RayKind) -> String {
-    format!("{kind:?}").to_lowercase()
+    lower(&kind)
+}
+
+/// A variant's name as the tables write it.
+fn lower(variant: &impl std::fmt::Debug) -> String {
+    format!("{variant:?}").to_lowercase()
 }
 
 /// Counts of the left and of the right eye; every tile is decoded.
@@ -357,24 +377,34 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
             "not listed"
         },
     );
-    let mut headings = vec!["eye".to_owned(), "samples".to_owned(), "hits".to_owned()];
-    headings.extend(RAY_KINDS.map(kind_name));
-    headings.extend(["steps a ray".to_owned(), "tests a ray".to_owned()]);
-    let mut table = plain(&headings.iter().map(String::as_str).collect::<Vec<_>>());
-    for (eye, counts) in ["left", "right"].into_iter().zip(ray_counts(trace)?) {
-        let rays = counts.rays.iter().sum::<u64>().max(1) as f64;
-        let mut row = vec![
-            eye.to_owned(),
-            counts.samples.to_string(),
-            counts.hits.to_string(),
-        ];
-        row.extend(counts.rays.map(|n| n.to_string()));
-        row.push(format!("{:.2}", counts.steps as f64 / rays));
-        row.push(format!("{:.2}", counts.triangle_tests as f64 / rays));
-        table.add_row(row);
+    let [left, right] = ray_counts(trace)?;
+    type EyeRow = (&'static str, RayCounts);
+    let mut columns = vec![
+        Column::text("eye", "eye", |r: &EyeRow| r.0),
+        count("samples", |r: &EyeRow| r.1.samples),
+        count("hits", |r: &EyeRow| r.1.hits),
+    ];
+    for kind in RAY_KINDS {
+        let rays = move |r: &EyeRow| r.1.rays[kind as usize];
+        columns.push(Column::new(
+            kind_name(kind),
+            kind_name(kind),
+            "",
+            Show::Whole,
+            rays,
+        ));
     }
+    for (name, of) in [
+        ("steps a ray", (|c| c.steps) as fn(&RayCounts) -> u64),
+        ("tests a ray", |c| c.triangle_tests),
+    ] {
+        columns.push(Column::real(name, name, "", 2, move |r: &EyeRow| {
+            of(&r.1) as f64 / r.1.rays.iter().sum::<u64>().max(1) as f64
+        }));
+    }
+    let table = Table::new(&columns, &[("left", left), ("right", right)]).text();
     text += &format!(
-        "{table}\n\n{} materials, {} lights, {} triangles hit\n",
+        "{table}\n{} materials, {} lights, {} triangles hit\n",
         materials.len(),
         lights.len(),
         triangles.len(),

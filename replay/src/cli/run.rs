@@ -76,15 +76,3 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     })?;
     Ok(ExitCode::SUCCESS)
 }
-
-/// A table without lines whose columns but the first are numbers.
-pub(super) fn plain(header: &[&str]) -> comfy_table::Table {
-    let mut table = comfy_table::Table::new();
-    table
-        .load_style(comfy_table::presets::NOTHING)
-        .set_header(header);
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Right);
-    }
-    table
-}

@@ -103,46 +103,6 @@ pub fn spread(wishes: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
     placed
 }
 
-/// The round step (1, 2, 2.5 or 5 times a power of ten) that cuts `span` into about `parts`.
-#[must_use]
-pub fn nice_step(span: f64, parts: u32) -> f64 {
-    if !(span.is_finite() && span > 0.0) {
-        return 1.0;
-    }
-    let raw = span / f64::from(parts.max(1));
-    let decade = 10f64.powf(raw.log10().floor());
-    [1.0, 2.0, 2.5, 5.0, 10.0]
-        .into_iter()
-        .map(|m| m * decade)
-        .find(|&step| step >= raw * 0.999)
-        .unwrap_or(10.0 * decade)
-}
-
-/// Multiples of `step` from `low` to `high`.
-#[must_use]
-pub fn ticks(low: f64, high: f64, step: f64) -> Vec<f64> {
-    let first = (low / step - 1e-9).ceil() as i64;
-    let last = (high / step + 1e-9).floor() as i64;
-    (first..=last.max(first).min(first + 200))
-        .map(|i| i as f64 * step)
-        .collect()
-}
-
-/// Formats a number for a tick of the given step: just enough decimals, thousands apart.
-#[must_use]
-pub fn tick_label(value: f64, step: f64) -> String {
-    let mut decimals = 0;
-    let mut scaled = step.abs();
-    while decimals < 6 && (scaled - scaled.round()).abs() > 1e-6 * scaled.max(1.0) {
-        scaled *= 10.0;
-        decimals += 1;
-    }
-    group_thousands(&format!(
-        "{:.decimals$}",
-        if value == 0.0 { 0.0 } else { value }
-    ))
-}
-
 /// Puts a thin space between groups of three digits before the point.
 #[must_use]
 pub fn group_thousands(number: &str) -> String {
@@ -194,15 +154,6 @@ mod tests {
     #[test]
     fn spread_centres_a_cluster_on_its_wishes() {
         assert_eq!(spread(&[50.0, 50.0], 10.0, 0.0, 100.0), [45.0, 55.0]);
-    }
-
-    #[test]
-    fn ticks_are_round_and_cover_the_range() {
-        let step = nice_step(12.3, 5);
-        assert_eq!(step, 2.5);
-        assert_eq!(ticks(0.0, 12.3, step), [0.0, 2.5, 5.0, 7.5, 10.0]);
-        assert_eq!(tick_label(7.5, step), "7.5");
-        assert_eq!(tick_label(0.2, 0.05), "0.20");
     }
 
     #[test]

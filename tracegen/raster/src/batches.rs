@@ -55,6 +55,7 @@ mod tests {
             mode,
             transform: Affine3A::IDENTITY,
             mirrored: mesh == 9,
+            colored: false,
             first_primitive: 0,
             bounds: [Vec3::ZERO; 2],
         };

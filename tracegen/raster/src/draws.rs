@@ -56,6 +56,8 @@ pub struct DrawCall {
     pub mirrored: bool,
     /// Number of its first primitive.
     pub first_primitive: u32,
+    /// Its vertices have colours.
+    pub colored: bool,
     /// World-space bounds of the instance.
     pub bounds: [Vec3; 2],
 }
@@ -121,6 +123,7 @@ impl DrawList {
                     transform: instance.transform,
                     mirrored: instance.mirrored(),
                     first_primitive: next_primitive,
+                    colored: !mesh.colors.is_empty(),
                     bounds: bounds(&mesh.positions, &instance.transform),
                 });
                 next_primitive = u32::try_from(mesh.triangles())

@@ -100,6 +100,8 @@ pub(crate) struct PipelineKey {
     pub leaders: u32,
     /// Shadow cascades.
     pub cascades: u32,
+    /// Vertices have colours.
+    pub colored: bool,
     /// Both faces are drawn.
     pub double_sided: bool,
     /// Front faces wind clockwise.
@@ -129,6 +131,7 @@ impl PipelineKey {
             },
             leaders: if capture { material.leaders } else { 0 },
             cascades: if lit { cascades } else { 0 },
+            colored: role != Role::Shadow && call.colored,
             // Shadow maps hold both faces: walls that are modelled from one side block light.
             double_sided: role.casts() || material.double_sided,
             mirrored: !role.casts() && call.mirrored,

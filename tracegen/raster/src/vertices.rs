@@ -53,6 +53,23 @@ pub(crate) fn pack(mesh: &Mesh) -> Vec<VertexData> {
         .collect()
 }
 
+/// Colour of a vertex, 16 bits a channel.
+pub(crate) type ColorData = [u16; 4];
+
+/// Bytes between two colours.
+pub(crate) const COLOR_STRIDE: u64 = size_of::<ColorData>() as u64;
+
+/// The mesh's vertex colours; none where it has none.
+pub(crate) fn pack_colors(mesh: &Mesh) -> Vec<ColorData> {
+    if mesh.colors.is_empty() {
+        return Vec::new();
+    }
+    let color = |i| mesh.colors.get(i).copied().unwrap_or(Vec4::ONE);
+    (0..mesh.positions.len())
+        .map(|i| color(i).to_array().map(|c| (c * 65535.0).round() as u16))
+        .collect()
+}
+
 /// One row a draw, at least one.
 pub(crate) fn instances(draws: &DrawList) -> Vec<InstanceData> {
     let mut rows: Vec<InstanceData> = (0_u32..)

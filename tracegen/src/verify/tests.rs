@@ -24,6 +24,8 @@ struct Captured {
     /// Tiles by pass.
     tiles: Vec<Vec<Tile>>,
     pictures_match: bool,
+    /// RGBA8 by pass.
+    pictures: Vec<Vec<u8>>,
     killed: u64,
     work: Work,
 }
@@ -128,6 +130,7 @@ fn try_capture(
             Some(plain) => plain?.0 == pictures,
             None => true,
         },
+        pictures,
         killed: counts.masked_lanes_killed,
         work: Work {
             draws: after.draws - before.draws,
@@ -556,4 +559,46 @@ fn a_built_in_scene_agrees_with_the_reference() {
     assert!(a.coverage_iou() >= 0.999, "{a:?}");
     assert!(a.mean_uv_error_texels < 0.01, "{a:?}");
     assert!((a.level_differs as f64) < 0.002 * a.both as f64, "{a:?}");
+}
+
+#[test]
+fn vertex_colours_show_and_mask_as_the_same_base_colour_does() {
+    let quad = |color: Option<Vec4>| Mesh {
+        positions: [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]
+            .map(|[x, y]| Vec3::new(x, y, -6.0))
+            .to_vec(),
+        normals: vec![Vec3::Z; 4],
+        uv0: [[0.0, 4.0], [4.0, 4.0], [4.0, 0.0], [0.0, 0.0]]
+            .map(Vec2::from)
+            .to_vec(),
+        colors: color.map_or_else(Vec::new, |color| vec![color; 4]),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Mesh::default()
+    };
+    let color = Vec4::new(0.75, 0.25, 0.5, 0.5);
+    // A cutoff that an opaque texel passes with alpha 1 and not with alpha 0.5.
+    for alpha in [AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Mask(0.75)] {
+        let material = |base_color| Material {
+            base_color,
+            ..textured(alpha, false)
+        };
+        let shot = |vertex: Option<Vec4>, base_color| {
+            let (meshes, materials) = (vec![quad(vertex)], vec![material(base_color)]);
+            let scene = Scene {
+                sky: Vec3::ONE,
+                ..scene(meshes, materials, vec![checker()])
+            };
+            capture(&scene, SIZE_PX, 0, BUDGET)
+        };
+        let (vertex, base) = (shot(Some(color), Vec4::ONE), shot(None, color));
+        let (white, plain) = (shot(Some(Vec4::ONE), Vec4::ONE), shot(None, Vec4::ONE));
+        for (a, b) in [(&vertex, &base), (&white, &plain)] {
+            assert!(a.pictures_match && b.pictures_match);
+            let differences = a.pictures.concat().into_iter().zip(b.pictures.concat());
+            let largest = differences.map(|(a, b)| a.abs_diff(b)).max();
+            assert!(largest <= Some(1), "{alpha:?}: {largest:?}");
+            assert_eq!(a.tiles, b.tiles, "{alpha:?}");
+        }
+        assert!(vertex.pictures != plain.pictures, "{alpha:?}");
+    }
 }

@@ -3,8 +3,6 @@
 //! A page is a title, a few facts and a list of [`Section`]s; every subcommand that writes a page
 //! makes sections and hands them to [`page`].
 
-pub mod table;
-
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Inline style sheet; it maps the plots' inks by attribute so that they follow the colour scheme.

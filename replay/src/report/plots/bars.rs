@@ -1,10 +1,10 @@
 //! Grouped bars with optional reference marks (a paper's values) over them.
 
-use super::{
-    Anchor, LegendEntry, PlotError, Scale, SeriesStyle, Symbol, draw, fill, heading,
-    horizontal_grid, legend, legend_width_px, stroke, text, wrap,
-};
+use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::{PlotError, SeriesStyle};
 use crate::report::theme;
+use plotters::prelude::{Color, PathElement, Rectangle};
+use plotters::style::text_anchor::HPos;
 
 /// One group of bars: a scene, a cache configuration.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,10 +38,12 @@ pub struct BarChart {
     pub decimals: Option<usize>,
 }
 
-const LEFT_PX: f64 = 58.0;
-const TOP_PX: f64 = 72.0;
-const PLOT_HEIGHT_PX: f64 = 210.0;
-const RIGHT_PX: f64 = 14.0;
+const LEFT_PX: u32 = 58;
+const TOP_PX: u32 = 66;
+const PLOT_HEIGHT_PX: f64 = 216.0;
+/// The highest value keeps this share of the height free for its number.
+const HEADROOM: f64 = 1.08;
+const LINE_HEIGHT_PX: i32 = 15;
 
 impl BarChart {
     /// The chart as SVG.
@@ -49,159 +51,114 @@ impl BarChart {
     /// # Errors
     /// A value that is not finite or negative, or a group whose values do not match the series.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let fail = |problem: String| PlotError {
+        self.check().map_err(|problem| PlotError {
             title: self.title.clone(),
             problem,
-        };
-        for group in &self.groups {
-            if group.values.len() != self.series.len() {
-                return Err(fail(format!(
-                    "group `{}` has {} values for {} series",
-                    group.label,
-                    group.values.len(),
-                    self.series.len()
-                )));
-            }
-            if let Some(bad) = group
-                .values
-                .iter()
-                .chain(&group.marks)
-                .flatten()
-                .find(|v| !(v.is_finite() && **v >= 0.0))
-            {
-                return Err(fail(format!("group `{}` holds {bad}", group.label)));
-            }
-        }
-
-        let per_group = self.series.len().max(1) as f64;
+        })?;
+        let bars = self.series.len().max(1) as f64;
+        let groups = self.groups.len().max(1) as f64;
         let bar_px = self.bar_width_px();
-        let gap_px = (bar_px * 0.8).max(14.0);
-        let group_px = (bar_px * per_group + gap_px).max(self.widest_word_px() + 10.0);
-        let plot_width = (group_px * self.groups.len() as f64).max(320.0);
-        let group_px = plot_width / self.groups.len().max(1) as f64;
-        let label_lines = self
+        let group_px = (bar_px * bars + (bar_px * 0.8).max(14.0))
+            .max(self.widest_word_px() + 10.0)
+            .max(320.0 / groups);
+        let names: Vec<Vec<String>> = self
             .groups
             .iter()
-            .map(|g| wrap(&g.label, group_px - 6.0, theme::LABEL_PX).len())
-            .max()
-            .unwrap_or(1);
-        let legend_width: f64 = legend_width_px(&self.legend()) + LEFT_PX + RIGHT_PX;
-        let heading_width = theme::text_width_px(&self.title, theme::TITLE_PX)
-            .max(theme::text_width_px(&self.value_label, theme::LABEL_PX))
-            + 16.0;
-        let width = (LEFT_PX + plot_width + RIGHT_PX)
-            .max(legend_width)
-            .max(heading_width);
-        let bottom = TOP_PX + PLOT_HEIGHT_PX;
-        let axis_title = if self.group_label.is_empty() {
-            0.0
-        } else {
-            18.0
-        };
-        let height = bottom + 10.0 + 15.0 * label_lines as f64 + axis_title;
-
-        let top_value = self
+            .map(|g| wrap(&g.label, group_px - 6.0, theme::LABEL_PX))
+            .collect();
+        let name_lines = names.iter().map(Vec::len).max().unwrap_or(1) as u32;
+        let axis_title_px = if self.group_label.is_empty() { 0 } else { 18 };
+        let largest = self
             .groups
             .iter()
             .flat_map(|g| g.values.iter().chain(&g.marks).flatten().copied())
             .chain(self.reference)
             .fold(0.0, f64::max);
-        let top_value = if top_value > 0.0 { top_value } else { 1.0 };
-        let step = theme::nice_step(top_value * 1.02, 5);
-        let high = (top_value * 1.02 / step).ceil() * step;
-        let scale = Scale::linear(0.0, high, bottom, TOP_PX);
-        let at: Vec<(f64, String)> = theme::ticks(0.0, high, step)
-            .into_iter()
-            .map(|v| (v, theme::tick_label(v, step)))
-            .collect();
+        let values = 0.0..HEADROOM * if largest > 0.0 { largest } else { 1.0 };
+        let frame = Frame {
+            title: &self.title,
+            value_label: &self.value_label,
+            legend: self.legend(),
+            plot_px: ((group_px * groups).floor(), PLOT_HEIGHT_PX),
+            around_px: [
+                TOP_PX,
+                14,
+                10 + LINE_HEIGHT_PX as u32 * name_lines + axis_title_px,
+                LEFT_PX,
+            ],
+        };
+        frame.draw(|root, mut builder| {
+            // Group number `g` is from g to g + 1.
+            let mut chart = builder.build_cartesian_2d(0.0..groups, values.clone())?;
+            let mut mesh = chart.configure_mesh();
+            themed(&mut mesh)
+                .disable_x_mesh()
+                .x_labels(0)
+                .x_desc(&self.group_label)
+                .y_label_formatter(&tick_format(&values))
+                .draw()?;
+            let number = text_style(theme::TICK_PX, theme::INK, HPos::Center);
+            let name = text_style(theme::LABEL_PX, theme::INK, HPos::Center);
+            let bar = bar_px / group_px;
+            for (g, (group, lines)) in self.groups.iter().zip(&names).enumerate() {
+                let middle = g as f64 + 0.5;
+                for (s, (value, style)) in group.values.iter().zip(&self.series).enumerate() {
+                    let Some(value) = *value else { continue };
+                    let left = middle + bar * (s as f64 - bars / 2.0);
+                    let right = left + bar;
+                    let corners = [(left, 0.0), (right, value)];
+                    let mut rectangle = Rectangle::new(corners, style.color.filled());
+                    rectangle.set_margin(0, 0, 1, 1);
+                    chart.plotting_area().draw(&rectangle)?;
+                    let mark = group.marks.get(s).copied().flatten();
+                    if let Some(mark) = mark {
+                        let style = theme::INK.stroke_width(theme::LINE_PX);
+                        let line = PathElement::new([(left, mark), (right, mark)], style);
+                        chart.plotting_area().draw(&line)?;
+                    }
+                    if let Some(decimals) = self.decimals {
+                        let (x, top) = chart.backend_coord(&(left + bar / 2.0, value));
+                        let strokes = [self.reference, mark]
+                            .map(|v| v.map(|v| chart.backend_coord(&(left, v)).1));
+                        let at = (x, label_y(top, strokes));
+                        root.draw_text(&format!("{value:.decimals$}"), &number, at)?;
+                    }
+                }
+                for (i, line) in (0..).zip(lines) {
+                    let (x, y) = chart.backend_coord(&(middle, 0.0));
+                    root.draw_text(line, &name, (x, y + 14 + LINE_HEIGHT_PX * i))?;
+                }
+            }
+            if let Some(reference) = self.reference {
+                let line = [(0.0, reference), (groups, reference)];
+                chart
+                    .plotting_area()
+                    .draw(&PathElement::new(line, theme::AXIS))?;
+            }
+            Ok(())
+        })
+    }
 
-        draw(
-            &self.title,
-            (width.ceil() as u32, height.ceil() as u32),
-            |area| {
-                heading(area, &self.title, &self.value_label)?;
-                legend(area, (LEFT_PX, 53.0), &self.legend())?;
-                horizontal_grid(
-                    area,
-                    &scale,
-                    &at,
-                    (LEFT_PX, LEFT_PX + plot_width),
-                    Some(0.0),
-                )?;
-                for (g, group) in self.groups.iter().enumerate() {
-                    let centre = LEFT_PX + group_px * (g as f64 + 0.5);
-                    let first = centre - bar_px * per_group / 2.0;
-                    for (s, (value, style)) in group.values.iter().zip(&self.series).enumerate() {
-                        let x = first + bar_px * s as f64;
-                        let Some(value) = *value else { continue };
-                        fill(
-                            area,
-                            (x + 1.0, scale.at(value)),
-                            (x + bar_px - 1.0, bottom),
-                            style.color,
-                        )?;
-                        let mark = group.marks.get(s).copied().flatten();
-                        if let Some(mark) = mark {
-                            let y = scale.at(mark);
-                            stroke(
-                                area,
-                                &[(x - 1.0, y), (x + bar_px, y)],
-                                theme::INK,
-                                theme::LINE_PX,
-                            )?;
-                        }
-                        if let Some(decimals) = self.decimals {
-                            let label = format!("{value:.decimals$}");
-                            let lines = [self.reference, mark];
-                            let y = label_y(scale.at(value), lines.map(|v| v.map(|v| scale.at(v))));
-                            text(
-                                area,
-                                (x + bar_px / 2.0, y),
-                                &label,
-                                theme::TICK_PX,
-                                theme::INK,
-                                Anchor::Middle,
-                            )?;
-                        }
-                    }
-                    for (i, line) in wrap(&group.label, group_px - 6.0, theme::LABEL_PX)
-                        .iter()
-                        .enumerate()
-                    {
-                        let y = bottom + 14.0 + 15.0 * i as f64;
-                        text(
-                            area,
-                            (centre, y),
-                            line,
-                            theme::LABEL_PX,
-                            theme::INK,
-                            Anchor::Middle,
-                        )?;
-                    }
-                }
-                if let Some(reference) = self.reference {
-                    let y = scale.at(reference);
-                    stroke(
-                        area,
-                        &[(LEFT_PX, y), (LEFT_PX + plot_width, y)],
-                        theme::AXIS,
-                        1,
-                    )?;
-                }
-                if !self.group_label.is_empty() {
-                    let at = (LEFT_PX + plot_width / 2.0, height - 9.0);
-                    text(
-                        area,
-                        at,
-                        &self.group_label,
-                        theme::LABEL_PX,
-                        theme::MUTED,
-                        Anchor::Middle,
-                    )?;
-                }
-                Ok(())
-            },
-        )
+    fn check(&self) -> Result<(), String> {
+        for BarGroup {
+            label,
+            values,
+            marks,
+        } in &self.groups
+        {
+            if values.len() != self.series.len() {
+                return Err(format!(
+                    "group `{label}` has {} values for {} series",
+                    values.len(),
+                    self.series.len()
+                ));
+            }
+            let mut numbers = values.iter().chain(marks).flatten();
+            if let Some(bad) = numbers.find(|v| !(v.is_finite() && **v >= 0.0)) {
+                return Err(format!("group `{label}` holds {bad}"));
+            }
+        }
+        Ok(())
     }
 
     /// Group names break at spaces, so that neighbours cannot touch when a group has this width.
@@ -242,14 +199,31 @@ impl BarChart {
     }
 }
 
-/// Middle of the number over a bar: above the lines that would strike it through.
-fn label_y(bar_top: f64, lines: [Option<f64>; 2]) -> f64 {
-    let mut lines: Vec<f64> = lines.into_iter().flatten().collect();
+/// Breaks a label at spaces, hyphens or slashes into lines no wider than `width_px`.
+fn wrap(label: &str, width_px: f64, size_px: u32) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    let mut line = String::new();
+    for word in label.split_inclusive([' ', '-', '/']) {
+        let longer = format!("{line}{word}");
+        if !line.is_empty() && theme::text_width_px(longer.trim_end(), size_px) > width_px {
+            lines.push(line.trim_end().to_owned());
+            line = word.to_owned();
+        } else {
+            line = longer;
+        }
+    }
+    lines.push(line.trim_end().to_owned());
+    lines
+}
+
+/// Middle of the number over a bar: above the lines that would strike it through. All in pixels.
+fn label_y(bar_top: i32, lines: [Option<i32>; 2]) -> i32 {
+    let mut lines: Vec<i32> = lines.into_iter().flatten().collect();
     // From the lowest up: a number moved off one line may come to lie on the next.
-    lines.sort_by(|a, b| b.total_cmp(a));
-    lines.into_iter().fold(bar_top - 8.0, |y, line| {
-        if (line - y).abs() < 8.0 {
-            line.min(bar_top) - 8.0
+    lines.sort_by(|a, b| b.cmp(a));
+    lines.into_iter().fold(bar_top - 8, |y, line| {
+        if (line - y).abs() < 8 {
+            line.min(bar_top) - 8
         } else {
             y
         }
@@ -258,6 +232,7 @@ fn label_y(bar_top: f64, lines: [Option<f64>; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::text_at;
     use super::*;
 
     fn chart() -> BarChart {
@@ -287,6 +262,7 @@ mod tests {
         let svg = chart().svg().unwrap();
         assert!(svg.contains("external traffic, MB per frame"));
         assert!(svg.contains("L1/L2, KiB"));
+        assert!(svg.contains("\n10\n"), "a tick of the value axis");
     }
 
     #[test]
@@ -301,19 +277,11 @@ mod tests {
 
     #[test]
     fn no_line_strikes_a_number_through() {
-        assert_eq!(label_y(100.0, [None, None]), 92.0);
-        assert_eq!(
-            label_y(100.0, [Some(110.0), None]),
-            92.0,
-            "a line below the top"
-        );
-        assert_eq!(label_y(100.0, [Some(94.0), None]), 86.0);
-        assert_eq!(
-            label_y(100.0, [Some(82.0), Some(94.0)]),
-            74.0,
-            "both in turn"
-        );
-        assert_eq!(label_y(100.0, [Some(50.0), None]), 92.0, "a line far above");
+        assert_eq!(label_y(100, [None, None]), 92);
+        assert_eq!(label_y(100, [Some(110), None]), 92, "a line below the top");
+        assert_eq!(label_y(100, [Some(94), None]), 86);
+        assert_eq!(label_y(100, [Some(82), Some(94)]), 74, "both in turn");
+        assert_eq!(label_y(100, [Some(50), None]), 92, "a line far above");
     }
 
     #[test]
@@ -324,11 +292,7 @@ mod tests {
         second.label = "sampling.helper_lanes = true".into();
         long.groups.push(second);
         let svg = long.svg().unwrap();
-        let centre = |word: &str| -> f64 {
-            let end = svg.find(&format!("\n{word}\n")).unwrap();
-            let x = svg[..end].rfind(" x=\"").unwrap() + 4;
-            svg[x..].split('"').next().unwrap().parse().unwrap()
-        };
+        let centre = |word: &str| text_at(&svg, word).0;
         let apart = centre("sampling.helper_lanes =") - centre("layout.base_align_bytes =");
         let widest = theme::text_width_px("layout.base_align_bytes =", theme::LABEL_PX);
         assert!(apart >= widest, "{apart} < {widest}");

@@ -1,11 +1,10 @@
 //! A function of two miss rates as contour lines, with measured points over it.
 
-use super::{
-    Anchor, LegendEntry, PlotError, Scale, SeriesStyle, Symbol, dot, draw, heading,
-    horizontal_grid, legend, legend_width_px, stroke, text,
-};
+use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use plotters::prelude::Color;
+use plotters::prelude::{Circle, Color, IntoLogRange, PathElement};
+use plotters::style::text_anchor::HPos;
 
 /// Points of one series.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,9 +35,9 @@ pub struct ContourChart<'a> {
     pub series: Vec<PointSeries>,
 }
 
-const LEFT_PX: f64 = 58.0;
-const TOP_PX: f64 = 92.0;
-const SIZE_PX: (f64, f64) = (430.0, 260.0);
+const LEFT_PX: u32 = 58;
+const TOP_PX: u32 = 92;
+const PLOT_PX: (f64, f64) = (430.0, 260.0);
 
 impl ContourChart<'_> {
     /// The chart as SVG.
@@ -66,88 +65,64 @@ impl ContourChart<'_> {
                 )));
             }
         }
-        let (right, bottom) = (LEFT_PX + SIZE_PX.0, TOP_PX + SIZE_PX.1);
-        let x = Scale::log(low, high, LEFT_PX, right);
-        let y = Scale::linear(0.0, 100.0, bottom, TOP_PX);
-        let ticks: Vec<(f64, String)> = theme::ticks(0.0, 100.0, 20.0)
-            .into_iter()
-            .map(|v| (v, theme::tick_label(v, 20.0)))
-            .collect();
-        let width = (right + 26.0).max(LEFT_PX + legend_width_px(&self.legend()));
-        let size = (width.ceil() as u32, (bottom + 44.0) as u32);
-        draw(&self.title, size, |area| {
-            heading(area, &self.title, &self.y_label)?;
-            legend(area, (LEFT_PX, 54.0), &self.legend())?;
-            horizontal_grid(area, &y, &ticks, (LEFT_PX, right), Some(0.0))?;
-            let mut tick = low.log2().ceil().exp2();
-            while tick <= high * 1.0001 {
-                let at = x.at(tick);
-                stroke(area, &[(at, bottom), (at, bottom + 4.0)], theme::AXIS, 1)?;
-                let label = theme::tick_label(tick, tick.min(1.0));
-                text(
-                    area,
-                    (at, bottom + 13.0),
-                    &label,
-                    theme::TICK_PX,
-                    theme::MUTED,
-                    Anchor::Middle,
-                )?;
-                tick *= 2.0;
-            }
-            let below = (LEFT_PX + SIZE_PX.0 / 2.0, bottom + 33.0);
-            text(
-                area,
-                below,
-                &self.x_label,
-                theme::LABEL_PX,
-                theme::MUTED,
-                Anchor::Middle,
-            )?;
-            self.contours(area, &x, &y)?;
-            for series in &self.series {
-                let style = if series.hollow {
-                    series.style.color.stroke_width(1)
-                } else {
-                    series.style.color.filled()
-                };
-                for &(px, py) in &series.points {
-                    dot(area, (x.at(px.clamp(low, high)), y.at(py)), style)?;
+        let legend = self.series.iter().map(|s| LegendEntry {
+            name: &s.style.name,
+            color: s.style.color,
+            symbol: if s.hollow { Symbol::Ring } else { Symbol::Dot },
+        });
+        let frame = Frame {
+            title: &self.title,
+            value_label: &self.y_label,
+            legend: legend.collect(),
+            plot_px: PLOT_PX,
+            around_px: [TOP_PX, 26, AXIS_PX, LEFT_PX],
+        };
+        frame.draw(|root, mut builder| {
+            let x = (low..high).log_scale().base(2.0);
+            let mut chart = builder.build_cartesian_2d(x, 0.0..100.0)?;
+            themed(&mut chart.configure_mesh())
+                .disable_x_mesh()
+                .x_desc(&self.x_label)
+                .x_labels(12)
+                .x_label_formatter(&|x| x.to_string())
+                .y_label_formatter(&tick_format(&(0.0..100.0)))
+                .draw()?;
+            let (levels, unit) = &self.levels;
+            let mut ends = Vec::new();
+            for &level in levels {
+                let line: Vec<(f64, f64)> = (0..=96)
+                    .map(|i| low * (high / low).powf(f64::from(i) / 96.0))
+                    .filter_map(|at| Some((at, self.solve(at, level)?)))
+                    .collect();
+                if let Some(first) = line.first() {
+                    ends.push((level, f64::from(chart.backend_coord(first).0)));
+                    chart
+                        .plotting_area()
+                        .draw(&PathElement::new(line, theme::AXIS))?;
                 }
+            }
+            // Lines end at the top edge (from there on the level is out of reach); names stand
+            // above.
+            let wishes: Vec<f64> = ends.iter().map(|(_, x)| *x).collect();
+            let left = f64::from(LEFT_PX);
+            let placed = theme::spread(&wishes, 34.0, left, left + PLOT_PX.0);
+            let name = text_style(theme::TICK_PX, theme::MUTED, HPos::Center);
+            for ((level, _), x) in ends.iter().zip(placed) {
+                let at = (x.round() as i32, TOP_PX as i32 - 9);
+                root.draw_text(&format!("{level}{unit}"), &name, at)?;
+            }
+            for series in &self.series {
+                let color = series.style.color;
+                let style = match series.hollow {
+                    true => color.stroke_width(1),
+                    false => color.filled(),
+                };
+                let dot =
+                    |&(x, y): &(f64, f64)| Circle::new((x.clamp(low, high), y), DOT_PX, style);
+                chart.draw_series(series.points.iter().map(dot))?;
             }
             Ok(())
         })
-    }
-
-    fn contours(&self, area: &super::Area, x: &Scale, y: &Scale) -> Result<(), String> {
-        let (low, high) = self.x_range;
-        let (levels, unit) = &self.levels;
-        let mut ends = Vec::new();
-        for &level in levels {
-            let line: Vec<(f64, f64)> = (0..=96)
-                .map(|i| low * (high / low).powf(f64::from(i) / 96.0))
-                .filter_map(|at| Some((at, self.solve(at, level)?)))
-                .map(|(at, value)| (x.at(at), y.at(value)))
-                .collect();
-            if let Some(&first) = line.first() {
-                stroke(area, &line, theme::AXIS, 1)?;
-                ends.push((level, first));
-            }
-        }
-        // Lines end at the top edge (from there on the level is out of reach); names stand above.
-        let wishes: Vec<f64> = ends.iter().map(|(_, (x, _))| *x).collect();
-        let at = theme::spread(&wishes, 34.0, LEFT_PX, LEFT_PX + SIZE_PX.0);
-        for ((level, _), at) in ends.iter().zip(at) {
-            let label = format!("{level}{unit}");
-            text(
-                area,
-                (at, TOP_PX - 9.0),
-                &label,
-                theme::TICK_PX,
-                theme::MUTED,
-                Anchor::Middle,
-            )?;
-        }
-        Ok(())
     }
 
     /// The `y` from 0 to 100 at which the surface has this level, by bisection.
@@ -165,17 +140,6 @@ impl ContourChart<'_> {
             }
         }
         Some(0.5 * (low + high))
-    }
-
-    fn legend(&self) -> Vec<LegendEntry<'_>> {
-        self.series
-            .iter()
-            .map(|s| LegendEntry {
-                name: &s.style.name,
-                color: s.style.color,
-                symbol: if s.hollow { Symbol::Ring } else { Symbol::Dot },
-            })
-            .collect()
     }
 }
 

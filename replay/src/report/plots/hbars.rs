@@ -1,7 +1,10 @@
 //! Horizontal grouped bars, for long names.
 
-use super::{Anchor, PlotError, Scale, SeriesStyle, draw, fill, heading, stroke, text};
+use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::{PlotError, SeriesStyle};
 use crate::report::theme;
+use plotters::prelude::{BindKeyPoints, Color, Rectangle};
+use plotters::style::text_anchor::HPos;
 
 /// A chart of horizontal bars, one group a row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,11 +21,11 @@ pub struct HBarChart {
     pub decimals: Option<usize>,
 }
 
-const TOP_PX: f64 = 66.0;
-const BAR_PX: f64 = 6.0;
+const TOP_PX: u32 = 66;
+const BAR_PX: i32 = 6;
 /// Bars with a number beside them are a line of text high.
-const NUMBERED_BAR_PX: f64 = 12.0;
-const ROW_GAP_PX: f64 = 7.0;
+const NUMBERED_BAR_PX: i32 = 12;
+const ROW_GAP_PX: i32 = 7;
 const PLOT_WIDTH_PX: f64 = 300.0;
 const LONGEST_NAME_CHARS: usize = 34;
 
@@ -45,96 +48,64 @@ impl HBarChart {
             }
         }
         let names: Vec<String> = self.rows.iter().map(|(name, _)| shorten(name)).collect();
-        let name_width = names
+        let name_px = names
             .iter()
             .map(|n| theme::text_width_px(n, theme::TICK_PX))
             .fold(40.0, f64::max);
-        let left = 8.0 + name_width + 8.0;
-        let bar_px = if self.decimals.is_some() {
-            NUMBERED_BAR_PX
-        } else {
-            BAR_PX
+        let (bar_px, right_px) = match self.decimals {
+            Some(_) => (NUMBERED_BAR_PX, 60),
+            None => (BAR_PX, 22),
         };
-        let row_px = bar_px * self.series.len().max(1) as f64 + ROW_GAP_PX;
-        let bottom = TOP_PX + row_px * self.rows.len() as f64;
+        let row_px = bar_px * self.series.len().max(1) as i32 + ROW_GAP_PX;
+        let height_px = row_px * names.len().max(1) as i32;
         let largest = self
             .rows
             .iter()
             .flat_map(|(_, v)| v.iter().flatten().copied())
             .fold(0.0, f64::max);
-        let largest = if largest > 0.0 { largest } else { 1.0 };
-        let step = theme::nice_step(largest, 5);
-        let high = (largest / step).ceil() * step;
-        let scale = Scale::linear(0.0, high, left, left + PLOT_WIDTH_PX);
-        let width = (left + PLOT_WIDTH_PX + if self.decimals.is_some() { 60.0 } else { 22.0 })
-            .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0);
-        draw(
-            &self.title,
-            (width.ceil() as u32, (bottom + 26.0) as u32),
-            |area| {
-                heading(area, &self.title, &self.value_label)?;
-                let mut x = left;
-                for style in &self.series {
-                    fill(area, (x, 48.0), (x + 12.0, 56.0), style.color)?;
-                    text(
-                        area,
-                        (x + 17.0, 52.0),
-                        &style.name,
-                        theme::LABEL_PX,
-                        theme::INK,
-                        Anchor::Start,
-                    )?;
-                    x += 34.0 + theme::text_width_px(&style.name, theme::LABEL_PX);
-                }
-                for value in theme::ticks(0.0, high, step) {
-                    let x = scale.at(value);
-                    let color = if value == 0.0 {
-                        theme::AXIS
-                    } else {
-                        theme::GRID
-                    };
-                    stroke(area, &[(x, TOP_PX), (x, bottom)], color, 1)?;
-                    let label = theme::tick_label(value, step);
-                    text(
-                        area,
-                        (x, bottom + 12.0),
-                        &label,
-                        theme::TICK_PX,
-                        theme::MUTED,
-                        Anchor::Middle,
-                    )?;
-                }
-                for (r, ((_, values), name)) in self.rows.iter().zip(&names).enumerate() {
-                    let top = TOP_PX + row_px * r as f64 + 3.5;
-                    let middle = top + (row_px - ROW_GAP_PX) / 2.0;
-                    text(
-                        area,
-                        (left - 8.0, middle),
-                        name,
-                        theme::TICK_PX,
-                        theme::INK,
-                        Anchor::End,
-                    )?;
-                    for (s, (value, style)) in values.iter().zip(&self.series).enumerate() {
-                        if let Some(value) = value {
-                            let y = top + bar_px * s as f64;
-                            fill(
-                                area,
-                                (left, y),
-                                (scale.at(*value), y + bar_px - 1.0),
-                                style.color,
-                            )?;
-                            if let Some(decimals) = self.decimals {
-                                let at = (scale.at(*value) + 4.0, y + bar_px / 2.0);
-                                let label = format!("{value:.decimals$}");
-                                text(area, at, &label, theme::TICK_PX, theme::INK, Anchor::Start)?;
-                            }
-                        }
+        let values = 0.0..if largest > 0.0 { largest * 1.02 } else { 1.0 };
+        let legend = self.series.iter().map(|s| LegendEntry {
+            name: &s.name,
+            color: s.color,
+            symbol: Symbol::Box,
+        });
+        let frame = Frame {
+            title: &self.title,
+            value_label: &self.value_label,
+            legend: legend.collect(),
+            plot_px: (PLOT_WIDTH_PX, f64::from(height_px)),
+            around_px: [TOP_PX, right_px, 26, name_px as u32 + 16],
+        };
+        frame.draw(|root, mut builder| {
+            // Rows are counted in pixels from the top: numbers beside bars need that place.
+            let middles: Vec<i32> = (0..names.len() as i32)
+                .map(|row| row_px * row + row_px / 2)
+                .collect();
+            let rows = (height_px..0).with_key_points(middles);
+            let mut chart = builder.build_cartesian_2d(values.clone(), rows)?;
+            let name = |y: &i32| names.get((y / row_px) as usize).cloned();
+            themed(&mut chart.configure_mesh())
+                .disable_y_mesh()
+                .y_label_style(text_style(theme::TICK_PX, theme::INK, HPos::Right))
+                .x_label_formatter(&tick_format(&values))
+                .y_label_formatter(&|y| name(y).unwrap_or_default())
+                .draw()?;
+            let number = text_style(theme::TICK_PX, theme::INK, HPos::Left);
+            for (row, (_, values)) in (0..).zip(&self.rows) {
+                for (bar, (value, style)) in (0..).zip(values.iter().zip(&self.series)) {
+                    let Some(value) = *value else { continue };
+                    let y = row_px * row + ROW_GAP_PX / 2 + bar_px * bar;
+                    let corners = [(0.0, y), (value, y + bar_px - 1)];
+                    let bar = Rectangle::new(corners, style.color.filled());
+                    chart.plotting_area().draw(&bar)?;
+                    if let Some(decimals) = self.decimals {
+                        let (x, y) = chart.backend_coord(&(value, y + bar_px / 2));
+                        root.draw_text(&format!("{value:.decimals$}"), &number, (x + 4, y))?;
                     }
                 }
-                Ok(())
-            },
-        )
+            }
+            Ok(())
+        })
     }
 }
 
@@ -175,6 +146,8 @@ mod tests {
             decimals: Some(1),
         };
         assert_eq!(chart.svg().unwrap(), chart.svg().unwrap());
-        assert!(chart.svg().unwrap().contains("L1 miss rate, %"));
+        for text in ["L1 miss rate, %", "\n3.0\n", "\nb.png\n"] {
+            assert!(chart.svg().unwrap().contains(text), "{text}");
+        }
     }
 }

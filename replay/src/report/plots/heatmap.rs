@@ -3,9 +3,13 @@
 //! Cells travel as a small embedded PNG (one pixel a tile, scaled without smoothing), which keeps
 //! a 60x68 map near two kilobytes; everything else is vector.
 
-use super::{Anchor, Area, PlotError, draw, escape, fill, stroke, text};
+use super::frame::{Area, Drawn, Frame, text_style, themed, tick_format};
+use super::{PlotError, escape};
 use crate::report::theme;
+use plotters::chart::ChartBuilder;
+use plotters::prelude::{Color, Rectangle};
 use plotters::style::RGBColor;
+use plotters::style::text_anchor::HPos;
 use std::fmt::Write as _;
 
 /// One eye's cells, row by row from the top left.
@@ -36,6 +40,8 @@ pub struct HeatMap {
 const TOP_PX: f64 = 66.0;
 const GAP_PX: f64 = 18.0;
 const BAR_PX: f64 = 14.0;
+/// Room for the colour bar's tick labels.
+const TICKS_PX: f64 = 58.0;
 
 impl HeatMap {
     /// The largest value of all panels.
@@ -73,16 +79,6 @@ impl HeatMap {
         }
         let high = self.high.unwrap_or_else(|| self.largest());
         let high = if high > 0.0 { high } else { 1.0 };
-        let step = theme::nice_step(high, 4);
-        let ticks: Vec<(f64, String)> = theme::ticks(0.0, high, step)
-            .into_iter()
-            .map(|v| (v, theme::tick_label(v, step)))
-            .collect();
-        let tick_width = ticks
-            .iter()
-            .map(|(_, label)| theme::text_width_px(label, theme::TICK_PX))
-            .fold(0.0, f64::max);
-
         let mut x = 8.0;
         let places: Vec<(f64, f64, f64)> = self
             .panels
@@ -95,26 +91,32 @@ impl HeatMap {
                 place
             })
             .collect();
-        let bar_x = x;
         let height = places.iter().map(|p| p.2).fold(60.0, f64::max);
-        let width = (bar_x + BAR_PX + 8.0 + tick_width + 8.0)
-            .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0)
-            .max(theme::text_width_px(&self.value_label, theme::LABEL_PX) + 16.0);
-        let size = (width.ceil() as u32, (TOP_PX + height + 12.0) as u32);
-        let mut svg = draw(&self.title, size, |area| {
-            super::heading(area, &self.title, &self.value_label)?;
+        let frame = Frame {
+            title: &self.title,
+            value_label: &self.value_label,
+            legend: Vec::new(),
+            plot_px: (x - 8.0 + BAR_PX + TICKS_PX, height),
+            around_px: [TOP_PX as u32, 8, 12, 8],
+        };
+        let mut svg = frame.draw(|root, _| {
+            let name = text_style(theme::LABEL_PX, theme::INK, HPos::Center);
             for (panel, (x, w, h)) in self.panels.iter().zip(&places) {
-                text(
-                    area,
-                    (x + w / 2.0, TOP_PX - 11.0),
+                root.draw_text(
                     &panel.name,
-                    theme::LABEL_PX,
-                    theme::INK,
-                    Anchor::Middle,
+                    &name,
+                    ((x + w / 2.0) as i32, TOP_PX as i32 - 11),
                 )?;
-                frame(area, (*x, TOP_PX), (x + w, TOP_PX + h))?;
+                let corners = [(x - 1.0, TOP_PX - 1.0), (x + w, TOP_PX + h)];
+                let corners = corners.map(|(x, y)| (x as i32, y as i32));
+                root.draw(&Rectangle::new(corners, theme::AXIS))?;
             }
-            color_bar(area, (bar_x, TOP_PX), height, high, &ticks)
+            color_bar(
+                &root
+                    .clone()
+                    .shrink((x, TOP_PX), (BAR_PX + TICKS_PX, height)),
+                high,
+            )
         })?;
 
         let mut images = String::new();
@@ -141,54 +143,20 @@ fn cell_px(tiles: [u32; 2]) -> u32 {
     (240 / tiles[0].max(tiles[1]).max(1)).clamp(1, 24)
 }
 
-fn frame(area: &Area, (x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> Result<(), String> {
-    let corners = [
-        (x0 - 1.0, y0 - 1.0),
-        (x1, y0 - 1.0),
-        (x1, y1),
-        (x0 - 1.0, y1),
-        (x0 - 1.0, y0 - 1.0),
-    ];
-    stroke(area, &corners, theme::AXIS, 1)
-}
-
-fn color_bar(
-    area: &Area,
-    (x, y): (f64, f64),
-    height: f64,
-    high: f64,
-    ticks: &[(f64, String)],
-) -> Result<(), String> {
-    let steps = 64;
-    for i in 0..steps {
-        let t = f64::from(i) / f64::from(steps);
-        let next = f64::from(i + 1) / f64::from(steps);
-        let color = color(t + 0.5 / f64::from(steps));
-        fill(
-            area,
-            (x, y + height * (1.0 - next)),
-            (x + BAR_PX, y + height * (1.0 - t)),
-            color,
-        )?;
-    }
-    for (value, label) in ticks {
-        let at = y + height * (1.0 - value / high);
-        stroke(
-            area,
-            &[(x + BAR_PX, at), (x + BAR_PX + 4.0, at)],
-            theme::AXIS,
-            1,
-        )?;
-        text(
-            area,
-            (x + BAR_PX + 8.0, at),
-            label,
-            theme::TICK_PX,
-            theme::MUTED,
-            Anchor::Start,
-        )?;
-    }
-    Ok(())
+/// The colours from 0 to `high` with an axis right of them.
+fn color_bar(area: &Area, high: f64) -> Drawn {
+    let mut builder = ChartBuilder::on(area);
+    let builder = builder.right_y_label_area_size(TICKS_PX);
+    let mut chart = builder.build_cartesian_2d(0.0..1.0, 0.0..high)?;
+    chart.draw_series((0..64).map(|step| {
+        let [low, middle, top] = [0.0, 0.5, 1.0].map(|part| (f64::from(step) + part) / 64.0);
+        let corners = [(0.0, low * high), (1.0, top * high)];
+        Rectangle::new(corners, color(middle).filled())
+    }))?;
+    themed(&mut chart.configure_mesh())
+        .disable_mesh()
+        .y_label_formatter(&tick_format(&(0.0..high)))
+        .draw()
 }
 
 fn png_of(panel: &Panel, high: f64) -> Result<Vec<u8>, String> {

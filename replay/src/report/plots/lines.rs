@@ -1,12 +1,12 @@
 //! Line and scatter charts. A line's name stands at its last point, moved apart where lines meet;
 //! clouds of points are named in a row under the heading.
 
-use super::{
-    Anchor, LegendEntry, PlotError, Scale, SeriesStyle, Symbol, dot, draw, heading,
-    horizontal_grid, legend, legend_width_px, stroke, text,
-};
+use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use plotters::prelude::Color;
+use plotters::prelude::{Circle, Color, PathElement};
+use plotters::style::text_anchor::HPos;
+use std::ops::Range;
 
 /// How a series' points are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,32 +60,12 @@ pub struct LineChart {
     pub series: Vec<LineSeries>,
 }
 
-/// A name at a series' end: text, colour and centre in pixels.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EndLabel {
-    /// Series name.
-    pub name: String,
-    /// Its colour.
-    pub color: plotters::style::RGBColor,
-    /// The series' last point, px; a leader line joins it to the name.
-    pub from_px: (f64, f64),
-    /// Left end of the text, px.
-    pub x_px: f64,
-    /// Vertical middle of the text, px.
-    pub y_px: f64,
-}
-
-const LEFT_PX: f64 = 58.0;
-const TOP_PX: f64 = 72.0;
+const LEFT_PX: u32 = 58;
+const TOP_PX: u32 = 72;
 const PLOT_PX: (f64, f64) = (430.0, 260.0);
 const LABEL_GAP_PX: f64 = 15.0;
-
-struct Layout {
-    x: Scale,
-    y: Scale,
-    x_ticks: Vec<(f64, String)>,
-    y_ticks: Vec<(f64, String)>,
-}
+/// From the plotting area to the names at the lines' ends.
+const NAMES_PX: i32 = 22;
 
 impl LineChart {
     /// The chart as SVG.
@@ -106,187 +86,102 @@ impl LineChart {
                 }
             }
         }
-        let layout = self.layout();
-        let labels = self.end_labels(&layout);
-        let label_width = labels
-            .iter()
-            .map(|l| theme::text_width_px(&l.name, theme::LABEL_PX))
+        let points = || self.series.iter().flat_map(|s| &s.points);
+        let x = self.x.fit(points().map(|p| p.0));
+        let y = self.y.fit(points().map(|p| p.1));
+        let named = |mark| {
+            let series = self.series.iter();
+            series.filter(move |s| s.mark == mark && !s.style.name.is_empty())
+        };
+        let names_px = named(Mark::Line)
+            .map(|s| theme::text_width_px(&s.style.name, theme::LABEL_PX))
             .fold(0.0, f64::max);
-        let bottom = TOP_PX + PLOT_PX.1;
-        let right = LEFT_PX + PLOT_PX.0;
-        let width = (right + 24.0 + label_width + 8.0)
-            .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0)
-            .max(LEFT_PX + legend_width_px(&self.legend()));
-        let height = bottom + 44.0;
-        draw(&self.title, (width.ceil() as u32, height as u32), |area| {
-            heading(area, &self.title, &self.y.label)?;
-            legend(area, (LEFT_PX, 54.0), &self.legend())?;
-            horizontal_grid(area, &layout.y, &layout.y_ticks, (LEFT_PX, right), None)?;
-            stroke(area, &[(LEFT_PX, bottom), (right, bottom)], theme::AXIS, 1)?;
-            for (value, label) in &layout.x_ticks {
-                let x = layout.x.at(*value);
-                stroke(area, &[(x, bottom), (x, bottom + 4.0)], theme::AXIS, 1)?;
-                text(
-                    area,
-                    (x, bottom + 13.0),
-                    label,
-                    theme::TICK_PX,
-                    theme::MUTED,
-                    Anchor::Middle,
-                )?;
+        let legend = named(Mark::Dots).map(|s| LegendEntry {
+            name: &s.style.name,
+            color: s.style.color,
+            symbol: Symbol::Dot,
+        });
+        let frame = Frame {
+            title: &self.title,
+            value_label: &self.y.label,
+            legend: legend.collect(),
+            plot_px: PLOT_PX,
+            around_px: [
+                TOP_PX,
+                NAMES_PX as u32 + 10 + names_px as u32,
+                AXIS_PX,
+                LEFT_PX,
+            ],
+        };
+        frame.draw(|root, mut builder| {
+            let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
+            themed(&mut chart.configure_mesh())
+                .disable_x_mesh()
+                .x_desc(&self.x.label)
+                .x_label_formatter(&tick_format(&x))
+                .y_label_formatter(&tick_format(&y))
+                .draw()?;
+            for LineSeries {
+                style,
+                points,
+                mark,
+            } in &self.series
+            {
+                match mark {
+                    Mark::Line => {
+                        let line = PathElement::new(points.clone(), style.color);
+                        chart.plotting_area().draw(&line)?;
+                    }
+                    Mark::Dots => {
+                        let dot = |&at| Circle::new(at, DOT_PX, style.color.filled());
+                        chart.draw_series(points.iter().map(dot))?;
+                    }
+                }
             }
-            let axis_at = (LEFT_PX + PLOT_PX.0 / 2.0, bottom + 33.0);
-            text(
-                area,
-                axis_at,
-                &self.x.label,
-                theme::LABEL_PX,
-                theme::MUTED,
-                Anchor::Middle,
-            )?;
-            for series in &self.series {
-                paint(area, series, &layout)?;
-            }
-            for label in &labels {
-                let at = (label.x_px, label.y_px);
-                let leader = [
-                    label.from_px,
-                    (label.x_px - 12.0, label.y_px),
-                    (label.x_px - 4.0, label.y_px),
-                ];
-                stroke(area, &leader, label.color, 1)?;
-                text(
-                    area,
-                    at,
-                    &label.name,
-                    theme::LABEL_PX,
-                    theme::INK,
-                    Anchor::Start,
-                )?;
+            let last = |s: &LineSeries| s.points.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
+            let ends: Vec<(&SeriesStyle, (i32, i32))> = named(Mark::Line)
+                .filter_map(|s| Some((&s.style, chart.backend_coord(&last(s)?))))
+                .collect();
+            let wishes: Vec<f64> = ends.iter().map(|(_, (_, y))| f64::from(*y)).collect();
+            let top = f64::from(TOP_PX);
+            let placed = theme::spread(&wishes, LABEL_GAP_PX, top, top + PLOT_PX.1);
+            let x = LEFT_PX as i32 + PLOT_PX.0 as i32 + NAMES_PX;
+            for ((style, end), y) in ends.into_iter().zip(placed) {
+                let y = y.round() as i32;
+                let leader = [end, (x - 12, y), (x - 4, y)];
+                root.draw(&PathElement::new(leader, style.color))?;
+                let name = text_style(theme::LABEL_PX, theme::INK, HPos::Left);
+                root.draw_text(&style.name, &name, (x, y))?;
             }
             Ok(())
         })
     }
+}
 
-    /// Where the names of the series stand; never nearer than a line's height to each other.
-    #[must_use]
-    pub fn label_positions(&self) -> Vec<EndLabel> {
-        self.end_labels(&self.layout())
-    }
-
-    fn end_labels(&self, layout: &Layout) -> Vec<EndLabel> {
-        let named: Vec<(&LineSeries, (f64, f64))> = self
-            .series
-            .iter()
-            .filter(|s| !s.style.name.is_empty() && s.mark == Mark::Line)
-            .filter_map(|s| {
-                let end = s
-                    .points
-                    .iter()
-                    .copied()
-                    .max_by(|a, b| a.0.total_cmp(&b.0))?;
-                Some((s, end))
-            })
-            .collect();
-        let wishes: Vec<f64> = named.iter().map(|(_, (_, y))| layout.y.at(*y)).collect();
-        let placed = theme::spread(&wishes, LABEL_GAP_PX, TOP_PX, TOP_PX + PLOT_PX.1);
-        named
-            .iter()
-            .zip(placed)
-            .map(|((series, end), y_px)| EndLabel {
-                from_px: (layout.x.at(end.0), layout.y.at(end.1)),
-                name: series.style.name.clone(),
-                color: series.style.color,
-                x_px: LEFT_PX + PLOT_PX.0 + 22.0,
-                y_px,
-            })
-            .collect()
-    }
-
-    fn legend(&self) -> Vec<LegendEntry<'_>> {
-        self.series
-            .iter()
-            .filter(|s| s.mark == Mark::Dots && !s.style.name.is_empty())
-            .map(|s| LegendEntry {
-                name: &s.style.name,
-                color: s.style.color,
-                symbol: Symbol::Dot,
-            })
-            .collect()
-    }
-
-    fn layout(&self) -> Layout {
-        let bottom = TOP_PX + PLOT_PX.1;
-        let (x, x_ticks) = fit(
-            &self.x,
-            self.series
-                .iter()
-                .flat_map(|s| s.points.iter().map(|p| p.0)),
-            (LEFT_PX, LEFT_PX + PLOT_PX.0),
-        );
-        let (y, y_ticks) = fit(
-            &self.y,
-            self.series
-                .iter()
-                .flat_map(|s| s.points.iter().map(|p| p.1)),
-            (bottom, TOP_PX),
-        );
-        Layout {
-            x,
-            y,
-            x_ticks,
-            y_ticks,
+impl Axis {
+    /// The ends of the axis over these values.
+    fn fit(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
+        if let Some((low, high)) = self.range {
+            return low..high;
         }
-    }
-}
-
-fn paint(area: &super::Area, series: &LineSeries, layout: &Layout) -> Result<(), String> {
-    let points: Vec<(f64, f64)> = series
-        .points
-        .iter()
-        .map(|&(x, y)| (layout.x.at(x), layout.y.at(y)))
-        .collect();
-    let color = series.style.color;
-    match series.mark {
-        Mark::Line => stroke(area, &points, color, 1),
-        Mark::Dots => points
-            .iter()
-            .try_for_each(|&at| dot(area, at, color.filled())),
-    }
-}
-
-/// The scale of an axis and its ticks.
-fn fit(
-    axis: &Axis,
-    values: impl Iterator<Item = f64>,
-    (from, to): (f64, f64),
-) -> (Scale, Vec<(f64, String)>) {
-    let (low, high) = axis.range.unwrap_or_else(|| {
-        values
+        let (low, high) = values
             .fold(None, |range: Option<(f64, f64)>, v| {
                 Some(range.map_or((v, v), |(l, h)| (l.min(v), h.max(v))))
             })
-            .unwrap_or((0.0, 1.0))
-    });
-    let mut step = theme::nice_step((high - low).max(high.abs() * 1e-3), 5);
-    let (mut low, mut high) = (low, high);
-    if axis.range.is_none() {
-        if low >= 0.0 && low < 0.35 * high {
-            low = 0.0;
-            step = theme::nice_step(high, 5);
-        }
-        low = (low / step).floor() * step;
-        high = ((high / step).ceil() * step).max(low + step);
+            .unwrap_or((0.0, 1.0));
+        // Points stand off the edges; an axis that comes near zero begins there.
+        let room = match 0.04 * (high - low) {
+            0.0 => (0.04 * high.abs()).max(0.5),
+            room => room,
+        };
+        let from_zero = low >= 0.0 && low < 0.35 * high;
+        (if from_zero { 0.0 } else { low - room })..high + room
     }
-    let ticks = theme::ticks(low, high, step)
-        .into_iter()
-        .map(|v| (v, theme::tick_label(v, step)))
-        .collect();
-    (Scale::linear(low, high, from, to), ticks)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::text_at;
     use super::*;
 
     fn chart() -> LineChart {
@@ -314,10 +209,11 @@ mod tests {
 
     #[test]
     fn names_of_series_that_end_together_do_not_overlap() {
-        let mut at: Vec<f64> = chart().label_positions().iter().map(|l| l.y_px).collect();
+        let svg = chart().svg().unwrap();
+        let mut at = ["Morton", "Z2 LRTA", "Z2 STA"].map(|name| text_at(&svg, name).1);
         at.sort_by(f64::total_cmp);
         assert!(
-            at.windows(2).all(|w| w[1] - w[0] >= LABEL_GAP_PX - 1e-9),
+            at.windows(2).all(|w| w[1] - w[0] >= LABEL_GAP_PX - 1.0),
             "{at:?}"
         );
     }
@@ -326,6 +222,7 @@ mod tests {
     fn both_axes_carry_their_units() {
         let svg = chart().svg().unwrap();
         assert!(svg.contains("L1 size, KiB") && svg.contains("L1 miss rate, %"));
+        assert!(svg.contains("\n16\n") && svg.contains("\n20\n"), "ticks");
     }
 
     #[test]

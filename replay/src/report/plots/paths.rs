@@ -1,8 +1,12 @@
 //! A tile order as its path over both eyes' tiles (the Z2 paper's Figs. 2 and 3).
 
+use super::PlotError;
+use super::frame::{Area, Drawn, Frame, text_style, themed};
 use super::heatmap::{HeatMap, Panel};
-use super::{Anchor, Area, PlotError, draw, fill, stroke, text};
 use crate::report::theme;
+use plotters::chart::ChartBuilder;
+use plotters::prelude::{Color, PathElement, Rectangle};
+use plotters::style::text_anchor::HPos;
 
 /// A stop of the path: the eye (0 left, 1 right), column and row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,25 +59,22 @@ impl PathPlot {
             .clamp(8.0, 30.0)
             .floor();
         let (w, h) = (cell * f64::from(columns), cell * f64::from(rows));
-        let left = |eye: u32| 8.0 + f64::from(eye) * (w + GAP_PX);
-        let width = (left(1) + w + 10.0)
-            .max(theme::text_width_px(&self.title, theme::TITLE_PX) + 16.0)
-            .max(theme::text_width_px(&self.note, theme::LABEL_PX) + 16.0);
-        let size = (width.ceil() as u32, (TOP_PX + h + 10.0) as u32);
-        draw(&self.title, size, |area| {
-            super::heading(area, &self.title, &self.note)?;
-            for (eye, name) in [(0, "left eye"), (1, "right eye")] {
-                let at = (left(eye) + w / 2.0, TOP_PX - 11.0);
-                text(
-                    area,
-                    at,
-                    name,
-                    theme::LABEL_PX,
-                    theme::MUTED,
-                    Anchor::Middle,
-                )?;
+        let frame = Frame {
+            title: &self.title,
+            value_label: &self.note,
+            legend: Vec::new(),
+            plot_px: (2.0 * w + GAP_PX, h),
+            around_px: [TOP_PX as u32, 10, 10, 8],
+        };
+        frame.draw(|root, _| {
+            for (eye, name, x) in [(0, "left eye", 8.0), (1, "right eye", 8.0 + w + GAP_PX)] {
+                let style = text_style(theme::LABEL_PX, theme::MUTED, HPos::Center);
+                let middle = (x + w / 2.0) as i32;
+                root.draw_text(name, &style, (middle, TOP_PX as i32 - 11))?;
+                // The last line of the grid is a pixel wide too.
+                self.numbered(&root.clone().shrink((x, TOP_PX), (w + 1.0, h + 1.0)), eye)?;
             }
-            self.numbered(area, cell, &left)
+            Ok(())
         })
     }
 
@@ -102,58 +103,39 @@ impl PathPlot {
         }
     }
 
-    fn numbered(&self, area: &Area, cell: f64, left: &impl Fn(u32) -> f64) -> Result<(), String> {
+    /// One eye's path. A line between the eyes at every other step would hide both curves, so the
+    /// numbers tell the turn.
+    fn numbered(&self, area: &Area, eye: u32) -> Drawn {
         let [columns, rows] = self.tiles;
-        let centre = |s: &Stop| {
-            (
-                left(s.eye) + cell * (f64::from(s.x) + 0.5),
-                TOP_PX + cell * (f64::from(s.y) + 0.5),
-            )
-        };
-        for eye in 0..2 {
-            let (x0, x1) = (left(eye), left(eye) + cell * f64::from(columns));
-            for i in 0..=columns {
-                let x = x0 + cell * f64::from(i);
-                stroke(
-                    area,
-                    &[(x, TOP_PX), (x, TOP_PX + cell * f64::from(rows))],
-                    theme::GRID,
-                    1,
-                )?;
-            }
-            for i in 0..=rows {
-                let y = TOP_PX + cell * f64::from(i);
-                stroke(area, &[(x0, y), (x1, y)], theme::GRID, 1)?;
-            }
-        }
-        // Within an eye the stops of that eye are joined; a line between the eyes at every other
-        // step would hide both curves, so the numbers tell the turn.
-        for eye in 0..2 {
-            let points: Vec<(f64, f64)> = self
-                .stops
-                .iter()
-                .filter(|s| s.eye == eye)
-                .map(centre)
-                .collect();
-            stroke(
-                area,
-                &points,
-                theme::SERIES[if eye == 0 { 1 } else { 0 }],
-                theme::LINE_PX,
-            )?;
-        }
+        let mut builder = ChartBuilder::on(area);
+        let mut chart =
+            builder.build_cartesian_2d(0.0..f64::from(columns), f64::from(rows)..0.0)?;
+        themed(&mut chart.configure_mesh())
+            .x_labels(columns as usize + 1)
+            .y_labels(rows as usize + 1)
+            .draw()?;
+        let centre = |s: &Stop| (f64::from(s.x) + 0.5, f64::from(s.y) + 0.5);
+        let own = self.stops.iter().filter(|s| s.eye == eye);
+        let color = theme::SERIES[if eye == 0 { 1 } else { 0 }];
+        let path = PathElement::new(
+            own.map(centre).collect::<Vec<_>>(),
+            color.stroke_width(theme::LINE_PX),
+        );
+        chart.plotting_area().draw(&path)?;
+        let number = text_style(theme::TICK_PX, theme::INK, HPos::Center);
+        let pixels = chart.plotting_area().strip_coord_spec();
+        let (left, top) = pixels.get_base_pixel();
         for (step, stop) in self.numbering() {
-            let (x, y) = centre(stop);
-            let half = theme::text_width_px(&step.to_string(), theme::TICK_PX) / 2.0 + 1.0;
-            fill(area, (x - half, y - 6.0), (x + half, y + 6.0), theme::PAPER)?;
-            text(
-                area,
-                centre(stop),
-                &step.to_string(),
-                theme::TICK_PX,
-                theme::INK,
-                Anchor::Middle,
-            )?;
+            if stop.eye != eye {
+                continue;
+            }
+            let step = step.to_string();
+            let (x, y) = chart.backend_coord(&centre(stop));
+            let (x, y) = (x - left, y - top);
+            let half = (theme::text_width_px(&step, theme::TICK_PX) / 2.0) as i32 + 1;
+            let behind = [(x - half, y - 6), (x + half, y + 6)];
+            pixels.draw(&Rectangle::new(behind, theme::PAPER.filled()))?;
+            pixels.draw_text(&step, &number, (x, y))?;
         }
         Ok(())
     }

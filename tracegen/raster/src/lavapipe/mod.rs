@@ -136,6 +136,9 @@ impl Lavapipe {
             }
             if last_mesh.replace(call.mesh) != Some(call.mesh) {
                 pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+                if let Some(colors) = &mesh.colors {
+                    pass.set_vertex_buffer(2, colors.slice(..));
+                }
                 pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
             }
             pass.draw_indexed(0..mesh.index_count, 0, batch.range.clone());

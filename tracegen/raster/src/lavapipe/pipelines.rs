@@ -4,7 +4,7 @@ use super::device::Gpu;
 use crate::error::RasterError;
 use crate::roles::{PipelineKey, Role};
 use crate::shader::{self, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
-use crate::vertices::VERTEX_STRIDE;
+use crate::vertices::{COLOR_STRIDE, VERTEX_STRIDE};
 use std::collections::BTreeMap;
 
 /// Format of the picture.
@@ -116,6 +116,7 @@ impl Pipelines {
             ("TEXTURES", f64::from(key.textures)),
             ("LEADERS", f64::from(key.leaders)),
             ("CASCADES", f64::from(key.cascades)),
+            ("COLORED", f64::from(u8::from(key.colored))),
             ("BLENDED", f64::from(u8::from(key.role == Role::Blended))),
             ("MASKED", f64::from(u8::from(key.role == Role::Masked))),
         ];
@@ -125,6 +126,26 @@ impl Pipelines {
         };
         let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4];
         let draw = wgpu::vertex_attr_array![4 => Uint32];
+        let color = wgpu::vertex_attr_array![5 => Unorm16x4];
+        let mut buffers = vec![
+            Some(wgpu::VertexBufferLayout {
+                array_stride: VERTEX_STRIDE,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &attributes,
+            }),
+            Some(wgpu::VertexBufferLayout {
+                array_stride: 4,
+                step_mode: wgpu::VertexStepMode::Instance,
+                attributes: &draw,
+            }),
+        ];
+        if key.colored {
+            buffers.push(Some(wgpu::VertexBufferLayout {
+                array_stride: COLOR_STRIDE,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &color,
+            }));
+        }
         let shadow = key.role.casts();
         let entry_point = match key.role {
             Role::Opaque | Role::Blended => Some("fragment_early"),
@@ -154,20 +175,13 @@ impl Pipelines {
                 layout: Some(&self.layout),
                 vertex: wgpu::VertexState {
                     module: &self.module,
-                    entry_point: Some("vertex_main"),
+                    entry_point: Some(if key.colored {
+                        "vertex_colored"
+                    } else {
+                        "vertex_main"
+                    }),
                     compilation_options: compilation_options.clone(),
-                    buffers: &[
-                        Some(wgpu::VertexBufferLayout {
-                            array_stride: VERTEX_STRIDE,
-                            step_mode: wgpu::VertexStepMode::Vertex,
-                            attributes: &attributes,
-                        }),
-                        Some(wgpu::VertexBufferLayout {
-                            array_stride: 4,
-                            step_mode: wgpu::VertexStepMode::Instance,
-                            attributes: &draw,
-                        }),
-                    ],
+                    buffers: &buffers,
                 },
                 primitive: wgpu::PrimitiveState {
                     front_face: if key.mirrored {

@@ -16,6 +16,8 @@ use wgpu::util::DeviceExt;
 pub struct MeshBuffers {
     /// Interleaved vertices.
     pub vertices: wgpu::Buffer,
+    /// Vertex colours, where the mesh has them.
+    pub colors: Option<wgpu::Buffer>,
     /// 32-bit indices.
     pub indices: wgpu::Buffer,
     /// Number of indices.
@@ -107,6 +109,7 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
         });
     }
     let vertices = vertices::pack(mesh);
+    let colors = vertices::pack_colors(mesh);
     let buffer = |contents: &[u8], usage| {
         gpu.device
             .create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -118,6 +121,8 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
     // A trailing partial triangle would be no primitive: leave it out of the index range.
     Ok(MeshBuffers {
         vertices: buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
+        colors: (!colors.is_empty())
+            .then(|| buffer(bytemuck::cast_slice(&colors), wgpu::BufferUsages::VERTEX)),
         indices: buffer(
             bytemuck::cast_slice(&mesh.indices),
             wgpu::BufferUsages::INDEX,

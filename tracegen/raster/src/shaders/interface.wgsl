@@ -15,6 +15,8 @@ override CASCADES: u32 = 0u;
 override BLENDED: bool = false;
 // The base colour texture has BC1's one-bit alpha, whose transparent texels are black.
 override MASKED: bool = false;
+// Vertices have colours, which multiply the base colour.
+override COLORED: bool = false;
 
 // Index of no record.
 const NONE: u32 = 0xffffffffu;
@@ -99,10 +101,11 @@ struct Fragment {
     @location(3) uv: vec4<f32>,
     // Draw and number of the draw's first primitive.
     @location(4) @interpolate(flat, either) ids: vec2<u32>,
+    // Vertex colour, read where COLORED.
+    @location(5) color: vec4<f32>,
 }
 
-@vertex
-fn vertex_main(in: Vertex) -> Fragment {
+fn transform(in: Vertex, color: vec4<f32>) -> Fragment {
     let instance = instances[in.draw];
     let world = instance.world_from_object * vec4(in.position, 1.0);
     let n = instance.normal_from_object;
@@ -114,5 +117,16 @@ fn vertex_main(in: Vertex) -> Fragment {
     out.tangent = vec4(mat3x3(w[0].xyz, w[1].xyz, w[2].xyz) * in.tangent.xyz, in.tangent.w);
     out.uv = in.uv;
     out.ids = bitcast<vec2<u32>>(n[3].xy);
+    out.color = color;
     return out;
+}
+
+@vertex
+fn vertex_main(in: Vertex) -> Fragment {
+    return transform(in, vec4(1.0));
+}
+
+@vertex
+fn vertex_colored(in: Vertex, @location(5) color: vec4<f32>) -> Fragment {
+    return transform(in, color);
 }

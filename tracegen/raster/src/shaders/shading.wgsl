@@ -14,6 +14,7 @@ fn base_color(in: Fragment) -> vec4<f32> {
         if MASKED { texel = vec4(texel.rgb / max(texel.a, 0.02), texel.a); }
         color *= texel;
     }
+    if COLORED { color *= in.color; }
     return color;
 }
 

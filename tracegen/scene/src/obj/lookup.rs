@@ -39,8 +39,9 @@ impl Lookup {
         let mut any_case =
             |path: &PathBuf| self.walk(folder, path).filter(|path| is_no_folder(path));
         // The folders of another machine are left off, one by one.
-        let path = (paths.iter().flat_map(|path| endings(path)))
-            .find_map(|ending| exact(&[ending.clone()]).or_else(|| any_case(&ending)))?;
+        let path = (paths.iter().flat_map(|path| endings(path))).find_map(|ending| {
+            exact(std::slice::from_ref(&ending)).or_else(|| any_case(&ending))
+        })?;
         let inexact = true;
         Some(Found { path, inexact })
     }

@@ -2,8 +2,8 @@
 
 use super::elements::{Corner, Elements, NONE, Run};
 use super::polygon::triangulate;
-use crate::Mesh;
 use crate::geometry::{unit_or, vertex_normals, vertex_tangents};
+use crate::{Mesh, srgb};
 use glam::{Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 
@@ -138,12 +138,9 @@ fn linear(color: Vec4) -> Vec4 {
             value.clamp(0.0, 1.0)
         }
     };
-    let rgb = color.truncate().map(unit).map(|c| {
-        if c <= 0.04045 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        }
-    });
+    let rgb = color
+        .truncate()
+        .map(unit)
+        .map(|c| srgb::decode(c.into()) as f32);
     rgb.extend(unit(color.w))
 }
