@@ -175,7 +175,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         .run(&Rule::default(), args.reuse, config)
         .with_context(in_file)?;
     if let Some(image) = &args.image {
-        write_atomically(image, &png::encode(&triptych(&loaded, &ours))?)?;
+        write_atomically(image, &png::encode(&triptych(&ours))?)?;
     }
     let meta = &loaded.frame().tables.meta;
     let scene = meta.trace.scene.as_str();
@@ -220,23 +220,18 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
 }
 
 /// The right image, its bad pixels, and its error.
-fn triptych(loaded: &LoadedTrace, ours: &RuleRun) -> Picture {
-    let bad = picture::bad_pixels(loaded.frame(), &ours.decisions, &ours.picture);
+fn triptych(ours: &RuleRun) -> Picture {
+    let bad = picture::bad_pixels(&ours.decisions, &ours.picture);
     Picture::side_by_side(&[&ours.picture, &bad, &ours.flip.picture()], 8)
 }
 
 fn thumbnails(loaded: &LoadedTrace, ours: &RuleRun, plain: &RuleRun) -> anyhow::Result<Thumbnails> {
-    let frame = loaded.frame();
     let small = |p: &Picture| png::encode(&p.shrunk_to(report::THUMBNAIL_PX));
     Ok(Thumbnails {
         left: small(&loaded.left())?,
-        bad: small(&picture::bad_pixels(frame, &ours.decisions, &ours.picture))?,
+        bad: small(&picture::bad_pixels(&ours.decisions, &ours.picture))?,
         flip: small(&ours.flip.picture())?,
-        plain_bad: small(&picture::bad_pixels(
-            frame,
-            &plain.decisions,
-            &plain.picture,
-        ))?,
+        plain_bad: small(&picture::bad_pixels(&plain.decisions, &plain.picture))?,
         plain_flip: small(&plain.flip.picture())?,
     })
 }

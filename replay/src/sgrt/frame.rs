@@ -52,6 +52,16 @@ pub enum FrameError {
         /// Records there.
         found: usize,
     },
+    /// Several samples a pixel: their number decides how many left samples there are to fill a right
+    /// pixel from, so that reuse would say more about it than about the scene.
+    #[error(
+        "samples per pixel: expected 1, found {found}: the scheme keeps one hit a pixel in its \
+         G-buffer"
+    )]
+    Samples {
+        /// Samples of the trace.
+        found: u32,
+    },
     /// Sizes that reprojection cannot work with.
     #[error("eyes: expected two images of one size above 0, found {left:?} and {right:?}")]
     Size {
@@ -99,7 +109,7 @@ pub fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|c| a[c] + b[c])
 }
 
-/// One eye, row by row, `samples_per_px` entries a pixel.
+/// One eye, an entry a pixel, row by row.
 #[derive(Clone, Debug, Default)]
 pub struct EyeFrame {
     /// What is seen.
@@ -117,29 +127,30 @@ pub struct Frame {
     pub eyes: [EyeFrame; 2],
     /// Width and height of an eye's image in pixels.
     pub size_px: [u32; 2],
-    /// Samples per pixel, at least 1.
-    pub samples_per_px: u32,
 }
 
 impl Frame {
     /// Decodes all tiles of both eyes.
     ///
     /// # Errors
-    /// [`FrameError`] for the first tile that cannot be read.
+    /// [`FrameError`] for eyes or samples that reprojection is not made for, or the first tile that
+    /// cannot be read.
     pub fn load(source: &dyn RaySource) -> Result<Self, FrameError> {
         let tables = source.tables().clone();
         let [left, right] = [Eye::Left, Eye::Right].map(|e| tables.camera(e).size_px);
         if left != right || left.contains(&0) {
             return Err(FrameError::Size { left, right });
         }
-        let samples_per_px = tables.meta.samples_per_px.max(1);
-        let load = |eye| load_eye(source, eye, left, samples_per_px as usize);
+        let found = tables.meta.samples_per_px;
+        if found > 1 {
+            return Err(FrameError::Samples { found });
+        }
+        let load = |eye| load_eye(source, eye, left);
         let eyes = [load(Eye::Left)?, load(Eye::Right)?];
         Ok(Self {
             tables,
             eyes,
             size_px: left,
-            samples_per_px,
         })
     }
 
@@ -155,45 +166,30 @@ impl Frame {
         &self.eyes[1]
     }
 
-    /// Samples of an eye: pixels times samples per pixel.
+    /// Samples of an eye, one a pixel.
     #[must_use]
     pub fn sample_count(&self) -> usize {
-        self.size_px[0] as usize * self.size_px[1] as usize * self.samples_per_px as usize
+        self.size_px[0] as usize * self.size_px[1] as usize
     }
 
     /// Sample numbers of the pixels of a tile, row by row.
     pub fn tile_samples(&self, tile: u32) -> impl Iterator<Item = usize> + use<> {
         let ([x, y], [w, h]) = self.tables.tile_rect(tile);
-        let (width, spp) = (self.size_px[0] as usize, self.samples_per_px as usize);
+        let width = self.size_px[0] as usize;
         (y..y + h).flat_map(move |row| {
-            let first = (row as usize * width + x as usize) * spp;
-            first..first + w as usize * spp
+            let first = row as usize * width + x as usize;
+            first..first + w as usize
         })
     }
 
     /// Image position of a sample of either eye, in pixels from the top left.
     #[must_use]
     pub fn position_px(&self, sample: usize) -> [f32; 2] {
-        let (pixel, number) = (
-            sample as u32 / self.samples_per_px,
-            sample as u32 % self.samples_per_px,
+        let (x, y) = (
+            sample as u32 % self.size_px[0],
+            sample as u32 / self.size_px[0],
         );
-        let (x, y) = (pixel % self.size_px[0], pixel / self.size_px[0]);
-        sample_position_px(x, y, number, self.samples_per_px)
-    }
-
-    /// Averages per-sample colours to an image, linear RGB.
-    #[must_use]
-    pub fn resolve(&self, colors: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        let spp = self.samples_per_px as usize;
-        if spp == 1 {
-            return colors.to_vec();
-        }
-        let average = |samples: &[[f32; 3]]| {
-            let sum = samples.iter().fold([0.0; 3], |a, b| add(a, *b));
-            sum.map(|c| c / spp as f32)
-        };
-        colors.par_chunks_exact(spp).map(average).collect()
+        sample_position_px(x, y, 0, 1)
     }
 }
 
@@ -201,12 +197,11 @@ fn load_eye(
     source: &dyn RaySource,
     eye: Eye,
     [width, height]: [u32; 2],
-    spp: usize,
 ) -> Result<EyeFrame, FrameError> {
     let tables = source.tables();
     let camera = tables.camera(eye);
     let columns = width.div_ceil(TILE_SIZE_PX);
-    let count = width as usize * height as usize * spp;
+    let count = width as usize * height as usize;
     let empty = Sample {
         position: [0.0; 3],
         primitive: SKY,
@@ -217,7 +212,7 @@ fn load_eye(
     };
     let mut samples = vec![empty; count];
     let mut work = vec![PixelWork::default(); count];
-    let band = width as usize * TILE_SIZE_PX as usize * spp;
+    let band = width as usize * TILE_SIZE_PX as usize;
     samples
         .par_chunks_mut(band)
         .zip(work.par_chunks_mut(band))
@@ -234,7 +229,7 @@ fn load_eye(
                         source,
                     })?;
                 let ([left, top], [w, h]) = tables.tile_rect(index);
-                let expected = w as usize * h as usize * spp;
+                let expected = w as usize * h as usize;
                 if tile.pixels.len() != expected {
                     return Err(FrameError::Pixels {
                         eye,
@@ -244,8 +239,8 @@ fn load_eye(
                     });
                 }
                 for (i, pixel) in tile.pixels.iter().enumerate() {
-                    let (row, in_row) = (i / (w as usize * spp), i % (w as usize * spp));
-                    let at = (row * width as usize + left as usize) * spp + in_row;
+                    let (row, column) = (i / w as usize, i % w as usize);
+                    let at = row * width as usize + left as usize + column;
                     let seen = &mut samples[at];
                     *seen = match &pixel.hit {
                         Some(hit) => Sample {
@@ -256,9 +251,8 @@ fn load_eye(
                             ..empty
                         },
                         None => {
-                            let (x, y) = (left + (in_row / spp) as u32, top + row as u32);
-                            let s = (in_row % spp) as u32;
-                            let at = sample_position_px(x, y, s, spp as u32);
+                            let (x, y) = (left + column as u32, top + row as u32);
+                            let at = sample_position_px(x, y, 0, 1);
                             Sample {
                                 position: camera.direction(at),
                                 ..empty

@@ -253,11 +253,10 @@ pub fn compare(
         let (_, [width, height]) = frame.tables.tile_rect(tile);
         let pixels = u64::from(width) * u64::from(height);
         let [band, band_and_beside] = rows.of_tile(frame, tile);
-        let row_px = u64::from(width) * u64::from(frame.samples_per_px);
         let right_tile = RightTile {
             tested: work.right.detected,
             reused: work.right.reused,
-            fetched_bytes: reads.fetched_bytes(g, band, band_and_beside, row_px),
+            fetched_bytes: reads.fetched_bytes(g, band, band_and_beside, u64::from(width)),
         };
         let plain_left = BatchWork {
             reprojected: 0,

@@ -158,7 +158,7 @@ impl<'a> LoadedTrace<'a> {
 
     pub(super) fn picture(&self, decisions: &[Decision], reuse: Reuse) -> Picture {
         let colors = compose(&self.frame, decisions, reuse);
-        Picture::from_linear(self.frame.size_px, &self.frame.resolve(&colors))
+        Picture::from_linear(self.frame.size_px, &colors)
     }
 
     pub(super) fn flip(&self, picture: &Picture) -> FlipMap {
@@ -170,7 +170,7 @@ impl<'a> LoadedTrace<'a> {
 fn traced(frame: &Frame, eye: Eye) -> Picture {
     let samples = &frame.eyes[eye as usize].samples;
     let colors: Vec<[f32; 3]> = samples.iter().map(super::frame::Sample::color).collect();
-    Picture::from_linear(frame.size_px, &frame.resolve(&colors))
+    Picture::from_linear(frame.size_px, &colors)
 }
 
 #[cfg(test)]
@@ -206,26 +206,17 @@ mod tests {
     }
 
     #[test]
-    fn four_samples_a_pixel_reuse_what_one_reuses() {
-        let mut near = room();
-        near.extend(wall(0.8, [0.2, 0.3], -0.3, 3));
-        for scene in [room(), near] {
-            let of = |samples_per_px, rule| {
-                let view = View {
-                    size_px: [160, 96],
-                    samples_per_px,
-                    ..View::default()
-                };
-                outcome(&trace(&scene, view), rule)
-            };
-            let (one, four) = (of(1, "none").reuse_pct, of(4, "none").reuse_pct);
-            assert!(
-                (one - four).abs() < 2.0,
-                "{one} % with 1 sample, {four} % with 4"
-            );
-            let careful = of(4, super::super::DEFAULT_RULE);
-            assert!(careful.flip_mean < 0.01, "{}", careful.flip_mean);
-        }
+    fn several_samples_a_pixel_are_refused_with_the_reason() {
+        let view = View {
+            samples_per_px: 4,
+            ..View::default()
+        };
+        let source = trace(&room(), view);
+        let error = LoadedTrace::load(&source).map(drop).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "samples per pixel: expected 1, found 4: the scheme keeps one hit a pixel in its G-buffer"
+        );
     }
 
     #[test]

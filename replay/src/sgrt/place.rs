@@ -44,16 +44,15 @@ impl<'a> Place<'a> {
         &self.frame.left().samples[self.candidate().source as usize]
     }
 
-    /// The same sample of neighbouring pixels, where they lie in the image.
+    /// Neighbouring pixels, where they lie in the image.
     pub fn neighbours(self, offsets: &'static [Offset]) -> impl Iterator<Item = Self> {
-        let spp = self.frame.samples_per_px as usize;
         let [width, height] = self.frame.size_px.map(|s| s as i32);
-        let (pixel, sample) = ((self.index / spp) as i32, self.index % spp);
+        let index = self.index as i32;
         offsets.iter().filter_map(move |(dx, dy)| {
-            let (x, y) = (pixel % width + dx, pixel / width + dy);
+            let (x, y) = (index % width + dx, index / width + dy);
             let inside = (0..width).contains(&x) && (0..height).contains(&y);
             inside.then(|| Self {
-                index: (y * width + x) as usize * spp + sample,
+                index: (y * width + x) as usize,
                 ..self
             })
         })

@@ -1,9 +1,7 @@
 //! Forward reprojection: every left hit goes to the right pixel in which it is seen; where several
 //! meet, the nearest wins.
 //!
-//! The sky is reprojected by its direction, as a surface at infinity. With several samples a pixel a
-//! left sample goes to the right sample nearest to where it is seen; samples of a pixel that none
-//! went to take the nearest that arrived in the pixel.
+//! The sky is reprojected by its direction, as a surface at infinity.
 
 use super::frame::{Frame, Sample};
 use formats::raytrace::EyeCamera;
@@ -82,67 +80,23 @@ pub fn reproject(frame: &Frame) -> Reprojection {
         .map(|sample| project(eye, sample))
         .collect();
 
-    let (width, spp) = (frame.size_px[0] as usize, frame.samples_per_px as usize);
     let mut candidates = vec![Candidate::EMPTY; frame.sample_count()];
     // In order, so that of two equally near hits the left one wins on every run.
     for (source, p) in projected.iter().enumerate() {
         let Some([x, y]) = p.pixel(frame.size_px) else {
             continue;
         };
-        let first = (y as usize * width + x as usize) * spp;
-        let to_sample = |i: &usize| distance_px(p.at_px, frame.position_px(*i));
-        let Some(target) = nearest(first..first + spp, to_sample) else {
-            continue;
-        };
-        let slot = &mut candidates[target];
+        let slot = &mut candidates[y as usize * frame.size_px[0] as usize + x as usize];
         slot.arrivals = slot.arrivals.saturating_add(1);
         if slot.is_missing() || p.depth < slot.depth {
             slot.source = source as u32;
             slot.depth = p.depth;
         }
     }
-    if spp > 1 {
-        candidates
-            .par_chunks_exact_mut(spp)
-            .enumerate()
-            .for_each(|(pixel, slots)| fill_pixel(frame, &projected, pixel * spp, slots));
-    }
     Reprojection {
         candidates,
         projected,
     }
-}
-
-/// Gives samples of a pixel that nothing went to the nearest of what arrived in the pixel.
-fn fill_pixel(frame: &Frame, projected: &[Projected], first: usize, slots: &mut [Candidate]) {
-    let arrived: Vec<Candidate> = slots.iter().filter(|c| !c.is_missing()).copied().collect();
-    for (i, slot) in slots.iter_mut().enumerate() {
-        if slot.is_missing() {
-            let at = frame.position_px(first + i);
-            let to_arrival = |c: &Candidate| distance_px(projected[c.source as usize].at_px, at);
-            if let Some(near) = nearest(arrived.iter().copied(), to_arrival) {
-                *slot = Candidate {
-                    arrivals: 1,
-                    ..near
-                };
-            }
-        }
-    }
-}
-
-/// The first of those with the least distance.
-fn nearest<T>(mut all: impl Iterator<Item = T>, distance: impl Fn(&T) -> f32) -> Option<T> {
-    let first = all.next()?;
-    let start = (distance(&first), first);
-    let (_, found) = all.fold(start, |(least, found), next| {
-        let d = distance(&next);
-        if d < least { (d, next) } else { (least, found) }
-    });
-    Some(found)
-}
-
-fn distance_px(a: [f32; 2], b: [f32; 2]) -> f32 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 fn project(eye: &EyeCamera, sample: &Sample) -> Projected {

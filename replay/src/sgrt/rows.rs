@@ -45,7 +45,6 @@ impl RowNeeds {
     #[must_use]
     pub fn new(frame: &Frame, arrived: &Reprojection) -> Self {
         let [width, height] = frame.size_px.map(|s| s as usize);
-        let spp = frame.samples_per_px as usize;
         let words = height.div_ceil(64);
         // A bit for each left row, by right row.
         let mut sources = vec![0u64; height * words];
@@ -55,7 +54,7 @@ impl RowNeeds {
                 continue;
             };
             let [_, own] = frame.position_px(source);
-            let y = source / spp / width;
+            let y = source / width;
             let is_still = (projected.at_px[1] - own).abs() < STILL_PX;
             let row = if is_still { y } else { landed as usize };
             seen += 1;
@@ -110,19 +109,14 @@ mod tests {
 
     #[test]
     fn parallel_eyes_need_the_row_itself_and_its_neighbours() {
-        for samples_per_px in [1, 4] {
-            let (frame, needs) = needs(View {
-                samples_per_px,
-                ..View::default()
-            });
-            assert_eq!(needs.summary.other_row_pct, 0.0);
-            assert_eq!(needs.summary.left_rows_per_right_row, 1.0);
-            assert!(needs.summary.row_test_applies);
-            let tiles_a_band = frame.tables.tiles()[0];
-            // 40 rows: two whole bands and half a one.
-            let bands = [0, 1, 2].map(|band| needs.of_tile(&frame, band * tiles_a_band));
-            assert_eq!(bands, [[16, 17], [16, 18], [8, 9]]);
-        }
+        let (frame, needs) = needs(View::default());
+        assert_eq!(needs.summary.other_row_pct, 0.0);
+        assert_eq!(needs.summary.left_rows_per_right_row, 1.0);
+        assert!(needs.summary.row_test_applies);
+        let tiles_a_band = frame.tables.tiles()[0];
+        // 40 rows: two whole bands and half a one.
+        let bands = [0, 1, 2].map(|band| needs.of_tile(&frame, band * tiles_a_band));
+        assert_eq!(bands, [[16, 17], [16, 18], [8, 9]]);
     }
 
     #[test]

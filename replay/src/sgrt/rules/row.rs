@@ -45,12 +45,12 @@ const SAME_SURFACE_SHARE: f32 = 0.05;
 /// A near surface that the right eye sees stretched leaves gaps between its splats; the segments
 /// close them.
 fn spans(frame: &Frame, arrived: &Reprojection) -> Vec<f32> {
-    let (width, spp) = (frame.size_px[0] as usize, frame.samples_per_px as usize);
+    let width = frame.size_px[0] as usize;
     let mut nearest = vec![f32::INFINITY; frame.sample_count()];
     let samples = &frame.left().samples;
     for (index, a) in arrived.projected.iter().enumerate() {
-        let next = index + spp;
-        let is_last = (index / spp) % width == width - 1;
+        let next = index + 1;
+        let is_last = index % width == width - 1;
         if is_last || samples[index].is_sky() || samples[index].object != samples[next].object {
             continue;
         }
@@ -75,7 +75,7 @@ fn spans(frame: &Frame, arrived: &Reprojection) -> Vec<f32> {
                 (x + 0.5 - x0) / (x1 - x0)
             };
             let depth = a.depth + (b.depth - a.depth) * share;
-            let slot = &mut nearest[(row * width + x as usize) * spp + index % spp];
+            let slot = &mut nearest[row * width + x as usize];
             *slot = slot.min(depth);
             x += 1.0;
         }
