@@ -2,7 +2,7 @@
 """Compares the counting traversal with Embree 4 in ROBUST mode on the same triangles and rays.
 
     pip install embreex numpy
-    cargo bench -p tracegen --bench rays --no-run
+    cargo bench -p rays --bench rays --no-run
     scripts/embree_compare.py BENCH SCENE [ROUNDS]
 
 BENCH is the executable that cargo names. Both programs take turns, ROUNDS times; figures are the
