@@ -221,6 +221,12 @@ impl<C: Cache> Consumer for Memory<C> {
 
     #[inline(always)]
     fn footprint(&mut self, cell: usize, lines: Lines<'_>) -> bool {
+        let l1 = &mut self.l1[self.core].cache;
+        let safe = lines.count() <= l1.repeat_safe_lines();
+        // One line, there: what nearly all footprints find.
+        if lines.only().is_some_and(|line| l1.lookup(line)) {
+            return safe;
+        }
         let mut misses = FootprintMisses::default();
         let mut ready = 0;
         for line in lines.iter() {
@@ -229,7 +235,7 @@ impl<C: Cache> Consumer for Memory<C> {
             }
         }
         if misses.l1_lines + misses.l1_secondary == 0 {
-            return lines.count() <= self.l1[self.core].cache.repeat_safe_lines();
+            return safe;
         }
         if ready > self.now {
             self.pending.push(ready);

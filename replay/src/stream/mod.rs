@@ -62,6 +62,28 @@ impl<'a> Lines<'a> {
         self.relative.len() as u32
     }
 
+    /// The line of a footprint that has one.
+    #[inline(always)]
+    #[must_use]
+    pub fn only(self) -> Option<u32> {
+        match self.relative {
+            [relative] => Some(self.base + relative),
+            _ => None,
+        }
+    }
+
+    /// Sum of the lines' [`access_hash`]. One and two lines are written out: a loop over them would
+    /// be compiled to vectors, which cost more than they save.
+    #[inline(always)]
+    fn hash(self) -> u64 {
+        let hash = |relative: &u32| access_hash(self.base + relative);
+        match self.relative {
+            [only] => hash(only),
+            [first, second] => hash(first).wrapping_add(hash(second)),
+            lines => lines.iter().map(hash).fold(0, u64::wrapping_add),
+        }
+    }
+
     /// Line numbers: addresses over the line size.
     #[inline(always)]
     pub fn iter(self) -> impl Iterator<Item = u32> + 'a {
@@ -165,9 +187,7 @@ fn send(cell: usize, sample: SampleRef, bundle: &Bundle, consumer: &mut impl Con
         let lines = Lines::new(sample.base_line, bundle.lines_of(index));
         line_lookups += lines.count();
         if !(bundle.repeats(index) && repeats_are_idle) {
-            last_hash = lines
-                .iter()
-                .fold(0, |sum, line| access_hash(line).wrapping_add(sum));
+            last_hash = lines.hash();
             repeats_are_idle = consumer.footprint(cell, lines);
         }
         hash = hash.wrapping_add(last_hash);
