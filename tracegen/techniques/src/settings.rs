@@ -245,7 +245,7 @@ mod tests {
         }
         for deg in [[51.0, 0.0], [0.0, -46.0], [f32::NAN, 0.0], [0.0, 179.0]] {
             let error = looking(deg).check(&hmd()).unwrap_err().to_string();
-            assert!(error.contains("50.2 left"), "{error}");
+            assert!(error.contains("50.2 degrees left"), "{error}");
         }
     }
 
