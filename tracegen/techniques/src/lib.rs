@@ -2,8 +2,10 @@
 //!
 //! Knows displays and angles, and neither drivers nor scenes: a driver renders the [`layer::Layer`]s.
 
+pub mod far_field;
 pub mod gaze;
 pub mod layer;
+pub mod least_work;
 pub mod mask;
 pub mod plan;
 pub mod settings;
