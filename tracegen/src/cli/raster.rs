@@ -4,6 +4,7 @@ use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::picture;
+use crate::study::memory;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
@@ -22,7 +23,7 @@ use techniques::Settings;
 use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
-const CASCADES: u32 = 4;
+pub(super) const CASCADES: u32 = 4;
 
 /// Arguments of `tracegen raster`.
 #[derive(Args, Debug)]
@@ -215,7 +216,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
 }
 
 /// Near and far end of the cascades: from the near plane to where the scene ends.
-fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
+pub(super) fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
     let farthest = (setup.camera.eye - lo)
         .abs()
         .max((setup.camera.eye - hi).abs())
@@ -224,7 +225,8 @@ fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f3
     [near, farthest.min(setup.camera.far).max(2.0 * near)]
 }
 
-fn tables(
+/// The tables of a trace of the scene's frames.
+pub(super) fn tables(
     setup: &SceneSetup,
     spec: &str,
     draws: &DrawList,
@@ -326,7 +328,7 @@ impl Summary {
                 "with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace)"
             ));
         }
-        if let Some(bytes) = peak_rss_bytes() {
+        if let Some(bytes) = memory::peak_bytes() {
             note(&format!(
                 "peak memory    {:.0} MiB",
                 bytes as f64 / f64::from(1 << 20)
@@ -335,16 +337,8 @@ impl Summary {
     }
 }
 
-/// Largest resident set so far, where the system tells (Linux).
-fn peak_rss_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024)
-}
-
 /// Sets what Mesa reads from the environment.
-fn prepare_environment(threads: Option<u16>) {
+pub(super) fn prepare_environment(threads: Option<u16>) {
     // SAFETY: the only other thread waits for signals; nothing reads the environment meanwhile.
     unsafe {
         // Mesa's device selection asks a display server, in vain and aloud where there is none.

@@ -1,0 +1,96 @@
+//! Measures combinations on a device.
+
+use super::budget::Budget;
+use super::search::{Judge, Verdict};
+use crate::study::measure::{Extent, median_s, time};
+use crate::study::rows::Row;
+use crate::study::world::World;
+use anyhow::Context;
+use image_error::{Mask, Picture, Reference};
+use raster::lavapipe::Lavapipe;
+use shell::Progress;
+use techniques::Settings;
+
+/// Renders combinations and the baseline beside them.
+pub struct Bench<'a> {
+    /// Scene and path.
+    pub world: &'a World,
+    /// The device.
+    pub backend: &'a mut Lavapipe,
+    /// What errors are measured in.
+    pub budget: Budget,
+    /// Frames and repeats of the search.
+    pub extent: Extent,
+    /// How far it is.
+    pub progress: &'a Progress,
+}
+
+impl Bench<'_> {
+    /// The error of a combination in a frame, in the budget's unit, after the frame before it.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn error(&mut self, row: &Row, frame: u32) -> anyhow::Result<f64> {
+        let shot = self.world.shoot(self.backend, &row.settings, frame)?;
+        if let Budget::Pixels(_) = self.budget {
+            let shift = shot.frame.plan.predicted.disparity_px;
+            return Ok(shift.map_or(0.0, f64::from));
+        }
+        let pictures = self.world.pictures(self.backend, &shot)?;
+        let baseline = self
+            .world
+            .shoot(self.backend, &Settings::default(), frame)?;
+        let references = self.world.pictures(self.backend, &baseline)?;
+        let mut worst = 0.0_f64;
+        for (eye, (picture, reference)) in pictures.iter().zip(&references).enumerate() {
+            let hmd = &self.world.hmd;
+            let (fov, size_px) = (&hmd.fov[eye], hmd.eye_size_px);
+            let mask = Mask::of_lens(size_px, fov, &self.world.lens[eye]);
+            let ppd = image_error::pixels_per_degree(size_px[0], fov);
+            let error = Reference::new(of_rgba(size_px, reference), mask, ppd)
+                .and_then(|reference| reference.error(&of_rgba(size_px, picture)))
+                .context("comparing pictures")?;
+            worst = worst.max(error.flip_mean);
+        }
+        Ok(worst)
+    }
+}
+
+impl Judge for Bench<'_> {
+    type Error = anyhow::Error;
+
+    fn judge(&mut self, row: &Row) -> anyhow::Result<Verdict> {
+        let extent = self.extent.clone();
+        let mut error = 0.0_f64;
+        for (frame, measured) in extent.rendered() {
+            if measured {
+                error = error.max(self.error(row, frame)?);
+            } else {
+                self.world.shoot(self.backend, &row.settings, frame)?;
+            }
+        }
+        let times = time(self.world, self.backend, &extent, |_| &row.settings, || ())?;
+        let mut ratios = Vec::new();
+        let mut frame = Vec::new();
+        for times in &times {
+            let pairs = times.frame.iter().zip(&times.baseline);
+            ratios.extend(pairs.map(|(own, beside)| own.as_secs_f64() / beside.as_secs_f64()));
+            frame.extend(times.frame.iter().copied());
+        }
+        ratios.sort_by(f64::total_cmp);
+        self.progress.advance(1);
+        Ok(Verdict {
+            frame_time_ratio: ratios[(ratios.len() - 1) / 2],
+            frame_s: median_s(&frame),
+            error,
+        })
+    }
+}
+
+/// A picture without its alpha.
+fn of_rgba(size_px: [u32; 2], rgba: &[u8]) -> Picture {
+    Picture {
+        size_px,
+        pixels: rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect(),
+    }
+}
