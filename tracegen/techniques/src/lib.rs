@@ -7,9 +7,11 @@ pub mod gaze;
 pub mod layer;
 pub mod least_work;
 pub mod mask;
+pub mod plan;
 pub mod settings;
 
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};
 pub use mask::Mask;
+pub use plan::FramePlan;
 pub use settings::{Settings, SettingsError};
