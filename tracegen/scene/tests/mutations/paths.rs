@@ -125,10 +125,10 @@ fn no_damaged_path_panics_takes_long_or_takes_much_memory() {
                         !text.contains(char::is_control),
                         "{name}, case {case}: {text:?}"
                     );
-                    assert!(
-                        text.len() < 4000 && text.contains(name),
-                        "{name}, case {case}: {text}"
-                    );
+                    assert!(text.len() < 4000, "{name}, case {case}: {text}");
+                    // A glTF file may name another one, which the error then names.
+                    let names = text.contains(name) || name.ends_with("gltf");
+                    assert!(names, "{name}, case {case}: {text}");
                     refused += 1;
                 }
             }
