@@ -8,8 +8,10 @@ pub mod layer;
 pub mod least_work;
 pub mod mask;
 pub mod settings;
+pub mod skips;
 
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};
 pub use mask::Mask;
+pub use skips::Skips;
 pub use settings::{Settings, SettingsError};
