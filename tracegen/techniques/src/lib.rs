@@ -7,11 +7,13 @@ pub mod gaze;
 pub mod layer;
 pub mod least_work;
 pub mod mask;
+pub mod plan;
 pub mod settings;
 pub mod skips;
 
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};
 pub use mask::Mask;
-pub use skips::Skips;
+pub use plan::FramePlan;
 pub use settings::{Settings, SettingsError};
+pub use skips::Skips;
