@@ -21,18 +21,23 @@ impl CaptureJob<'_> {
     /// any frame may see, or by a masked caster that a shadow cascade may see. `None` for an image that
     /// nothing samples.
     #[must_use]
-    pub fn finest_levels(&self, scene: &Scene, frames: &[FrameViews]) -> Vec<Option<u32>> {
+    pub fn finest_levels(&self, frames: &[FrameViews]) -> Vec<Option<u32>> {
+        let scene = self.scene;
+        if !self.skips.images {
+            return vec![Some(0); scene.images.len()];
+        }
         let mut finest = vec![None; scene.images.len()];
         for views in frames {
-            let frame = self.frame(views);
+            let frame = self.boxes_seen(views);
             for view in frame.views() {
-                let projection = view.eye.eye_to_clip;
+                let projection = view.layer.view.eye_to_clip;
                 let pixels = Pixels {
                     clip_from_world: view.clip_from_world(),
-                    size_px: self.size_px,
+                    size_px: view.layer.size_px,
                     least_w: projection[3][2] / projection[2][2],
                 };
-                self.sample(scene, &pixels, view.visible, |_| MATERIAL_TEXTURES, &mut finest);
+                let all = |_| MATERIAL_TEXTURES;
+                self.sample(scene, &pixels, view.visible, all, &mut finest);
             }
             for (cascade, casters) in frame.lighting.cascades.iter().zip(&frame.casters) {
                 // A masked caster samples its base colour, the first slot.
@@ -62,14 +67,12 @@ impl CaptureJob<'_> {
             let mesh = &scene.meshes[call.mesh];
             let textures = scene.materials[call.material].textures();
             let sampled = || textures[..slots(call.mode)].iter().flatten();
-            // Whole already, or of no image.
-            let is_new = |t: &&TextureRef| finest.get(t.image).is_some_and(|level| *level != Some(0));
-            if !sampled().any(|t| is_new(&t)) || !self.any_inside(call, mesh, pixels) {
+            if !sampled().any(|t| is_new(t, finest)) || !self.any_inside(call, mesh, pixels) {
                 continue;
             }
             for set in [0, 1] {
                 let of_set = || sampled().filter(move |t| t.uv_set == set);
-                if !of_set().any(|t| is_new(&t)) {
+                if !of_set().any(|t| is_new(t, finest)) {
                     continue;
                 }
                 let largest = LARGEST_UV / of_set().map(scale).fold(1.0, f32::max);
@@ -79,7 +82,9 @@ impl CaptureJob<'_> {
                     0.0
                 };
                 for texture in of_set() {
-                    let Some(level) = finest.get_mut(texture.image) else { continue };
+                    let Some(level) = finest.get_mut(texture.image) else {
+                        continue;
+                    };
                     let least = least_level(texture, scene.images[texture.image].size, derivative);
                     *level = Some(level.map_or(least, |known| known.min(least)));
                 }
@@ -105,9 +110,20 @@ fn derivative_squared(
     let coordinates = if set == 0 { &mesh.uv0 } else { &mesh.uv1 };
     let uv = |vertex: usize| {
         let uv = coordinates.get(vertex).copied().unwrap_or(Vec2::NAN);
-        if uv.abs().max_element() <= largest { uv } else { Vec2::NAN }
+        if uv.abs().max_element() <= largest {
+            uv
+        } else {
+            Vec2::NAN
+        }
     };
     least_derivative_squared(&mesh.positions, &mesh.indices, uv, &call.transform, pixels)
+}
+
+/// Whether more of a texture's image may be needed than is known.
+fn is_new(texture: &TextureRef, finest: &[Option<u32>]) -> bool {
+    finest
+        .get(texture.image)
+        .is_some_and(|level| *level != Some(0))
 }
 
 /// By how much a texture's transform may enlarge a coordinate.

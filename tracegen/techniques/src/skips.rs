@@ -107,6 +107,9 @@ mod tests {
         let some = Skips::without(&[skip("cascades"), skip("mip-levels")]);
         assert!(!some.cascades && !some.mip_levels && some.images && some.draws && some.regions);
         let error = "mips".parse::<Skip>().unwrap_err().to_string();
-        assert!(error.contains("mip-levels") && error.contains("'mips'"), "{error}");
+        assert!(
+            error.contains("mip-levels") && error.contains("'mips'"),
+            "{error}"
+        );
     }
 }

@@ -87,7 +87,11 @@ pub fn compress(
         _ => 1.0,
     };
     let mut blocks = Vec::new();
-    let mut texels = if first_level == 0 { base.to_vec() } else { Vec::new() };
+    let mut texels = if first_level == 0 {
+        base.to_vec()
+    } else {
+        Vec::new()
+    };
     let mut level: Option<Level> = None;
     for index in 0..level_count(base_size) {
         if index > 0 {

@@ -137,7 +137,10 @@ impl TextureSet {
     #[must_use]
     pub fn skipped_bytes(&self) -> usize {
         let whole = |t: &CompressedTexture| compress::chain_bytes(&t.texture, 0).unwrap_or(0);
-        self.textures.iter().map(|t| whole(t) - t.blocks.len()).sum()
+        self.textures
+            .iter()
+            .map(|t| whole(t) - t.blocks.len())
+            .sum()
     }
 
     /// Textures whose finest levels are never sampled.
@@ -318,7 +321,7 @@ fn prepare_source(
         let Image {
             size, color_space, ..
         } = *member.image;
-        let (format, blocks) = 
+        let (format, blocks) =
             compress::compress(&rgba, size, color_space, member.role, member.first_level());
         drop(rgba);
         if let Some((cache, hasher)) = &source_key {

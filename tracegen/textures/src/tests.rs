@@ -211,7 +211,10 @@ fn levels_finer_than_what_is_sampled_are_left_out_and_the_others_stay_the_same()
                 (set.textures[0].clone(), set.cached)
             };
             let (texture, _) = shorter(None);
-            assert_eq!((texture.first_level, &texture.texture), (first, &whole.texture));
+            assert_eq!(
+                (texture.first_level, &texture.texture),
+                (first, &whole.texture)
+            );
             let [width, height] = texture.texture.level_size(first);
             assert!(whole.blocks.ends_with(&texture.blocks));
             assert_eq!(first > 0, texture.blocks.len() < whole.blocks.len());
