@@ -7,6 +7,7 @@ use super::lighting::Lighting;
 use formats::view::EyeView;
 use glam::Mat4;
 use record::{Captured, Region, Sink};
+use std::time::Duration;
 use techniques::Layer;
 
 /// One layer to render: its camera, its light and its draws.
@@ -45,6 +46,18 @@ pub struct Work {
     pub draws: u64,
     /// Draw calls that they took.
     pub calls: u64,
+    /// Pipelines, materials and meshes set before draw calls.
+    pub state_changes: u64,
+    /// Vertices of the draws' meshes, each once a draw.
+    pub vertices: u64,
+    /// Triangles of the draws.
+    pub triangles: u64,
+    /// Bytes written to the driver for views and lists of draws.
+    pub bytes_uploaded: u64,
+    /// Time of batching, encoding and submitting views, pictures with their records left out.
+    pub submitting: Duration,
+    /// Time of waiting for their pictures.
+    pub waiting: Duration,
     /// Shadow maps rendered, one a cascade.
     pub shadow_maps: u64,
     /// Pipelines made.

@@ -10,7 +10,7 @@ use raster::backend::{CaptureBackend, View, Work};
 use raster::capture::CaptureJob;
 use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
-use raster::lavapipe::Lavapipe;
+use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
 use techniques::{Layer, Settings, Skips};
@@ -609,4 +609,31 @@ fn vertex_colours_show_and_mask_as_the_same_base_colour_does() {
         }
         assert!(vertex.pictures != plain.pictures, "{alpha:?}");
     }
+}
+
+#[test]
+fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture() {
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Mask(0.5), true),
+        textured(AlphaMode::Blend, true),
+    ];
+    let meshes = (0..3).map(|m| triangles(60, 71 + m as u32, m)).collect();
+    let scene = scene(meshes, materials, vec![checker()]);
+    let captured = capture(&scene, SIZE_PX, 1, BUDGET);
+    let draws = DrawList::new(&scene, 1).unwrap();
+    let set = TextureSet::compress(&scene).unwrap();
+    let mut gpu = device::open(None).unwrap_or_else(|e| panic!("{e}"));
+    gpu.no_capture = Some("what the test took away".into());
+    let mut backend = Lavapipe::on(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
+    let (hmd, settings) = (display(SIZE_PX), Settings::default());
+    let job = job(&scene, &draws, &hmd, BOTH, &settings);
+    let frame = job.frame(&views(&scene, SIZE_PX));
+    job.light(&mut backend, &frame).unwrap();
+    let (pictures, _) = job.plain_frame(&mut backend, &frame).unwrap();
+    assert!(pictures == captured.pictures);
+    let work = backend.work();
+    assert!(work.state_changes > 0 && work.triangles >= 2 * 180 && work.vertices >= 2 * 180);
+    let refused = job.warm_up(&mut backend, &frame).unwrap_err().to_string();
+    assert!(refused.contains("what the test took away"), "{refused}");
 }

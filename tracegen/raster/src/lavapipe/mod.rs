@@ -1,7 +1,7 @@
 //! Capture through lavapipe, Mesa's Vulkan driver on llvmpipe.
 
 mod counter;
-mod device;
+pub mod device;
 mod pipelines;
 mod records;
 mod targets;
@@ -20,6 +20,7 @@ use pipelines::Pipelines;
 use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
 use records::RecordBuffers;
 use scene::Scene;
+use std::time::Instant;
 use targets::{ColorTarget, LayerTarget, Readback, ShadowMaps};
 use techniques::plan::Picture;
 use textures::TextureSet;
@@ -46,8 +47,7 @@ pub struct Lavapipe {
 }
 
 impl Lavapipe {
-    /// Opens the driver and uploads the scene. Regions may produce `record_budget_bytes` of raw
-    /// records before they are split, capped by the driver's limit of 128 MiB.
+    /// Opens lavapipe and uploads the scene, see [`Self::on`].
     ///
     /// # Errors
     /// No driver, unsupported features, sizes beyond its limits.
@@ -58,7 +58,30 @@ impl Lavapipe {
         view_size_px: [u32; 2],
         record_budget_bytes: u64,
     ) -> Result<Self, RasterError> {
-        let gpu = device::open()?;
+        let gpu = device::open(None)?;
+        Self::on(
+            gpu,
+            scene,
+            draws,
+            textures,
+            view_size_px,
+            record_budget_bytes,
+        )
+    }
+
+    /// Uploads the scene to an opened device. Regions may produce `record_budget_bytes` of raw
+    /// records before they are split, capped by the driver's limit of 128 MiB.
+    ///
+    /// # Errors
+    /// Driver errors, sizes beyond the device's limits.
+    pub fn on(
+        gpu: Gpu,
+        scene: &Scene,
+        draws: &DrawList,
+        textures: &TextureSet,
+        view_size_px: [u32; 2],
+        record_budget_bytes: u64,
+    ) -> Result<Self, RasterError> {
         let pipelines = Pipelines::new(&gpu)?;
         let buffers = SceneBuffers::new(&gpu, &pipelines.layouts, scene, draws, textures)?;
         let masked = draws.calls.iter().any(|c| c.mode == DrawMode::Masked);
@@ -132,7 +155,12 @@ impl Lavapipe {
             for &role in roles(call.mode, purpose) {
                 let key = PipelineKey::new(call, material, role, purpose, draws.cascades);
                 self.pipelines.prepare(&self.gpu, key)?;
-                self.work.draws += u64::from(batch.range.end - batch.range.start);
+                let instances = u64::from(batch.range.end - batch.range.start);
+                if let Some(mesh) = &self.scene.meshes[call.mesh] {
+                    self.work.vertices += instances * u64::from(mesh.vertex_count);
+                    self.work.triangles += instances * u64::from(mesh.index_count / 3);
+                }
+                self.work.draws += instances;
                 self.work.calls += 1;
                 plan.push((batch.clone(), key));
             }
@@ -140,16 +168,18 @@ impl Lavapipe {
         self.gpu
             .queue
             .write_buffer(&self.scene.instance_draws, 0, bytemuck::cast_slice(visible));
+        self.work.bytes_uploaded += size_of_val(visible) as u64;
         Ok(plan)
     }
 
-    /// Issues a plan, setting only the state that changes.
+    /// Issues a plan, setting only the state that changes. Tells how many changes there were.
     fn issue(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         draws: &DrawList,
         plan: &[(Batch, PipelineKey)],
-    ) {
+    ) -> u64 {
+        let mut changes = 0;
         let (mut last_key, mut last_material, mut last_mesh) = (None, None, None);
         pass.set_vertex_buffer(1, self.scene.instance_draws.slice(..));
         for (batch, key) in plan {
@@ -162,9 +192,11 @@ impl Lavapipe {
             };
             if last_key.replace(*key) != Some(*key) {
                 pass.set_pipeline(pipeline);
+                changes += 1;
             }
             if last_material.replace(call.material) != Some(call.material) {
                 pass.set_bind_group(1, &self.scene.materials[call.material], &[]);
+                changes += 1;
             }
             if last_mesh.replace(call.mesh) != Some(call.mesh) {
                 pass.set_vertex_buffer(0, mesh.vertices.slice(..));
@@ -172,9 +204,11 @@ impl Lavapipe {
                     pass.set_vertex_buffer(2, colors.slice(..));
                 }
                 pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+                changes += 1;
             }
             pass.draw_indexed(0..mesh.index_count, 0, batch.range.clone());
         }
+        changes
     }
 }
 
@@ -262,16 +296,24 @@ impl CaptureBackend for Lavapipe {
         } else {
             Purpose::Plain
         };
+        if let (Purpose::Capture, Some(what)) = (purpose, &self.gpu.no_capture) {
+            return Err(RasterError::Unsupported {
+                driver: self.gpu.driver.clone(),
+                what: what.clone(),
+            });
+        }
+        let start = Instant::now();
         let plan = self.plan(draws, view.visible, purpose)?;
         self.prepare_target(view)?;
         self.work.regions += 1;
+        self.work.bytes_uploaded += size_of::<ViewData>() as u64 + 4;
         let gpu = &self.gpu;
         let (buffers, target) = (&self.buffers, self.target(view.target)?);
         let data = ViewData::of_eye(view, buffers.capacity);
         gpu.queue
             .write_buffer(&buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         gpu.queue.write_buffer(&buffers.counter, 0, &[0; 4]);
-        gpu.checked("rendering a layer", || {
+        let changes = gpu.checked("rendering a layer", || {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 // Regions add up to a picture: everything is loaded, and the background clears
@@ -307,12 +349,17 @@ impl CaptureBackend for Lavapipe {
             }
             pass.set_pipeline(&self.pipelines.background);
             pass.draw(0..3, 0..1);
-            self.issue(&mut pass, draws, &plan);
+            let changes = self.issue(&mut pass, draws, &plan);
             drop(pass);
             gpu.queue.submit([encoder.finish()]);
+            changes
         })?;
+        self.work.state_changes += changes;
         let Some(sink) = sink else {
+            let submitted = Instant::now();
             gpu.wait("rendering a layer")?;
+            self.work.submitting += submitted - start;
+            self.work.waiting += submitted.elapsed();
             return Ok(Captured::Complete);
         };
         let needed = u64::from(gpu.read(&buffers.counter, 0..4, |bytes| {

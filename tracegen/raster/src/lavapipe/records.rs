@@ -30,6 +30,9 @@ impl RecordBuffers {
     pub fn new(gpu: &Gpu, budget_bytes: u64, has_depths: bool) -> Result<Self, RasterError> {
         let limits = gpu.device.limits();
         let binding = u64::from(limits.max_storage_buffer_binding_size as u32);
+        // A device that cannot capture gets stand-ins.
+        let captures = gpu.no_capture.is_none();
+        let budget_bytes = if captures { budget_bytes } else { 0 };
         let capacity =
             (budget_bytes.min(binding).min(limits.max_buffer_size) / RECORD_BYTES).max(1);
         let depths = if has_depths { capacity } else { 1 };
@@ -43,11 +46,16 @@ impl RecordBuffers {
                 })
             };
             use wgpu::BufferUsages as Usage;
+            let recorded = if captures {
+                Usage::STORAGE | Usage::MAP_READ
+            } else {
+                Usage::STORAGE
+            };
             Self {
-                records: buffer(capacity * RECORD_BYTES, Usage::STORAGE | Usage::MAP_READ),
-                depths: buffer(depths * DEPTH_BYTES, Usage::STORAGE | Usage::MAP_READ),
+                records: buffer(capacity * RECORD_BYTES, recorded),
+                depths: buffer(depths * DEPTH_BYTES, recorded),
                 has_depths,
-                counter: buffer(4, Usage::STORAGE | Usage::MAP_READ | Usage::COPY_DST),
+                counter: buffer(4, recorded | Usage::COPY_DST),
                 capacity: capacity as u32,
                 view_uniform: buffer(
                     size_of::<ViewData>() as u64,
