@@ -196,7 +196,7 @@ fn levels_finer_than_what_is_sampled_are_left_out_and_the_others_stay_the_same()
         ([64, 32], 0, 0),
         ([64, 32], 2, 2),
         ([64, 32], 9, 3),
-        ([30, 16], 2, 0),
+        ([30, 16], 2, 2),
         ([24, 16], 1, 0),
     ] {
         for alpha in [AlphaMode::Opaque, AlphaMode::Mask(0.3), AlphaMode::Blend] {
