@@ -7,7 +7,6 @@ pub mod config;
 pub mod engine;
 pub mod experiment;
 pub mod files;
-pub mod image;
 pub mod order;
 mod palette;
 pub mod paper;

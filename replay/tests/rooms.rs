@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// From the bottom up. A room may use rooms below it; those on one floor may use each other.
 const FLOORS: [&[&str]; 9] = [
-    &["files", "image", "palette", "registry", "result", "size"],
+    &["files", "palette", "registry", "result", "size"],
     &["cache", "config", "order"],
     &["paper", "tmu"],
     &["stream"],

@@ -63,7 +63,7 @@ fn rays_are_traced_without_a_gpu() {
 
 #[test]
 fn only_raster_knows_the_driver() {
-    for package in ["scene", "scenes", "textures", "visibility"] {
+    for package in ["scene", "scenes", "textures", "visibility", "techniques"] {
         assert_free_of(package, &["wgpu", "naga", "raster", "rays"]);
     }
     assert!(tree("raster").iter().any(|n| n == "wgpu"));

@@ -2,7 +2,6 @@
 //! image for the right one.
 
 use crate::files::{self, write_atomically};
-use crate::image::{Picture, png};
 use crate::paper::sgrt as paper;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
 use crate::result::{TOOL, TraceId, scene_name};
@@ -18,6 +17,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::Eye;
+use image_error::{Picture, png};
 use shell::{Output, Progress};
 use std::error::Error;
 use std::path::{Path, PathBuf};

@@ -131,7 +131,7 @@ pub fn count_errors(frame: &Frame, decisions: &[Decision]) -> Accuracy {
         counts.wrong_primitive += u64::from(decision.primitive != truth.primitive && elsewhere);
     }
     let finite: Vec<f32> = errors.into_iter().filter(|e| e.is_finite()).collect();
-    accuracy.position_mean_px = crate::image::mean(&finite);
-    accuracy.position_p99_px = f64::from(crate::image::quantile(&finite, 0.99));
+    accuracy.position_mean_px = image_error::mean(&finite);
+    accuracy.position_p99_px = f64::from(image_error::quantile(&finite, 0.99));
     accuracy
 }

@@ -14,9 +14,9 @@ use super::reproject::{Reprojection, reproject};
 use super::result::{ImageError, Outcome};
 use super::rows::RowNeeds;
 use super::rules::Rule;
-use crate::image::flip::{FlipMap, Prepared};
-use crate::image::{Picture, pixels_per_degree, psnr, ssim};
 use formats::view::Eye;
+use image_error::flip::{FlipMap, Prepared};
+use image_error::{Picture, pixels_per_degree, psnr, ssim};
 
 /// A loaded trace, ready for any number of rules.
 pub struct LoadedTrace<'a> {

@@ -1,7 +1,7 @@
 //! The right image with its bad pixels in yellow, as the paper's figure 1 shows them.
 
 use super::detect::Decision;
-use crate::image::Picture;
+use image_error::Picture;
 
 /// Traced pixels, missing or rejected.
 pub const BAD_PIXEL: [u8; 3] = [255, 230, 0];

@@ -9,8 +9,8 @@ use super::hardware::{Comparison, misses_by_rates, tile_work};
 use super::loaded::{LoadedTrace, RuleRun};
 use super::result::{CurvePoint, Sensitivity};
 use super::rules::Rule;
-use crate::image::Picture;
-use crate::image::flip::FlipMap;
+use image_error::Picture;
+use image_error::flip::FlipMap;
 
 impl LoadedTrace<'_> {
     /// Units' cycles saved against image error, over rules and levels of reuse.

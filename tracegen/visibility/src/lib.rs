@@ -1,4 +1,7 @@
 //! Which draw enters which view or shadow cascade. One technique a file.
 
+pub mod culling;
 pub mod frustum;
 pub mod triangles;
+
+pub use culling::Culling;

@@ -22,7 +22,7 @@ fn entry_of(view: View) -> Entry {
     let rule: Rule = crate::sgrt::DEFAULT_RULE.parse().expect("a rule");
     let run = |rule: &Rule| loaded.run(rule, Reuse::Primary, &model).expect("runs");
     let (ours, plain) = (run(&rule), run(&Rule::default()));
-    let png = crate::image::png::encode(&ours.picture).expect("a picture");
+    let png = image_error::png::encode(&ours.picture).expect("a picture");
     Entry {
         report: Report {
             schema: SCHEMA.to_owned(),

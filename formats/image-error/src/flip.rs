@@ -2,10 +2,10 @@
 //! for low dynamic range: how different two pictures look when flipped between in place.
 //!
 //! The kernels are sampled per degree of visual angle, so every value belongs to a number of
-//! pixels per degree; [`super::pixels_per_degree`] gives an eye's.
+//! pixels per degree; [`crate::pixels_per_degree`] gives an eye's.
 
-use super::Picture;
-use super::color;
+use crate::Picture;
+use crate::color;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
@@ -39,13 +39,13 @@ impl FlipMap {
     /// Mean error.
     #[must_use]
     pub fn mean(&self) -> f64 {
-        super::mean(&self.errors)
+        crate::mean(&self.errors)
     }
 
     /// 99th percentile of the error.
     #[must_use]
     pub fn p99(&self) -> f64 {
-        f64::from(super::quantile(&self.errors, 0.99))
+        f64::from(crate::quantile(&self.errors, 0.99))
     }
 
     /// The map in FLIP's usual colours.
@@ -56,7 +56,7 @@ impl FlipMap {
             pixels: self
                 .errors
                 .par_iter()
-                .map(|&e| super::colormap::magma(e))
+                .map(|&e| crate::colormap::magma(e))
                 .collect(),
         }
     }
@@ -78,13 +78,28 @@ impl Prepared {
     #[must_use]
     pub fn new(picture: &Picture, pixels_per_degree: f32) -> Self {
         let size = [picture.width(), picture.height()];
-        let opponent: Vec<[f32; 3]> = picture.pixels.par_iter().map(|&p| opponent(p)).collect();
+        let linear: [f32; 256] =
+            std::array::from_fn(|code| color::linear_from_srgb(code as f32 / 255.0));
+        let opponent: Vec<[f32; 3]> = picture
+            .pixels
+            .par_iter()
+            .map(|pixel| {
+                let linear = pixel.map(|code| linear[usize::from(code)]);
+                color::ycxcz_from_xyz(color::xyz_from_linear(linear))
+            })
+            .collect();
         Self {
             size_px: picture.size_px,
             pixels_per_degree,
             lab: filtered_lab(&opponent, size, pixels_per_degree),
             features: feature_strengths(&opponent, size, pixels_per_degree),
         }
+    }
+
+    /// Pixels per degree that the filters were made for.
+    #[must_use]
+    pub fn pixels_per_degree(&self) -> f32 {
+        self.pixels_per_degree
     }
 
     /// Error map of a test picture against this reference. Pixels outside either are left out.
@@ -117,12 +132,6 @@ impl Prepared {
 #[must_use]
 pub fn flip(reference: &Picture, test: &Picture, pixels_per_degree: f32) -> FlipMap {
     Prepared::new(reference, pixels_per_degree).compare(&Prepared::new(test, pixels_per_degree))
-}
-
-/// YCxCz of an 8-bit sRGB colour.
-fn opponent(pixel: [u8; 3]) -> [f32; 3] {
-    let linear = pixel.map(|c| color::linear_from_srgb(f32::from(c) / 255.0));
-    color::ycxcz_from_xyz(color::xyz_from_linear(linear))
 }
 
 /// Applies the contrast sensitivity functions and moves to Hunt-adjusted CIELAB.
@@ -167,7 +176,9 @@ fn gaussian((a, b): Lobe, radius: usize, ppd: f32) -> Vec<f32> {
     (0..=2 * radius)
         .map(|i| {
             let x_deg = (i as f32 - radius as f32) / ppd;
-            amplitude * (-PI * PI * x_deg * x_deg / b).exp()
+            let weight = (-PI * PI * x_deg * x_deg / b).exp();
+            // Denormal weights change nothing and make every product slow.
+            amplitude * if weight < 1e-30 { 0.0 } else { weight }
         })
         .collect()
 }
@@ -237,7 +248,7 @@ fn convolve<const N: usize, const M: usize>(
     [width, height]: [usize; 2],
     axis: Axis,
     radius: usize,
-    kernel: impl Fn(&mut dyn Iterator<Item = [f32; N]>) -> [f32; M] + Sync,
+    kernel: impl Fn(Window<N>) -> [f32; M] + Sync,
 ) -> Vec<[f32; M]> {
     let mut out = vec![[0.0; M]; source.len()];
     if source.is_empty() {
@@ -245,19 +256,46 @@ fn convolve<const N: usize, const M: usize>(
     }
     out.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.iter_mut().enumerate() {
-            *pixel = match axis {
-                Axis::Horizontal => kernel(&mut (0..=2 * radius).map(|i| {
-                    let at = (x + i).saturating_sub(radius).min(width - 1);
-                    source[y * width + at]
-                })),
-                Axis::Vertical => kernel(&mut (0..=2 * radius).map(|i| {
-                    let at = (y + i).saturating_sub(radius).min(height - 1);
-                    source[at * width + x]
-                })),
+            let (first, stride, length, at) = match axis {
+                Axis::Horizontal => (y * width, 1, width, x),
+                Axis::Vertical => (x, width, height, y),
             };
+            *pixel = kernel(Window {
+                source,
+                first,
+                stride,
+                last: length - 1,
+                radius,
+                steps: at..at + 2 * radius + 1,
+            });
         }
     });
     out
+}
+
+/// The pixels around one, along a line of a picture.
+struct Window<'a, const N: usize> {
+    source: &'a [[f32; N]],
+    /// Index of the line's first pixel.
+    first: usize,
+    /// From a pixel of the line to the next.
+    stride: usize,
+    /// Number of the line's last pixel.
+    last: usize,
+    radius: usize,
+    /// Pixels left, counted from `radius` before the line.
+    steps: std::ops::Range<usize>,
+}
+
+impl<const N: usize> Iterator for Window<'_, N> {
+    type Item = [f32; N];
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<[f32; N]> {
+        let step = self.steps.next()?;
+        let at = step.saturating_sub(self.radius).min(self.last);
+        Some(self.source[self.first + at * self.stride])
+    }
 }
 
 /// Hunt effect: chroma counts for more in the light.
@@ -289,8 +327,8 @@ fn color_error(distance: f32, largest: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_pictures::{noise, scene_like, shifted};
     use super::*;
+    use crate::test_pictures::{noise, scene_like, shifted};
 
     /// The authors' C++ implementation.
     fn reference_flip(a: &Picture, b: &Picture, ppd: f32) -> Vec<f32> {

@@ -1,6 +1,6 @@
 //! Peak signal-to-noise ratio of 8-bit pictures.
 
-use super::Picture;
+use crate::Picture;
 
 /// Decibels for identical pictures, where the ratio is infinite (JSON has no infinity).
 pub const IDENTICAL_DB: f64 = 100.0;
@@ -17,6 +17,11 @@ pub fn psnr_db(reference: &Picture, test: &Picture) -> f64 {
         .zip(test.pixels.iter().flatten())
         .map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2))
         .sum();
+    psnr_of_squares(squares, count)
+}
+
+/// The ratio from the sum of squared differences of 8-bit codes and the number of codes.
+pub(crate) fn psnr_of_squares(squares: u64, count: usize) -> f64 {
     if squares == 0 || count == 0 {
         return IDENTICAL_DB;
     }
@@ -26,8 +31,8 @@ pub fn psnr_db(reference: &Picture, test: &Picture) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_pictures::noise;
     use super::*;
+    use crate::test_pictures::noise;
 
     #[test]
     fn one_code_of_difference_everywhere_is_48_db() {

@@ -1,6 +1,6 @@
 //! Structural similarity (Wang et al. 2004) of the luma of two pictures.
 
-use super::Picture;
+use crate::Picture;
 use rayon::prelude::*;
 
 const WINDOW_RADIUS: usize = 5;
@@ -12,10 +12,16 @@ const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 /// Gaussian window of deviation 1.5; windows are cut and renormalised at the edges.
 #[must_use]
 pub fn ssim(reference: &Picture, test: &Picture) -> f64 {
-    let size = [reference.width(), reference.height()];
     if reference.pixels.is_empty() || reference.size_px != test.size_px {
         return if reference == test { 1.0 } else { 0.0 };
     }
+    let values = ssim_map(reference, test);
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// SSIM of each pixel's window, of two pictures of one size.
+pub(crate) fn ssim_map(reference: &Picture, test: &Picture) -> Vec<f64> {
+    let size = [reference.width(), reference.height()];
     // Moments: a, b, a^2, b^2, ab; one separable pass each way.
     let moments: Vec<[f64; 5]> = reference
         .pixels
@@ -28,8 +34,7 @@ pub fn ssim(reference: &Picture, test: &Picture) -> f64 {
         .collect();
     let horizontal = blur(&moments, size, false);
     let local = blur(&horizontal, size, true);
-    let values: Vec<f64> = local.par_iter().map(|m| local_ssim(*m)).collect();
-    values.iter().sum::<f64>() / values.len() as f64
+    local.par_iter().map(|m| local_ssim(*m)).collect()
 }
 
 fn luma([r, g, b]: [u8; 3]) -> f64 {
@@ -77,8 +82,8 @@ fn blur(source: &[[f64; 5]], [width, height]: [usize; 2], vertical: bool) -> Vec
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_pictures::{noise, scene_like, shifted};
     use super::*;
+    use crate::test_pictures::{noise, scene_like, shifted};
 
     /// Straight from the definition: every window summed in two dimensions.
     fn brute_force(a: &Picture, b: &Picture) -> f64 {

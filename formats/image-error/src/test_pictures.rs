@@ -1,6 +1,6 @@
 //! Pictures for the metrics' tests.
 
-use super::Picture;
+use crate::Picture;
 
 /// Uniform noise from a seed.
 pub fn noise(size_px: [u32; 2], seed: u32) -> Picture {

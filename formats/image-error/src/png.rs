@@ -1,6 +1,6 @@
 //! Pictures as PNG files.
 
-use super::Picture;
+use crate::Picture;
 use image::ImageEncoder;
 use image::codecs::png::PngEncoder;
 
@@ -36,8 +36,8 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>, PngError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_pictures::noise;
     use super::*;
+    use crate::test_pictures::noise;
 
     #[test]
     fn an_encoded_picture_decodes_to_the_same_pixels() {

@@ -1,13 +1,18 @@
-//! Image error as a viewer of the head-mounted display would see it: FLIP, PSNR and SSIM.
+//! Image error as a viewer of the head-mounted display would see it: FLIP, PSNR and SSIM of a
+//! picture inside the part that the lens shows, and flicker from frame to frame.
 //!
 //! Metrics compare what the display shows, so all of them work on 8-bit sRGB pictures.
 
 pub mod color;
 pub mod colormap;
+pub mod flicker;
 pub mod flip;
 pub mod png;
 pub mod psnr;
 pub mod ssim;
+mod visible;
+
+pub use visible::{Mask, PictureError, Reference};
 
 use formats::view::FovTangents;
 use rayon::prelude::*;

@@ -1,0 +1,263 @@
+//! What a capture leaves out or does more coarsely.
+
+use crate::Gaze;
+use formats::view::Hmd;
+use serde::{Deserialize, Serialize};
+use visibility::Culling;
+
+/// What a capture leaves out or does more coarsely; the default is the baseline.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct Settings {
+    /// How the draws of each view are found.
+    pub culling: Culling,
+    /// Draws hidden behind what the last frame showed are left out.
+    pub occlusion: bool,
+    /// Both eyes in one submission.
+    pub multiview: bool,
+    /// Nothing outside the lens is drawn.
+    pub hidden_area_mask: bool,
+    /// Far geometry once for both eyes.
+    pub far_field: Option<FarField>,
+    /// The periphery more coarsely.
+    pub foveation: Option<Foveation>,
+}
+
+/// One picture of the far field for both eyes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct FarField {
+    /// Where it begins.
+    pub split: Split,
+    /// How the eyes get it.
+    #[serde(default)]
+    pub variant: Variant,
+}
+
+/// Where the far field begins.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case")]
+pub enum Split {
+    /// At this distance.
+    Metres(f32),
+    /// Where a point is off by at most so many pixels.
+    Pixels(f32),
+    /// Where a frame costs least, no point being off by more than so many pixels.
+    LeastWork {
+        /// As for `pixels`.
+        within_px: f32,
+    },
+}
+
+/// How both eyes get the picture of the far field.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variant {
+    /// As a camera between the eyes sees it.
+    #[default]
+    Plain,
+    /// Shifted for each eye by the disparity at the split.
+    DepthShift,
+    /// From the left eye in even frames, from the right eye in odd ones.
+    AlternateEye,
+}
+
+/// Coarser shading away from the gaze.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Foveation {
+    /// How.
+    pub kind: FoveationKind,
+    /// Where the user looks.
+    #[serde(default)]
+    pub gaze: Gaze,
+    /// How much coarser at which angle.
+    #[serde(default)]
+    pub rates: Rates,
+}
+
+/// How the periphery is shaded more coarsely.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FoveationKind {
+    /// A rate for each tile, by its angle from the gaze.
+    Rings,
+    /// 3x3 viewports, the outer ones at half the resolution.
+    MultiResolution,
+    /// Every other 2x2 quad, from the first angle of the rates on.
+    RadialDensity,
+}
+
+/// Shading rates by angle from the gaze.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Rates {
+    /// Degrees from the gaze at which rates 1/2, 1/4, 1/8 and 1/16 begin, ascending.
+    pub edges_deg: [f32; 4],
+}
+
+impl Default for Rates {
+    fn default() -> Self {
+        Self {
+            edges_deg: [15.0, 25.0, 35.0, 45.0],
+        }
+    }
+}
+
+/// Settings that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{what}: expected {expected}, found {found}")]
+pub struct SettingsError {
+    /// Which setting.
+    pub what: &'static str,
+    /// What it may be.
+    pub expected: String,
+    /// What it is.
+    pub found: String,
+}
+
+impl Settings {
+    /// Checks every figure, and that no two techniques exclude each other.
+    ///
+    /// # Errors
+    /// The first setting that cannot be, and what it may be.
+    pub fn check(&self, hmd: &Hmd) -> Result<(), SettingsError> {
+        if let Some(foveation) = &self.foveation {
+            foveation.check(hmd)?;
+        }
+        if let Some(far_field) = &self.far_field {
+            far_field.check()?;
+        }
+        Ok(())
+    }
+}
+
+impl FarField {
+    fn check(&self) -> Result<(), SettingsError> {
+        let ok = match self.split {
+            Split::Metres(m) => m.is_finite() && m > 0.0,
+            Split::Pixels(px) | Split::LeastWork { within_px: px } => px.is_finite() && px > 0.0,
+        };
+        if ok {
+            return Ok(());
+        }
+        Err(SettingsError {
+            what: "split of the far field",
+            expected: "a number above 0".into(),
+            found: format!("{:?}", self.split),
+        })
+    }
+}
+
+impl Foveation {
+    fn check(&self, hmd: &Hmd) -> Result<(), SettingsError> {
+        let edges = self.rates.edges_deg;
+        if !(edges.iter().all(|edge| (0.0..=180.0).contains(edge)) && edges.is_sorted()) {
+            return Err(SettingsError {
+                what: "angles of the shading rates",
+                expected: "0 to 180 degrees, ascending".into(),
+                found: format!("{edges:?}"),
+            });
+        }
+        for deg in self.gaze.given() {
+            if !in_view(hmd, deg) {
+                return Err(SettingsError {
+                    what: "gaze",
+                    expected: format!("a direction inside an eye's view, {}", spans(hmd)),
+                    found: format!("{},{} degrees", deg[0], deg[1]),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether an eye's frustum holds a direction.
+fn in_view(hmd: &Hmd, deg: [f32; 2]) -> bool {
+    let sees = |eye: usize| {
+        let fov = &hmd.fov[eye];
+        crate::gaze::tangents(hmd, eye, deg).is_some_and(|[x, y]| {
+            (-fov.left..=fov.right).contains(&x) && (-fov.down..=fov.up).contains(&y)
+        })
+    };
+    sees(0) || sees(1)
+}
+
+/// The widest angles of both eyes, for messages.
+fn spans(hmd: &Hmd) -> String {
+    let degrees = |tangent: f32| tangent.atan().to_degrees();
+    let [left, right] = &hmd.fov;
+    format!(
+        "at most {:.1} degrees left, {:.1} right, {:.1} up and {:.1} down",
+        degrees(left.left) + hmd.cant_deg,
+        degrees(right.right) + hmd.cant_deg,
+        degrees(left.up.max(right.up)),
+        degrees(left.down.max(right.down))
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use formats::view::FovTangents;
+
+    fn hmd() -> Hmd {
+        let fov = |left, right| FovTangents {
+            left,
+            right,
+            up: 1.0,
+            down: 1.0,
+        };
+        Hmd {
+            eye_size_px: [64, 64],
+            fov: [fov(1.2, 0.8), fov(0.8, 1.2)],
+            ..Hmd::default()
+        }
+    }
+
+    fn looking(deg: [f32; 2]) -> Settings {
+        Settings {
+            foveation: Some(Foveation {
+                kind: FoveationKind::Rings,
+                gaze: Gaze::Fixed(deg),
+                rates: Rates::default(),
+            }),
+            ..Settings::default()
+        }
+    }
+
+    #[test]
+    fn the_baseline_and_every_setting_survive_json() {
+        for settings in [Settings::default(), looking([3.0, -4.0])] {
+            let text = serde_json::to_string(&settings).unwrap();
+            assert_eq!(
+                serde_json::from_str::<Settings>(&text).unwrap(),
+                settings,
+                "{text}"
+            );
+        }
+        assert!(serde_json::from_str::<Settings>(r#"{"cullng":"none"}"#).is_err());
+    }
+
+    #[test]
+    fn a_gaze_that_one_eye_sees_is_taken_and_one_that_none_sees_is_refused() {
+        // The left eye's view ends at 38.7 degrees to the right, the right eye's at 50.2.
+        for deg in [[0.0, 0.0], [45.0, 0.0], [-45.0, 44.0]] {
+            assert_eq!(looking(deg).check(&hmd()), Ok(()));
+        }
+        for deg in [[51.0, 0.0], [0.0, -46.0], [f32::NAN, 0.0], [0.0, 179.0]] {
+            let error = looking(deg).check(&hmd()).unwrap_err().to_string();
+            assert!(error.contains("50.2 degrees left"), "{error}");
+        }
+    }
+
+    #[test]
+    fn rates_must_get_coarser_outwards() {
+        let mut settings = looking([0.0, 0.0]);
+        if let Some(foveation) = &mut settings.foveation {
+            foveation.rates.edges_deg = [20.0, 10.0, 30.0, 40.0];
+        }
+        let error = settings.check(&hmd()).unwrap_err().to_string();
+        assert!(error.contains("ascending"), "{error}");
+    }
+}
