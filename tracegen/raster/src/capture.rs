@@ -9,13 +9,16 @@ use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, Hmd, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
+use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::{FramePlan, Layer, Settings};
+use techniques::{FramePlan, Layer, Settings, Skips};
 
 /// What to capture, the same for plain rendering and capture.
 pub struct CaptureJob<'a> {
-    /// Draws.
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its draws.
     pub draws: &'a DrawList,
     /// Lights; cascades are fitted per frame.
     pub lighting: Lighting,
@@ -29,6 +32,8 @@ pub struct CaptureJob<'a> {
     pub eyes: &'a [Eye],
     /// What is left out or done more coarsely.
     pub settings: &'a Settings,
+    /// What is left out because nobody sees it.
+    pub skips: Skips,
 }
 
 /// The pictures of one frame, one an eye: sRGB RGBA8.
@@ -64,6 +69,13 @@ impl CaptureJob<'_> {
     /// layer may see.
     #[must_use]
     pub fn frame(&self, views: &FrameViews) -> Frame {
+        let mut frame = self.boxes_seen(views);
+        self.skip(&mut frame);
+        frame
+    }
+
+    /// The frame as the boxes of its draws tell it.
+    pub(crate) fn boxes_seen(&self, views: &FrameViews) -> Frame {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
         lighting.cascades = cascades::fit(
@@ -168,6 +180,7 @@ impl CaptureJob<'_> {
                 backend: &mut *backend,
                 draws: self.draws,
                 view,
+                skip_regions: self.skips.regions,
             };
             let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
             counts += recorded.counts;
@@ -201,6 +214,7 @@ struct ViewCapturer<'a> {
     backend: &'a mut dyn CaptureBackend,
     draws: &'a DrawList,
     view: View<'a>,
+    skip_regions: bool,
 }
 
 impl Capturer for ViewCapturer<'_> {
@@ -212,7 +226,11 @@ impl Capturer for ViewCapturer<'_> {
 
     fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, RasterError> {
         // A part of the layer needs only the draws that may touch it.
-        let touching = self.draws.touching(&self.view, region);
+        let touching = if self.skip_regions {
+            self.draws.touching(&self.view, region)
+        } else {
+            self.view.visible.to_vec()
+        };
         let view = View {
             visible: &touching,
             ..self.view

@@ -13,7 +13,7 @@ use raster::error::RasterError;
 use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
-use techniques::{Layer, Settings};
+use techniques::{Layer, Settings, Skips};
 use textures::TextureSet;
 
 const SIZE_PX: [u32; 2] = [200, 136];
@@ -47,13 +47,14 @@ fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
 }
 
 fn job<'a>(
-    scene: &Scene,
+    scene: &'a Scene,
     draws: &'a DrawList,
     hmd: &'a Hmd,
     eyes: &'a [Eye],
     settings: &'a Settings,
 ) -> CaptureJob<'a> {
     CaptureJob {
+        scene,
         draws,
         lighting: Lighting::new(scene),
         bounds: scene.bounds().unwrap_or_default(),
@@ -61,6 +62,7 @@ fn job<'a>(
         hmd,
         eyes,
         settings,
+        skips: Skips::default(),
     }
 }
 

@@ -1,20 +1,14 @@
-//! Thousands of damaged paths: each is read or refused, quickly and within bounds.
-//!
-//! The cases are the same every time. `MUTATIONS=n` tries n a seed instead.
+//! Damaged paths of the head and of the gaze.
 
-#[path = "mutations/memory.rs"]
-mod memory;
-#[path = "mutations/mutate.rs"]
-mod mutate;
-
-use mutate::{Random, mutate};
+use crate::memory;
+use crate::mutate::{Random, mutate};
 use scene::paths::{HeadPath, Moments, PathOrigin, PathSpec, read_gazes};
 use scene::{Scene, SceneError, cameras};
 use serde_json::json;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-const CASES_PER_SEED: u64 = 2000;
+const CASES_PER_SEED: u64 = 700;
 const MAX_TIME: Duration = Duration::from_secs(5);
 const MAX_BYTES: usize = 1 << 28;
 
@@ -101,6 +95,7 @@ fn read(file: &Path) -> Result<(), SceneError> {
 
 #[test]
 fn no_damaged_path_panics_takes_long_or_takes_much_memory() {
+    let _alone = memory::alone();
     let cases = std::env::var("MUTATIONS").map_or(CASES_PER_SEED, |n| n.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let gltf = gltf();
@@ -130,10 +125,10 @@ fn no_damaged_path_panics_takes_long_or_takes_much_memory() {
                         !text.contains(char::is_control),
                         "{name}, case {case}: {text:?}"
                     );
-                    assert!(
-                        text.len() < 4000 && text.contains(name),
-                        "{name}, case {case}: {text}"
-                    );
+                    assert!(text.len() < 4000, "{name}, case {case}: {text}");
+                    // A glTF file may name another one, which the error then names.
+                    let names = text.contains(name) || name.ends_with("gltf");
+                    assert!(names, "{name}, case {case}: {text}");
                     refused += 1;
                 }
             }
