@@ -3,7 +3,7 @@
 use super::cache_args::CacheArgs;
 use super::path_args::PathArgs;
 use super::raster::{self, CASCADES};
-use super::scene_args::{SceneArgs, SceneSetup};
+use super::scene_args::SceneArgs;
 use crate::study::auto::{AutoRecord, Budget, Choice, choose};
 use crate::study::folder::{self, Folder, RowRecord, Subject};
 use crate::study::frames;
@@ -15,7 +15,7 @@ use ::raster::lavapipe::{Lavapipe, device};
 use ::raster::lighting::Lighting;
 use anyhow::{Context, ensure};
 use clap::Args;
-use formats::view::{FrameViews, Lens};
+use formats::view::Lens;
 use scene::LoadOptions;
 use shell::{Progress, Threads, note};
 use std::path::{Path, PathBuf};
@@ -116,18 +116,12 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     } else {
         setup.scene.shadow_cascades.min(CASCADES)
     };
-    let bounds = setup.scene.bounds().unwrap_or_default();
-    let mut world = World {
-        draws: DrawList::new(&setup.scene, cascades)?,
-        lighting: Lighting::new(&setup.scene),
-        bounds,
-        shadow_range_m: raster::shadow_range_m(&setup, bounds),
-        hmd: setup.hmd.clone(),
-        lens,
-        views: setup.frames.clone(),
-        tables: formats::textrace::Tables::default(),
-    };
-    let uploads = textures(&world, &setup, &rows, &extent, cache.as_ref())?;
+    let draws = DrawList::new(&setup.scene, cascades)?;
+    // Techniques and frames may sample what others do not.
+    let uploads = TextureSet::prepare(&setup.scene, |_| Some(0), cache.as_ref())?;
+    for note in &uploads.notes {
+        shell::warn(note);
+    }
     let (adapter, captures) = (gpu.adapter.clone(), gpu.no_capture.is_none());
     if let Some(what) = &gpu.no_capture {
         shell::warn(&format!(
@@ -136,28 +130,15 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     }
     let software_driver = gpu.is_software;
     let size_px = setup.hmd.eye_size_px;
-    let mut backend = Lavapipe::on(
-        gpu,
-        &setup.scene,
-        &world.draws,
-        &uploads,
-        size_px,
-        RECORD_BUDGET,
-    )?;
-    world.tables = raster::tables(
-        &setup,
-        &args.scene.scene,
-        &world.draws,
-        &uploads,
-        &backend,
-        Vec::new(),
-    );
+    let (scene, spec) = (&setup.scene, &args.scene.scene);
+    let mut backend = Lavapipe::on(gpu, scene, &draws, &uploads, size_px, RECORD_BUDGET)?;
+    let tables = raster::tables(&setup, spec, &draws, &uploads, &backend, Vec::new());
     drop(uploads);
     let subject = Subject {
         tool: super::tool(),
-        scene: args.scene.scene.clone(),
-        scene_triangles: setup.scene.triangle_count(),
-        instances: setup.scene.instances.len() as u64,
+        scene: spec.clone(),
+        scene_triangles: scene.triangle_count(),
+        instances: scene.instances.len() as u64,
         camera: setup.camera.name.clone(),
         path: args.path.path.to_string(),
         path_frames: args.path_frames,
@@ -168,7 +149,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         lens,
         pixels_per_degree: image_error::pixels_per_degree(size_px[0], &setup.hmd.fov[0]),
         adapter,
-        driver: world.tables.meta.driver.clone(),
+        driver: tables.meta.driver.clone(),
         software_driver,
         baseline: Row::baseline().name,
         repeats: args.repeats,
@@ -176,7 +157,18 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         shadow_cascades: cascades,
         input_checksum: checksum(&inputs)?,
     };
-    drop(setup);
+    let bounds = scene.bounds().unwrap_or_default();
+    let world = World {
+        draws,
+        lighting: Lighting::new(scene),
+        bounds,
+        shadow_range_m: raster::shadow_range_m(&setup, bounds),
+        lens,
+        tables,
+        hmd: setup.hmd,
+        views: setup.frames,
+        scene: setup.scene,
+    };
     let folder = Folder::create(&args.output, &subject)?;
     let mut bench = Bench {
         world: &world,
@@ -283,31 +275,6 @@ impl TechniquesArgs {
             repeats: self.repeats,
         }
     }
-}
-
-/// The textures that any row may sample in the frames that are rendered.
-fn textures(
-    world: &World,
-    setup: &SceneSetup,
-    rows: &[Row],
-    extent: &Extent,
-    cache: Option<&textures::Cache>,
-) -> anyhow::Result<TextureSet> {
-    let views: Vec<FrameViews> = (extent.rendered())
-        .map(|(frame, _)| setup.frames[frame as usize].clone())
-        .collect();
-    let mut seen = vec![false; setup.scene.images.len()];
-    for row in rows {
-        let of_row = world.job(&row.settings).seen_images(&setup.scene, &views);
-        for (seen, of_row) in seen.iter_mut().zip(of_row) {
-            *seen |= of_row;
-        }
-    }
-    let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache)?;
-    for note in &uploads.notes {
-        shell::warn(note);
-    }
-    Ok(uploads)
 }
 
 /// Checksum of files' bytes, one after the other.

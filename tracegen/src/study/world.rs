@@ -9,15 +9,18 @@ use raster::error::RasterError;
 use raster::frame::Frame;
 use raster::lighting::Lighting;
 use record::CaptureCounts;
+use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::Settings;
+use techniques::{Settings, Skips};
 
 const EYES: &[Eye] = &[Eye::Left, Eye::Right];
 
 /// A scene and a path through it, ready to be rendered.
 #[derive(Debug)]
 pub struct World {
+    /// The scene.
+    pub scene: Scene,
     /// Draws.
     pub draws: DrawList,
     /// Lights.
@@ -56,6 +59,7 @@ impl World {
     #[must_use]
     pub fn job<'a>(&'a self, settings: &'a Settings) -> CaptureJob<'a> {
         CaptureJob {
+            scene: &self.scene,
             draws: &self.draws,
             lighting: self.lighting.clone(),
             bounds: self.bounds,
@@ -63,6 +67,8 @@ impl World {
             hmd: &self.hmd,
             eyes: EYES,
             settings,
+            // What is searched for anew in every frame would hide what the techniques find.
+            skips: Skips::NONE,
         }
     }
 

@@ -44,8 +44,9 @@ impl Bench<'_> {
         let mut worst = 0.0_f64;
         for (eye, (picture, reference)) in pictures.iter().zip(&references).enumerate() {
             let hmd = &self.world.hmd;
+            let lens = self.world.lens[eye];
             let (fov, size_px) = (&hmd.fov[eye], hmd.eye_size_px);
-            let mask = Mask::of_lens(size_px, fov, &self.world.lens[eye]);
+            let mask = Mask::circle(size_px, fov, lens.center, lens.radius);
             let ppd = image_error::pixels_per_degree(size_px[0], fov);
             let error = Reference::new(of_rgba(size_px, reference), mask, ppd)
                 .and_then(|reference| reference.error(&of_rgba(size_px, picture)))
