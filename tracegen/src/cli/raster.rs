@@ -17,6 +17,7 @@ use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use techniques::Settings;
 use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
@@ -102,13 +103,15 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
+    let settings = Settings::default();
     let job = CaptureJob {
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
         shadow_range_m: shadow_range_m(&setup, bounds),
-        size_px,
-        views: args.views.eyes(),
+        hmd: &setup.hmd,
+        eyes: args.views.eyes(),
+        settings: &settings,
     };
     let seen = job.seen_images(&setup.scene, &setup.frames);
     let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache.as_ref())?;
@@ -117,7 +120,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         shell::warn(note);
     }
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
-    let passes = job.passes(setup.frames.len() as u32);
+    let passes = job.passes(&setup.frames);
     let tables = tables(
         &setup,
         &args.scene.scene,
@@ -150,7 +153,8 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
 
     let mut writer = TextraceWriter::create(&args.output, &tables)?;
     let mut first_pictures: Option<Pictures> = None;
-    for (number, views) in setup.frames.iter().enumerate() {
+    let mut first_pass = 0;
+    for views in &setup.frames {
         let frame = match first.take() {
             Some(first) => first,
             None => {
@@ -167,9 +171,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
             Some(pictures)
         };
         let start = Instant::now();
-        let first_pass = number * job.views.len();
         let (pictures, counts, sorting) =
             job.capture_frame(&mut backend, &frame, first_pass, &mut recorder, &mut writer)?;
+        first_pass += frame.plan.layers.len();
         summary.sorting += sorting;
         summary.captured += start.elapsed();
         summary.counts += counts;
@@ -202,7 +206,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
-    let views = [setup.frames.len(), job.views.len()];
+    let views = [setup.frames.len(), job.eyes.len()];
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
 }
