@@ -63,6 +63,7 @@ mod tests {
             calls: meshes.iter().map(call).collect(),
             groups: Vec::new(),
             cascades: 0,
+            hierarchy: visibility::Hierarchy::default(),
         }
     }
 

@@ -9,7 +9,7 @@ use glam::{Affine3A, Mat4, Vec3};
 use record::Region;
 use scene::{AlphaMode, Material, Scene};
 use textures::TextureSet;
-use visibility::frustum;
+use visibility::{Hierarchy, frustum};
 
 /// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
 pub const SHADOW_SIZE: u32 = 2048;
@@ -71,6 +71,8 @@ pub struct DrawList {
     pub groups: Vec<MaterialGroups>,
     /// Shadow cascades that lit draws sample, 0 to 4.
     pub cascades: u32,
+    /// The tree over the draws' bounds.
+    pub hierarchy: Hierarchy,
 }
 
 impl DrawList {
@@ -136,7 +138,9 @@ impl DrawList {
                     })?;
             }
         }
+        let bounds: Vec<[Vec3; 2]> = calls.iter().map(|call| call.bounds).collect();
         Ok(Self {
+            hierarchy: Hierarchy::new(&bounds),
             calls,
             groups: scene.materials.iter().map(MaterialGroups::new).collect(),
             cascades,
@@ -146,7 +150,16 @@ impl DrawList {
     /// Indices of the draws that a view or a shadow cascade may see, ascending.
     #[must_use]
     pub fn visible(&self, clip_from_world: Mat4) -> Vec<u32> {
-        frustum::visible(self.calls.iter().map(|call| call.bounds), clip_from_world)
+        self.hierarchy.entering(clip_from_world)
+    }
+
+    /// Those of `list` that a view may see.
+    #[must_use]
+    pub(crate) fn visible_of(&self, list: &[u32], clip_from_world: Mat4) -> Vec<u32> {
+        let bounds = list.iter().map(|&draw| self.calls[draw as usize].bounds);
+        (frustum::visible(bounds, clip_from_world).into_iter())
+            .map(|position| list[position as usize])
+            .collect()
     }
 
     /// The draws of a layer that may touch a region of it, ascending.
@@ -158,10 +171,7 @@ impl DrawList {
         }
         let clip =
             frustum::crop(region.origin_px, region.size_px, size_px) * view.clip_from_world();
-        let bounds = (view.visible.iter()).map(|&draw| self.calls[draw as usize].bounds);
-        (frustum::visible(bounds, clip).into_iter())
-            .map(|position| view.visible[position as usize])
-            .collect()
+        self.visible_of(view.visible, clip)
     }
 
     /// Texture table of the trace: the scene's textures in their order, then the shadow maps.
@@ -273,12 +283,21 @@ fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
     index as u16
 }
 
+/// World-space bounds of a mesh, rounding of its vertices on the way through any driver included.
 fn bounds(positions: &[Vec3], transform: &Affine3A) -> [Vec3; 2] {
+    // Parts of the magnitude of the sums that a coordinate comes from: 8 units in the last place.
+    const ROUNDING: f32 = 8.0 * f32::EPSILON / 2.0;
     let empty = [Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY)];
-    positions.iter().fold(empty, |[lo, hi], p| {
-        let p = transform.transform_point3(*p);
-        [lo.min(p), hi.max(p)]
-    })
+    let m = &transform.matrix3;
+    let axes = [m.x_axis, m.y_axis, m.z_axis].map(|axis| Vec3::from(axis.abs()));
+    let start = Vec3::from(transform.translation.abs());
+    let ([lo, hi], terms) = (positions.iter()).fold((empty, Vec3::ZERO), |([lo, hi], most), &p| {
+        let world = transform.transform_point3(p);
+        let p = p.abs();
+        let terms = axes[0] * p.x + axes[1] * p.y + axes[2] * p.z + start;
+        ([lo.min(world), hi.max(world)], most.max(terms))
+    });
+    [lo - terms * ROUNDING, hi + terms * ROUNDING]
 }
 
 #[cfg(test)]

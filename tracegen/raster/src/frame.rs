@@ -3,7 +3,9 @@
 use super::backend::{View, clip_from_world};
 use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
+use std::time::{Duration, Instant};
 use techniques::{FramePlan, Stage};
+use visibility::{Culling, Rig, Scratch, TooWide};
 
 /// One frame, ready to be drawn.
 #[derive(Clone, Debug)]
@@ -14,30 +16,58 @@ pub struct Frame {
     pub casters: Vec<Vec<u32>>,
     /// The layers, and how the pictures come of them.
     pub plan: FramePlan,
+    /// Boxes that were tested to find the draws of the eyes' pictures.
+    pub cull_tests: u64,
+    /// Time that this took.
+    pub cull_time: Duration,
     /// Draws that each layer may see.
     visible: Vec<Vec<u32>>,
 }
 
 impl Frame {
-    /// Finds the draws that each of the plan's layers and each of the lighting's cascades may see.
-    #[must_use]
-    pub fn new(draws: &DrawList, lighting: Lighting, plan: FramePlan) -> Self {
+    /// Finds the draws that each of the plan's layers and each of the lighting's cascades may see:
+    /// of frame `number` of the eyes of `rig`.
+    ///
+    /// # Errors
+    /// Eyes that the culling technique is not made for.
+    pub fn new(
+        draws: &DrawList,
+        lighting: Lighting,
+        plan: FramePlan,
+        rig: &Rig,
+        culling: Culling,
+        number: u32,
+    ) -> Result<Self, TooWide> {
+        let start = Instant::now();
+        let mut kept = Vec::new();
+        let cull_tests =
+            (draws.hierarchy).cull(rig, culling, number, &mut Scratch::default(), &mut kept)?;
+        let cull_time = start.elapsed();
         let casters = (lighting.cascades.iter())
             .map(|cascade| draws.visible(cascade.clip_from_world))
             .collect();
         let visible = (plan.layers.iter())
             .map(|layer| {
-                let mut visible = draws.visible(clip_from_world(&layer.view));
+                // An eye's own picture gets the technique's list, a part of it or another view what
+                // the list has for it.
+                let whole = rig.eyes().iter().any(|eye| eye.view == layer.view);
+                let mut visible = if whole {
+                    kept.clone()
+                } else {
+                    draws.visible_of(&kept, clip_from_world(&layer.view))
+                };
                 visible.retain(|&draw| enters(layer.draws, draws.calls[draw as usize].mode));
                 visible
             })
             .collect();
-        Self {
+        Ok(Self {
             lighting,
             casters,
             plan,
+            cull_tests,
+            cull_time,
             visible,
-        }
+        })
     }
 
     /// The layers in their order, each with its draws.

@@ -2,6 +2,7 @@
 
 use super::capture::CaptureJob;
 use super::draws::DrawMode;
+use super::error::RasterError;
 use super::groups::MATERIAL_TEXTURES;
 use formats::view::FrameViews;
 use glam::Mat4;
@@ -11,11 +12,17 @@ use visibility::triangles;
 impl CaptureJob<'_> {
     /// For each image of the scene, whether a draw that samples it may be seen by a view of any
     /// frame, or is a masked caster that a shadow cascade may see.
-    #[must_use]
-    pub fn seen_images(&self, scene: &Scene, frames: &[FrameViews]) -> Vec<bool> {
+    ///
+    /// # Errors
+    /// Eyes that the culling technique is not made for.
+    pub fn seen_images(
+        &self,
+        scene: &Scene,
+        frames: &[FrameViews],
+    ) -> Result<Vec<bool>, RasterError> {
         let mut seen = vec![false; scene.images.len()];
         for views in frames {
-            let frame = self.frame(views);
+            let frame = self.frame(views)?;
             for view in frame.views() {
                 let all = |_| MATERIAL_TEXTURES;
                 self.mark(scene, view.clip_from_world(), view.visible, all, &mut seen);
@@ -26,7 +33,7 @@ impl CaptureJob<'_> {
                 self.mark(scene, cascade.clip_from_world, casters, slots, &mut seen);
             }
         }
-        seen
+        Ok(seen)
     }
 
     /// Marks the images in the first `slots` of the materials that the view may see.

@@ -2,6 +2,7 @@
 
 use super::cache_args::CacheArgs;
 use super::scene_args::{SceneArgs, SceneSetup};
+use super::technique_args::TechniqueArgs;
 use crate::picture;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
@@ -17,7 +18,6 @@ use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use techniques::Settings;
 use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
@@ -53,6 +53,8 @@ pub struct RasterArgs {
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
     record_budget: u64,
+    #[command(flatten)]
+    techniques: TechniqueArgs,
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
@@ -103,17 +105,19 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
-    let settings = Settings::default();
+    let settings = args.techniques.settings();
+    let lenses = args.techniques.lenses(&setup.hmd)?;
     let job = CaptureJob {
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
         shadow_range_m: shadow_range_m(&setup, bounds),
         hmd: &setup.hmd,
+        lenses,
         eyes: args.views.eyes(),
         settings: &settings,
     };
-    let seen = job.seen_images(&setup.scene, &setup.frames);
+    let seen = job.seen_images(&setup.scene, &setup.frames)?;
     let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache.as_ref())?;
     let textured = started.elapsed();
     for note in &uploads.notes {
@@ -132,7 +136,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let (total, cached, unseen) = (uploads.textures.len(), uploads.cached, uploads.unseen());
     drop(uploads);
     let mut summary = Summary::default();
-    let first = job.frame(&setup.frames[0]);
+    let first = job.frame(&setup.frames[0])?;
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
@@ -158,7 +162,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let frame = match first.take() {
             Some(first) => first,
             None => {
-                let frame = job.frame(views);
+                let frame = job.frame(views)?;
                 summary.shadows += job.light(&mut backend, &frame)?;
                 frame
             }
