@@ -9,14 +9,17 @@ use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, Hmd, Lens, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
+use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::{FramePlan, Layer, Settings};
+use techniques::{FramePlan, Layer, Settings, Skips};
 use visibility::Rig;
 
 /// What to capture, the same for plain rendering and capture.
 pub struct CaptureJob<'a> {
-    /// Draws.
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its draws.
     pub draws: &'a DrawList,
     /// Lights; cascades are fitted per frame.
     pub lighting: Lighting,
@@ -32,6 +35,8 @@ pub struct CaptureJob<'a> {
     pub eyes: &'a [Eye],
     /// What is left out or done more coarsely.
     pub settings: &'a Settings,
+    /// What is left out because nobody sees it.
+    pub skips: Skips,
 }
 
 /// The pictures of one frame, one an eye: sRGB RGBA8.
@@ -69,6 +74,13 @@ impl CaptureJob<'_> {
     /// # Errors
     /// Eyes that the culling technique is not made for.
     pub fn frame(&self, views: &FrameViews) -> Result<Frame, RasterError> {
+        let mut frame = self.boxes_seen(views)?;
+        self.skip(&mut frame);
+        Ok(frame)
+    }
+
+    /// The frame as the boxes of its draws tell it.
+    pub(crate) fn boxes_seen(&self, views: &FrameViews) -> Result<Frame, RasterError> {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
         lighting.cascades = cascades::fit(
@@ -82,7 +94,7 @@ impl CaptureJob<'_> {
         let (culling, number) = (self.settings.culling, views.frame);
         let (plan, rig) = (self.plan(views), self.rig(views));
         Ok(Frame::new(
-            self.draws, lighting, plan, &rig, culling, number,
+            self.draws, lighting, plan, rig, culling, number,
         )?)
     }
 
@@ -175,6 +187,7 @@ impl CaptureJob<'_> {
                 backend: &mut *backend,
                 draws: self.draws,
                 view,
+                skip_regions: self.skips.regions,
             };
             let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
             counts += recorded.counts;
@@ -208,6 +221,7 @@ struct ViewCapturer<'a> {
     backend: &'a mut dyn CaptureBackend,
     draws: &'a DrawList,
     view: View<'a>,
+    skip_regions: bool,
 }
 
 impl Capturer for ViewCapturer<'_> {
@@ -219,7 +233,11 @@ impl Capturer for ViewCapturer<'_> {
 
     fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, RasterError> {
         // A part of the layer needs only the draws that may touch it.
-        let touching = self.draws.touching(&self.view, region);
+        let touching = if self.skip_regions {
+            self.draws.touching(&self.view, region)
+        } else {
+            self.view.visible.to_vec()
+        };
         let view = View {
             visible: &touching,
             ..self.view

@@ -3,6 +3,7 @@
 use super::backend::{View, clip_from_world};
 use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
+use super::skips::Skipped;
 use std::time::{Duration, Instant};
 use techniques::{FramePlan, Stage};
 use visibility::{Culling, Rig, Scratch, TooWide};
@@ -14,14 +15,24 @@ pub struct Frame {
     pub lighting: Lighting,
     /// Draws that each shadow cascade may see.
     pub casters: Vec<Vec<u32>>,
+    /// Which shadow cascades may be looked up; the others need not be rendered.
+    pub cascades_seen: Vec<bool>,
     /// The layers, and how the pictures come of them.
     pub plan: FramePlan,
     /// Boxes that were tested to find the draws of the eyes' pictures.
     pub cull_tests: u64,
-    /// Time that this took.
+    /// Boxes that were held against the depth of others.
+    pub occlusion_tests: u64,
+    /// Draws of layers that others hide.
+    pub occluded: u64,
+    /// Time that all this took.
     pub cull_time: Duration,
+    /// The eyes.
+    pub rig: Rig,
     /// Draws that each layer may see.
-    visible: Vec<Vec<u32>>,
+    pub(crate) visible: Vec<Vec<u32>>,
+    /// What nobody sees of it and has been left out.
+    pub skipped: Skipped,
 }
 
 impl Frame {
@@ -34,14 +45,14 @@ impl Frame {
         draws: &DrawList,
         lighting: Lighting,
         plan: FramePlan,
-        rig: &Rig,
+        rig: Rig,
         culling: Culling,
         number: u32,
     ) -> Result<Self, TooWide> {
         let start = Instant::now();
         let mut kept = Vec::new();
         let cull_tests =
-            (draws.hierarchy).cull(rig, culling, number, &mut Scratch::default(), &mut kept)?;
+            (draws.hierarchy).cull(&rig, culling, number, &mut Scratch::default(), &mut kept)?;
         let cull_time = start.elapsed();
         let casters = (lighting.cascades.iter())
             .map(|cascade| draws.visible(cascade.clip_from_world))
@@ -60,25 +71,36 @@ impl Frame {
                 visible
             })
             .collect();
+        let cascades_seen = vec![true; lighting.cascades.len()];
         Ok(Self {
             lighting,
             casters,
+            cascades_seen,
             plan,
             cull_tests,
+            occlusion_tests: 0,
+            occluded: 0,
             cull_time,
+            rig,
             visible,
+            skipped: Skipped::default(),
         })
     }
 
     /// The layers in their order, each with its draws.
     pub fn views(&self) -> impl Iterator<Item = View<'_>> {
-        let layers = self.plan.layers.iter().zip(&self.visible).enumerate();
-        layers.map(|(target, (layer, visible))| View {
-            target,
-            layer,
+        (0..self.plan.layers.len()).map(|number| self.view(number))
+    }
+
+    /// A layer with its draws.
+    #[must_use]
+    pub fn view(&self, number: usize) -> View<'_> {
+        View {
+            target: number,
+            layer: &self.plan.layers[number],
             lighting: &self.lighting,
-            visible,
-        })
+            visible: &self.visible[number],
+        }
     }
 }
 

@@ -1,29 +1,34 @@
 //! `tracegen raster`.
 
 use super::cache_args::CacheArgs;
+use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
 use super::technique_args::TechniqueArgs;
 use crate::picture;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
-use formats::view::Eye;
+use formats::view::{Eye, FrameViews};
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
+use raster::error::RasterError;
+use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
+use raster::skips::Skipped;
 use record::CaptureCounts;
 use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use techniques::Skips;
+use techniques::skips::Skip;
 use textures::TextureSet;
+use visibility::Occlusion;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;
-/// Most frames of a camera path.
-const MAX_FRAMES: i64 = 10_000;
 
 /// Arguments of `tracegen raster`.
 #[derive(Args, Debug)]
@@ -36,9 +41,11 @@ pub struct RasterArgs {
     /// Picture of all views side by side.
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
-    /// Frames along a slow walk: 0.4 m/s ahead with a sideways sway of 5 cm, at 72 frames a second.
+    #[command(flatten)]
+    path: PathArgs,
+    /// Frames along the path.
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Camera",
-          value_parser = clap::value_parser!(u32).range(1..=MAX_FRAMES))]
+          value_parser = frame_count())]
     frames: u32,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
@@ -53,6 +60,10 @@ pub struct RasterArgs {
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
     record_budget: u64,
+    /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, draws, regions or all of
+    /// them. Pictures and trace stay the same.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    no_skip: Vec<Skip>,
     #[command(flatten)]
     techniques: TechniqueArgs,
     #[command(flatten)]
@@ -94,7 +105,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let started = Instant::now();
     let cache = args.cache.open()?;
     let progress = Progress::new("loading the scene", 0, "");
-    let setup = args.scene.setup(None, args.frames, &LoadOptions::ALL)?;
+    let setup = args
+        .scene
+        .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
     let loaded = started.elapsed();
     let cascades = if args.shadows {
         CASCADES
@@ -108,6 +121,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let settings = args.techniques.settings();
     let lenses = args.techniques.lenses(&setup.hmd)?;
     let job = CaptureJob {
+        scene: &setup.scene,
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
@@ -116,9 +130,11 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         lenses,
         eyes: args.views.eyes(),
         settings: &settings,
+        skips: Skips::without(&args.no_skip),
     };
-    let seen = job.seen_images(&setup.scene, &setup.frames)?;
-    let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache.as_ref())?;
+    let finest = job.finest_levels(&setup.frames)?;
+    let searched = started.elapsed();
+    let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
     let textured = started.elapsed();
     for note in &uploads.notes {
         shell::warn(note);
@@ -134,9 +150,16 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         passes,
     );
     let (total, cached, unseen) = (uploads.textures.len(), uploads.cached, uploads.unseen());
+    let texels = format!(
+        "{:.1} MiB of texels, {:.1} MiB left out ({unseen} images and the finest levels of {} that no view samples, found in {:.2} s)",
+        mib(uploads.bytes()),
+        mib(uploads.skipped_bytes()),
+        uploads.shortened(),
+        (searched - loaded).as_secs_f64()
+    );
     drop(uploads);
     let mut summary = Summary::default();
-    let first = job.frame(&setup.frames[0])?;
+    let first = summary.look(&job, &mut backend, &setup.frames[0])?;
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
@@ -162,7 +185,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let frame = match first.take() {
             Some(first) => first,
             None => {
-                let frame = job.frame(views)?;
+                let frame = summary.look(&job, &mut backend, views)?;
                 summary.shadows += job.light(&mut backend, &frame)?;
                 frame
             }
@@ -211,6 +234,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
     let views = [setup.frames.len(), job.eyes.len()];
+    note(&texels);
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
 }
@@ -263,9 +287,37 @@ struct Summary {
     sorting: Duration,
     counts: CaptureCounts,
     identical: Option<bool>,
+    looking: Duration,
+    culling: Duration,
+    cull_tests: u64,
+    occlusion: Occlusion,
+    occlusion_tests: u64,
+    occluded: u64,
+    skipped: Skipped,
 }
 
 impl Summary {
+    /// Finds what a frame draws.
+    fn look(
+        &mut self,
+        job: &CaptureJob<'_>,
+        backend: &mut dyn CaptureBackend,
+        views: &FrameViews,
+    ) -> Result<Frame, RasterError> {
+        let start = Instant::now();
+        let mut frame = job.frame(views)?;
+        if job.settings.occlusion {
+            job.occlude(backend, &mut frame, &mut self.occlusion)?;
+        }
+        self.looking += start.elapsed();
+        self.skipped += frame.skipped;
+        self.cull_tests += frame.cull_tests;
+        self.occlusion_tests += frame.occlusion_tests;
+        self.occluded += frame.occluded;
+        self.culling += frame.cull_time;
+        Ok(frame)
+    }
+
     fn print(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64, work: &Work) {
         let CaptureCounts {
             quads,
@@ -274,6 +326,7 @@ impl Summary {
             masked_lanes_killed,
             not_finite,
             tile_bytes,
+            empty_tiles,
         } = self.counts;
         let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
         let pixels = (views * frames) as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
@@ -308,6 +361,19 @@ impl Summary {
             work.pipelines,
             work.samplers
         ));
+        note(&format!(
+            "culling        {} boxes tested, {} more against depth that hides {} draws, in {:.3} ms a frame",
+            self.cull_tests,
+            self.occlusion_tests,
+            self.occluded,
+            self.culling.as_secs_f64() * 1e3 / frames as f64
+        ));
+        note(&format!(
+            "never drawn    {empty_tiles} empty tiles, {} draws without a triangle in view, {} shadow cascades that nobody sees (draws found in {:.3} s)",
+            self.skipped.draws,
+            self.skipped.cascades,
+            self.looking.as_secs_f64()
+        ));
         let captured = self.captured.as_secs_f64();
         let includes = "all views, reading the pictures back";
         if let Some(identical) = self.identical {
@@ -334,6 +400,11 @@ impl Summary {
             ));
         }
     }
+}
+
+/// Bytes in MiB.
+fn mib(bytes: usize) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
 }
 
 /// Largest resident set so far, where the system tells (Linux).

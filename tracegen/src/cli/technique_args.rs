@@ -15,6 +15,9 @@ pub struct TechniqueArgs {
     #[arg(long, value_name = "NAME", default_value = Culling::default().name(),
           value_parser = culling_parser())]
     cull: Culling,
+    /// Leave out draws that others hide: what the last frame showed is drawn for its depth first.
+    #[arg(long)]
+    occlusion: bool,
     /// Radius of the circle that the lens shows of an eye's picture, as a tangent [default: half of
     /// the sum of the longer axis's tangents].
     #[arg(long, value_name = "TAN", allow_hyphen_values = true)]
@@ -26,6 +29,7 @@ impl TechniqueArgs {
     pub fn settings(&self) -> Settings {
         Settings {
             culling: self.cull,
+            occlusion: self.occlusion,
             ..Settings::default()
         }
     }

@@ -13,7 +13,7 @@ use raster::error::RasterError;
 use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
-use techniques::{Layer, Settings};
+use techniques::{Layer, Settings, Skips};
 use textures::TextureSet;
 
 const SIZE_PX: [u32; 2] = [200, 136];
@@ -41,19 +41,20 @@ fn display(size_px: [u32; 2]) -> Hmd {
 }
 
 fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
-    cameras::frame_views(&scene.cameras[0], &display(size_px), 1)
+    cameras::still_frame(&scene.cameras[0], &display(size_px))
         .unwrap()
         .remove(0)
 }
 
 fn job<'a>(
-    scene: &Scene,
+    scene: &'a Scene,
     draws: &'a DrawList,
     hmd: &'a Hmd,
     eyes: &'a [Eye],
     settings: &'a Settings,
 ) -> CaptureJob<'a> {
     CaptureJob {
+        scene,
         draws,
         lighting: Lighting::new(scene),
         bounds: scene.bounds().unwrap_or_default(),
@@ -62,6 +63,7 @@ fn job<'a>(
         lenses: hmd.fov.map(|fov| Lens::of(&fov)),
         eyes,
         settings,
+        skips: Skips::default(),
     }
 }
 

@@ -9,9 +9,11 @@ pub mod least_work;
 pub mod mask;
 pub mod plan;
 pub mod settings;
+pub mod skips;
 
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};
 pub use mask::Mask;
 pub use plan::FramePlan;
 pub use settings::{Settings, SettingsError};
+pub use skips::Skips;
