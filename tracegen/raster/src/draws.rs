@@ -11,7 +11,7 @@ use scene::geometry::transformed_box;
 use scene::{AlphaMode, Instance, Material, Mesh, Scene};
 use std::collections::{HashMap, HashSet};
 use textures::TextureSet;
-use visibility::frustum;
+use visibility::{Hierarchy, frustum};
 
 /// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
 pub const SHADOW_SIZE: u32 = 2048;
@@ -115,6 +115,8 @@ pub struct DrawList {
     pub groups: Vec<MaterialGroups>,
     /// Shadow cascades that lit draws sample, 0 to 4.
     pub cascades: u32,
+    /// The tree over the draws' bounds.
+    pub hierarchy: Hierarchy,
 }
 
 impl DrawList {
@@ -165,7 +167,9 @@ impl DrawList {
             }
         }
         let moving = moving(scene, &calls);
+        let bounds: Vec<[Vec3; 2]> = calls.iter().map(|call| call.bounds).collect();
         Ok(Self {
+            hierarchy: Hierarchy::new(&bounds),
             calls,
             moving,
             groups: scene.materials.iter().map(MaterialGroups::new).collect(),
@@ -194,7 +198,16 @@ impl DrawList {
     /// Indices of the draws that a view or a shadow cascade may see, ascending.
     #[must_use]
     pub fn visible(&self, clip_from_world: Mat4) -> Vec<u32> {
-        frustum::visible(self.calls.iter().map(|call| call.bounds), clip_from_world)
+        self.hierarchy.entering(clip_from_world)
+    }
+
+    /// Those of `list` that a view may see.
+    #[must_use]
+    pub(crate) fn visible_of(&self, list: &[u32], clip_from_world: Mat4) -> Vec<u32> {
+        let bounds = list.iter().map(|&draw| self.calls[draw as usize].bounds);
+        (frustum::visible(bounds, clip_from_world).into_iter())
+            .map(|position| list[position as usize])
+            .collect()
     }
 
     /// The draws of a layer that may touch a region of it, ascending.
@@ -206,10 +219,7 @@ impl DrawList {
         }
         let clip =
             frustum::crop(region.origin_px, region.size_px, size_px) * view.clip_from_world();
-        let bounds = (view.visible.iter()).map(|&draw| self.calls[draw as usize].bounds);
-        (frustum::visible(bounds, clip).into_iter())
-            .map(|position| view.visible[position as usize])
-            .collect()
+        self.visible_of(view.visible, clip)
     }
 
     /// Texture table of the trace: the scene's textures in their order, then the shadow maps.

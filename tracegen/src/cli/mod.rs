@@ -6,6 +6,7 @@ pub mod raster;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;
+mod technique_args;
 pub mod techniques;
 
 use clap::{Parser, Subcommand};

@@ -3,6 +3,7 @@
 use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
+use super::technique_args::TechniqueArgs;
 use crate::picture;
 use crate::study::memory;
 use anyhow::{Context, ensure};
@@ -12,6 +13,7 @@ use formats::view::{Eye, FrameViews};
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
+use raster::error::RasterError;
 use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
@@ -21,9 +23,10 @@ use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use techniques::Skips;
 use techniques::skips::Skip;
-use techniques::{Settings, Skips};
 use textures::TextureSet;
+use visibility::Occlusion;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 pub(super) const CASCADES: u32 = 4;
@@ -62,6 +65,8 @@ pub struct RasterArgs {
     /// them. Pictures and trace stay the same.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     no_skip: Vec<Skip>,
+    #[command(flatten)]
+    techniques: TechniqueArgs,
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
@@ -114,7 +119,8 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
-    let settings = Settings::default();
+    let settings = args.techniques.settings();
+    let lenses = args.techniques.lenses(&setup.hmd)?;
     let job = CaptureJob {
         scene: &setup.scene,
         draws: &draws,
@@ -122,11 +128,12 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         bounds,
         shadow_range_m: shadow_range_m(&setup, bounds),
         hmd: &setup.hmd,
+        lenses,
         eyes: args.views.eyes(),
         settings: &settings,
         skips: Skips::without(&args.no_skip),
     };
-    let finest = job.finest_levels(&setup.frames);
+    let finest = job.finest_levels(&setup.frames)?;
     let searched = started.elapsed();
     let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
     let textured = started.elapsed();
@@ -153,7 +160,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     );
     drop(uploads);
     let mut summary = Summary::default();
-    let first = summary.look(&job, &setup.frames[0]);
+    let first = summary.look(&job, &mut backend, &setup.frames[0])?;
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
@@ -179,7 +186,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let frame = match first.take() {
             Some(first) => first,
             None => {
-                let frame = summary.look(&job, views);
+                let frame = summary.look(&job, &mut backend, views)?;
                 summary.shadows += job.light(&mut backend, &frame)?;
                 frame
             }
@@ -283,17 +290,34 @@ struct Summary {
     counts: CaptureCounts,
     identical: Option<bool>,
     looking: Duration,
+    culling: Duration,
+    cull_tests: u64,
+    occlusion: Occlusion,
+    occlusion_tests: u64,
+    occluded: u64,
     skipped: Skipped,
 }
 
 impl Summary {
     /// Finds what a frame draws.
-    fn look(&mut self, job: &CaptureJob<'_>, views: &FrameViews) -> Frame {
+    fn look(
+        &mut self,
+        job: &CaptureJob<'_>,
+        backend: &mut dyn CaptureBackend,
+        views: &FrameViews,
+    ) -> Result<Frame, RasterError> {
         let start = Instant::now();
-        let frame = job.frame(views);
+        let mut frame = job.frame(views)?;
+        if job.settings.occlusion {
+            job.occlude(backend, &mut frame, &mut self.occlusion)?;
+        }
         self.looking += start.elapsed();
         self.skipped += frame.skipped;
-        frame
+        self.cull_tests += frame.cull_tests;
+        self.occlusion_tests += frame.occlusion_tests;
+        self.occluded += frame.occluded;
+        self.culling += frame.cull_time;
+        Ok(frame)
     }
 
     fn print(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64, work: &Work) {
@@ -338,6 +362,13 @@ impl Summary {
             self.shadows.as_secs_f64(),
             work.pipelines,
             work.samplers
+        ));
+        note(&format!(
+            "culling        {} boxes tested, {} more against depth that hides {} draws, in {:.3} ms a frame",
+            self.cull_tests,
+            self.occlusion_tests,
+            self.occluded,
+            self.culling.as_secs_f64() * 1e3 / frames as f64
         ));
         note(&format!(
             "never drawn    {empty_tiles} empty tiles, {} draws without a triangle in view, {} shadow cascades that nobody sees (draws found in {:.3} s)",

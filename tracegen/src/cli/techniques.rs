@@ -18,6 +18,7 @@ use clap::Args;
 use formats::view::Lens;
 use scene::LoadOptions;
 use shell::{Progress, Threads, note};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use textures::TextureSet;
 use xxhash_rust::xxh3::xxh3_64;
@@ -175,6 +176,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         backend: &mut backend,
         captures,
         extent: &extent,
+        truth: HashMap::new(),
         folder: &folder,
         progress: &progress,
     };

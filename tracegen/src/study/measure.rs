@@ -5,11 +5,15 @@ use super::memory;
 use super::rows::Row;
 use super::world::{Shot, Tracer, World};
 use formats::textrace::TextraceWriter;
+use raster::backend::Marks;
 use raster::lavapipe::Lavapipe;
+use raster::truth::Wrong;
 use shell::Progress;
-use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
 use techniques::Settings;
+use visibility::Occlusion;
 
 /// What is measured of every row.
 #[derive(Clone, Debug)]
@@ -35,11 +39,11 @@ impl Extent {
         self.frames().len() as u64 * (1 + u64::from(self.repeats))
     }
 
-    /// Every frame that is rendered, and whether it is measured: before a run comes the frame that a
-    /// technique may remember in the first.
-    pub fn rendered(&self) -> impl Iterator<Item = (u32, bool)> + '_ {
-        self.runs.iter().flat_map(|run| {
-            let before = run[0].checked_sub(1).map(|frame| (frame, false));
+    /// Every frame that is rendered, and whether it is measured: where techniques remember frames,
+    /// the one before comes before a run.
+    pub fn rendered(&self, remembers: bool) -> impl Iterator<Item = (u32, bool)> + '_ {
+        self.runs.iter().flat_map(move |run| {
+            let before = run[0].checked_sub(1).filter(|_| remembers).map(|frame| (frame, false));
             before
                 .into_iter()
                 .chain(run.iter().map(|frame| (*frame, true)))
@@ -57,6 +61,8 @@ pub struct Bench<'a> {
     pub captures: bool,
     /// What is measured.
     pub extent: &'a Extent,
+    /// What the eyes see in truth, by frame, as far as it was asked for.
+    pub truth: HashMap<u32, Vec<Vec<Marks>>>,
     /// Where it goes.
     pub folder: &'a Folder,
     /// How far it is.
@@ -141,8 +147,9 @@ impl Bench<'_> {
             )),
         };
         let mut frames = Vec::new();
-        for (number, measured) in extent.rendered() {
-            let shot = world.shoot(self.backend, settings(number), number)?;
+        let mut memory = Occlusion::default();
+        for (number, measured) in extent.rendered(row.settings.occlusion) {
+            let shot = world.shoot(self.backend, settings(number), number, &mut memory)?;
             if !measured {
                 continue;
             }
@@ -162,13 +169,14 @@ impl Bench<'_> {
                     .map(|t| t.capture(&job, self.backend, &shot.frame))
             }
             .transpose()?;
+            let wrong = self.wrong(number, &shot)?;
             let work = &shot.work;
             frames.push(FrameRecord {
                 frame: number,
-                cull_tests: (world.draws.calls.len() * shot.frame.plan.layers.len()) as u64,
+                cull_tests: shot.frame.cull_tests + shot.frame.occlusion_tests,
                 cull_s: 0.0,
-                false_negatives: None,
-                false_positives: None,
+                false_negatives: wrong.map(|wrong| wrong.negatives),
+                false_positives: wrong.map(|wrong| wrong.positives),
                 draws: work.draws,
                 draw_calls: work.calls,
                 state_changes: work.state_changes,
@@ -194,6 +202,25 @@ impl Bench<'_> {
         };
         Ok((frames, trace))
     }
+
+    /// What the lists of a frame get wrong of what the lenses show, both eyes; none where the device
+    /// cannot tell.
+    fn wrong(&mut self, number: u32, shot: &Shot) -> anyhow::Result<Option<Wrong>> {
+        if !self.captures {
+            return Ok(None);
+        }
+        let settings = Settings::default();
+        let job = self.world.job(&settings);
+        let truth = match self.truth.entry(number) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(open) => open.insert(job.truth(self.backend, &shot.frame)?),
+        };
+        let mut wrong = Wrong::default();
+        for judgement in job.judge_against(&shot.frame, truth) {
+            wrong += judgement.lens;
+        }
+        Ok(Some(wrong))
+    }
 }
 
 /// Times frames with `settings` and with the baseline, which take turns, several times over: one entry
@@ -210,16 +237,18 @@ pub fn time<'s>(
 ) -> anyhow::Result<Vec<Times>> {
     let baseline = Settings::default();
     let mut times: Vec<Times> = extent.frames().iter().map(|_| Times::default()).collect();
+    let remembers = (extent.frames().into_iter()).any(|frame| settings(frame).occlusion);
     for repeat in 0..extent.repeats {
         let mut measured = times.iter_mut();
-        for (number, is_measured) in extent.rendered() {
+        let mut memory = Occlusion::default();
+        for (number, is_measured) in extent.rendered(remembers) {
             // Whoever comes second finds warmer caches: they take turns at that as well.
             let [row, beside] = if repeat % 2 == 0 {
-                let beside = world.shoot(backend, &baseline, number)?;
-                [world.shoot(backend, settings(number), number)?, beside]
+                let beside = world.shoot(backend, &baseline, number, &mut Occlusion::default())?;
+                [world.shoot(backend, settings(number), number, &mut memory)?, beside]
             } else {
-                let row = world.shoot(backend, settings(number), number)?;
-                [row, world.shoot(backend, &baseline, number)?]
+                let row = world.shoot(backend, settings(number), number, &mut memory)?;
+                [row, world.shoot(backend, &baseline, number, &mut Occlusion::default())?]
             };
             if !is_measured {
                 continue;
@@ -240,7 +269,7 @@ impl Times {
         self.frame.push(row.total);
         self.baseline.push(baseline.total);
         for (stage, time) in [
-            (CULL, row.cull),
+            (CULL, row.frame.cull_time),
             ("submit", row.work.submitting),
             ("render", row.work.waiting),
             ("compose", row.compose),

@@ -4,7 +4,7 @@ use techniques::Settings;
 use visibility::Culling;
 
 /// One technique: what it changes of the baseline.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Part {
     /// Name as in `--only`, manifests and results.
     pub name: String,
@@ -15,9 +15,10 @@ pub struct Part {
     change: Change,
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 enum Change {
     Culling(Culling),
+    Switch(Setting, fn(&mut Settings)),
 }
 
 /// The setting that a part changes: of two parts with the same one, only one can be.
@@ -25,6 +26,15 @@ enum Change {
 pub enum Setting {
     /// How draws are found.
     Culling,
+    /// Whether hidden ones are left out.
+    Occlusion,
+}
+
+impl PartialEq for Part {
+    /// Names are unique.
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
 }
 
 impl Part {
@@ -35,7 +45,24 @@ impl Part {
         let others = Culling::all().filter(|culling| *culling != baseline);
         let mut parts = vec![Self::culling(baseline)];
         parts.extend(others.map(Self::culling));
+        parts.extend([
+            Self::lossless("occlusion", "Occlusion culling", Setting::Occlusion, |s| s.occlusion = true),
+        ]);
         parts
+    }
+
+    fn lossless(
+        name: &str,
+        title: &str,
+        setting: Setting,
+        change: fn(&mut Settings),
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            title: title.to_owned(),
+            lossless: true,
+            change: Change::Switch(setting, change),
+        }
     }
 
     fn culling(culling: Culling) -> Self {
@@ -57,7 +84,7 @@ impl Part {
     #[must_use]
     pub fn is_shift(&self) -> bool {
         match self.change {
-            Change::Culling(_) => false,
+            Change::Culling(_) | Change::Switch(..) => false,
         }
     }
 
@@ -66,18 +93,20 @@ impl Part {
     pub fn setting(&self) -> Setting {
         match self.change {
             Change::Culling(_) => Setting::Culling,
+            Change::Switch(setting, _) => setting,
         }
     }
 
     fn apply(&self, settings: &mut Settings) {
         match self.change {
             Change::Culling(culling) => settings.culling = culling,
+            Change::Switch(_, change) => change(settings),
         }
     }
 }
 
 /// Combinations that a study measures beside the techniques alone: title and parts.
-const COMBINATIONS: &[(&str, &str)] = &[];
+const COMBINATIONS: &[(&str, &str)] = &[("Superfrustum and occlusion culling", "superfrustum+occlusion")];
 
 /// A technique or a combination of some, measured as one.
 #[derive(Clone, Debug)]

@@ -13,6 +13,7 @@ use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
 use techniques::{Settings, Skips};
+use visibility::Occlusion;
 
 const EYES: &[Eye] = &[Eye::Left, Eye::Right];
 
@@ -44,8 +45,6 @@ pub struct World {
 pub struct Shot {
     /// What was drawn.
     pub frame: Frame,
-    /// Time of planning the frame and culling its draws.
-    pub cull: Duration,
     /// Time of making the pictures of the layers.
     pub compose: Duration,
     /// Time of the whole frame but for its shadow maps, which are the same whatever the technique.
@@ -65,6 +64,7 @@ impl World {
             bounds: self.bounds,
             shadow_range_m: self.shadow_range_m,
             hmd: &self.hmd,
+            lenses: self.lens,
             eyes: EYES,
             settings,
             // What is searched for anew in every frame would hide what the techniques find.
@@ -72,20 +72,25 @@ impl World {
         }
     }
 
-    /// Renders a frame of the path without capture, and leaves its pictures on the device.
+    /// Renders a frame of the path without capture, and leaves its pictures on the device. `memory` is
+    /// what the technique remembers of the frame before.
     ///
     /// # Errors
-    /// Driver errors.
+    /// Driver errors, and eyes that the culling technique is not made for.
     pub fn shoot(
         &self,
         backend: &mut dyn CaptureBackend,
         settings: &Settings,
         number: u32,
+        memory: &mut Occlusion,
     ) -> Result<Shot, RasterError> {
         let job = self.job(settings);
         let start = Instant::now();
-        let frame = job.frame(&self.views[number as usize]);
-        let cull = start.elapsed();
+        let mut frame = job.frame(&self.views[number as usize])?;
+        if settings.occlusion {
+            job.occlude(backend, &mut frame, memory)?;
+        }
+        let planned = start.elapsed();
         job.light(backend, &frame)?;
         let before = backend.work();
         let start = Instant::now();
@@ -95,9 +100,8 @@ impl World {
         let done = start.elapsed();
         Ok(Shot {
             frame,
-            cull,
             compose: done - rendered,
-            total: cull + done,
+            total: planned + done,
             work: backend.work() - before,
         })
     }

@@ -4,7 +4,7 @@ use super::compare::{Agreement, compare, lanes};
 use super::reference;
 use formats::textrace::{SUBTEXELS, Tables, Textrace, TextraceWriter, Tile, TraceMeta};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
-use formats::view::{Eye, FrameViews, Hmd};
+use formats::view::{Eye, FrameViews, Hmd, Lens};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
 use raster::backend::{CaptureBackend, View, Work};
 use raster::capture::CaptureJob;
@@ -60,6 +60,7 @@ fn job<'a>(
         bounds: scene.bounds().unwrap_or_default(),
         shadow_range_m: [0.1, 40.0],
         hmd,
+        lenses: hmd.fov.map(|fov| Lens::of(&fov)),
         eyes,
         settings,
         skips: Skips::default(),
@@ -106,7 +107,7 @@ fn try_capture(
         draws: draw_table,
         passes: job.passes(std::slice::from_ref(&views)),
     };
-    let frame = job.frame(&views);
+    let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
@@ -628,7 +629,7 @@ fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture
     let mut backend = Lavapipe::on(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
     let (hmd, settings) = (display(SIZE_PX), Settings::default());
     let job = job(&scene, &draws, &hmd, BOTH, &settings);
-    let frame = job.frame(&views(&scene, SIZE_PX));
+    let frame = job.frame(&views(&scene, SIZE_PX)).unwrap();
     job.light(&mut backend, &frame).unwrap();
     let (pictures, _) = job.plain_frame(&mut backend, &frame).unwrap();
     assert!(pictures == captured.pictures);

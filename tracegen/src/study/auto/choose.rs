@@ -8,6 +8,7 @@ use anyhow::bail;
 use raster::lavapipe::Lavapipe;
 use shell::Progress;
 use std::time::Duration;
+use visibility::Occlusion;
 
 /// Frames of a path that the search sees.
 const SEARCH_FRAMES: u32 = 3;
@@ -70,17 +71,22 @@ pub fn choose(
     let held = match budget.error_limit() {
         Some(limit) => {
             let tried = &found.tried;
+            // Of the chosen combination; a safer one that takes its place in a frame starts anew.
+            let mut memory = Occlusion::default();
             hold(chosen, tried, path_frames, limit, |row, frame| {
                 if row.settings == chosen.settings {
                     progress.advance(1);
+                    return bench.error(row, frame, &mut memory);
                 }
-                bench.error(row, frame)
+                bench.error(row, frame, &mut Occlusion::default())
             })?
         }
         None => {
             let mut times: Vec<Duration> = Vec::new();
+            let mut memory = Occlusion::default();
             for frame in 0..path_frames {
-                times.push(world.shoot(bench.backend, &chosen.settings, frame)?.total);
+                let shot = world.shoot(bench.backend, &chosen.settings, frame, &mut memory)?;
+                times.push(shot.total);
                 progress.advance(1);
             }
             check_median(budget, chosen, median_s(&times))?;

@@ -10,6 +10,7 @@ use image_error::{Mask, Picture, Reference};
 use raster::lavapipe::Lavapipe;
 use shell::Progress;
 use techniques::Settings;
+use visibility::Occlusion;
 
 /// Renders combinations and the baseline beside them.
 pub struct Bench<'a> {
@@ -30,8 +31,13 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// Driver errors.
-    pub fn error(&mut self, row: &Row, frame: u32) -> anyhow::Result<f64> {
-        let shot = self.world.shoot(self.backend, &row.settings, frame)?;
+    pub fn error(
+        &mut self,
+        row: &Row,
+        frame: u32,
+        memory: &mut Occlusion,
+    ) -> anyhow::Result<f64> {
+        let shot = self.world.shoot(self.backend, &row.settings, frame, memory)?;
         if let Budget::Pixels(_) = self.budget {
             let shift = shot.frame.plan.predicted.disparity_px;
             return Ok(shift.map_or(0.0, f64::from));
@@ -63,11 +69,12 @@ impl Judge for Bench<'_> {
     fn judge(&mut self, row: &Row) -> anyhow::Result<Verdict> {
         let extent = self.extent.clone();
         let mut error = 0.0_f64;
-        for (frame, measured) in extent.rendered() {
+        let mut memory = Occlusion::default();
+        for (frame, measured) in extent.rendered(row.settings.occlusion) {
             if measured {
-                error = error.max(self.error(row, frame)?);
+                error = error.max(self.error(row, frame, &mut memory)?);
             } else {
-                self.world.shoot(self.backend, &row.settings, frame)?;
+                self.world.shoot(self.backend, &row.settings, frame, &mut memory)?;
             }
         }
         let times = time(self.world, self.backend, &extent, |_| &row.settings, || ())?;
