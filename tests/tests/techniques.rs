@@ -13,7 +13,16 @@ fn study(folder: &Path, only: &str) -> Command {
     let mut command = program("tracegen");
     command
         .args(["techniques", "atrium-plain", "--quiet", "--path", "head"])
-        .args(["--size", "64x72", "--path-frames", "6", "--frames", "3", "--repeats", "2"])
+        .args([
+            "--size",
+            "64x72",
+            "--path-frames",
+            "6",
+            "--frames",
+            "3",
+            "--repeats",
+            "2",
+        ])
         .args(["--only", only])
         .arg("-o")
         .arg(folder);
@@ -50,7 +59,11 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
             let entries = fs::read_dir(&path).expect("a folder");
             open.extend(entries.map(|entry| entry.expect("an entry").path()));
         } else if path.extension().is_none_or(|extension| extension != "json") {
-            let name = path.strip_prefix(folder).expect("inside").display().to_string();
+            let name = path
+                .strip_prefix(folder)
+                .expect("inside")
+                .display()
+                .to_string();
             found.push((name, fs::read(&path).expect("a file")));
         }
     }
@@ -70,7 +83,9 @@ fn a_study_tells_of_every_technique_what_it_draws_shows_and_takes() {
     let names: Vec<&Value> = rows.iter().map(|row| &row["technique"]).collect();
     assert_eq!(names, ["per-eye", "superfrustum", "round-robin"]);
     let image = |row: &Value, frame: usize, eye: usize| {
-        let name = row["frames"][frame]["images"][eye].as_str().expect("a name");
+        let name = row["frames"][frame]["images"][eye]
+            .as_str()
+            .expect("a name");
         fs::read(folder.join(name)).expect("a picture")
     };
     for row in rows {
@@ -97,7 +112,10 @@ fn a_study_tells_of_every_technique_what_it_draws_shows_and_takes() {
         run_ok(program("replay").arg("validate").arg(trace));
     }
     let tests = |row: &Value| row["frames"][0]["cull_tests"].as_u64();
-    assert!(tests(&rows[1]) < tests(&rows[0]), "one volume is tested less often than two");
+    assert!(
+        tests(&rows[1]) < tests(&rows[0]),
+        "one volume is tested less often than two"
+    );
 }
 
 #[test]
@@ -106,7 +124,10 @@ fn a_study_that_was_killed_goes_on_where_it_was_and_ends_with_the_same() {
     let [whole, killed] = ["whole", "killed"].map(|name| root.path().join(name));
     let only = "superfrustum,conical,round-robin";
     run_ok(&mut study(&whole, only));
-    let mut child = study(&killed, only).stderr(Stdio::null()).spawn().expect("the program starts");
+    let mut child = study(&killed, only)
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
     let first = killed.join("rows/per-eye.json");
     let start = Instant::now();
     while !first.exists() && start.elapsed() < Duration::from_secs(300) {
@@ -114,10 +135,16 @@ fn a_study_that_was_killed_goes_on_where_it_was_and_ends_with_the_same() {
     }
     child.kill().expect("it runs");
     child.wait().expect("it ends");
-    assert!(!killed.join("manifest.json").exists(), "it was killed too late to show anything");
+    assert!(
+        !killed.join("manifest.json").exists(),
+        "it was killed too late to show anything"
+    );
     let kept = fs::read(&first).expect("the first row");
     run_ok(&mut study(&killed, only));
-    assert!(fs::read(&first).expect("the first row") == kept, "a finished row is not measured again");
+    assert!(
+        fs::read(&first).expect("the first row") == kept,
+        "a finished row is not measured again"
+    );
     let [mut a, mut b] = [&whole, &killed].map(|folder| manifest(folder));
     without_measurements(&mut a);
     without_measurements(&mut b);
@@ -137,7 +164,11 @@ fn the_search_keeps_its_budget_on_frames_it_did_not_see_and_is_as_cheap_as_any_t
     let held = auto["held_frames"].as_array().expect("frames").len();
     assert_eq!(searched + held, 6);
     assert!(held >= 3);
-    let cost = |key: &str| auto[key]["verdict"]["frame_time_ratio"].as_f64().expect("a ratio");
+    let cost = |key: &str| {
+        auto[key]["verdict"]["frame_time_ratio"]
+            .as_f64()
+            .expect("a ratio")
+    };
     assert!(cost("chosen") <= cost("best_single"), "{auto}");
     let rows = manifest["rows"].as_array().expect("rows");
     assert_eq!(rows[rows.len() - 1]["technique"], "auto-flip-0.01");
@@ -164,21 +195,36 @@ fn what_cannot_be_is_refused_with_the_reason() {
         refuse(command.arg(&folder).args(arguments), expected);
         assert!(!folder.exists(), "{arguments:?}");
     };
-    refused(&["--only", "conical,octree"], &["--only", "'octree'", "superfrustum"]);
+    refused(
+        &["--only", "conical,octree"],
+        &["--only", "'octree'", "superfrustum"],
+    );
     refused(
         &["--only", "conical+superfrustum"],
         &["conical and superfrustum exclude each other"],
     );
     refused(&["--frames", "0"], &["--frames", "0"]);
-    refused(&["--frames", "9", "--path-frames", "8"], &["at most 8", "found 9"]);
+    refused(
+        &["--frames", "9", "--path-frames", "8"],
+        &["at most 8", "found 9"],
+    );
     refused(&["--repeats", "0"], &["--repeats"]);
-    refused(&["--adapter", "no such device"], &["'no such device'", "llvmpipe"]);
+    refused(
+        &["--adapter", "no such device"],
+        &["'no such device'", "llvmpipe"],
+    );
     refused(&["--auto", "flip=nan"], &["flip=ERROR", "'flip=nan'"]);
     refused(&["--auto", "ssim=1"], &["flip=ERROR", "'ssim=1'"]);
     let path = root.path().join("path.csv");
-    fs::write(&path, "time_s,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,nan,0,0,0,0,0,1\n")
-        .expect("a file");
-    refused(&["--path", path.to_str().expect("UTF-8")], &["path.csv", "nan"]);
+    fs::write(
+        &path,
+        "time_s,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,nan,0,0,0,0,0,1\n",
+    )
+    .expect("a file");
+    refused(
+        &["--path", path.to_str().expect("UTF-8")],
+        &["path.csv", "nan"],
+    );
 }
 
 #[test]
@@ -186,7 +232,10 @@ fn a_study_replaces_no_other_files() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let file = root.path().join("file");
     fs::write(&file, "kept").expect("a file");
-    for (output, expected) in [(file.as_path(), "found a file"), (root.path(), "found other files")] {
+    for (output, expected) in [
+        (file.as_path(), "found a file"),
+        (root.path(), "found other files"),
+    ] {
         refuse(&mut study(output, "none"), &["--output", expected]);
     }
     refuse(&mut study(Path::new("-"), "none"), &["expected a folder"]);

@@ -43,7 +43,10 @@ impl Extent {
     /// the one before comes before a run.
     pub fn rendered(&self, remembers: bool) -> impl Iterator<Item = (u32, bool)> + '_ {
         self.runs.iter().flat_map(move |run| {
-            let before = run[0].checked_sub(1).filter(|_| remembers).map(|frame| (frame, false));
+            let before = run[0]
+                .checked_sub(1)
+                .filter(|_| remembers)
+                .map(|frame| (frame, false));
             before
                 .into_iter()
                 .chain(run.iter().map(|frame| (*frame, true)))
@@ -245,10 +248,16 @@ pub fn time<'s>(
             // Whoever comes second finds warmer caches: they take turns at that as well.
             let [row, beside] = if repeat % 2 == 0 {
                 let beside = world.shoot(backend, &baseline, number, &mut Occlusion::default())?;
-                [world.shoot(backend, settings(number), number, &mut memory)?, beside]
+                [
+                    world.shoot(backend, settings(number), number, &mut memory)?,
+                    beside,
+                ]
             } else {
                 let row = world.shoot(backend, settings(number), number, &mut memory)?;
-                [row, world.shoot(backend, &baseline, number, &mut Occlusion::default())?]
+                [
+                    row,
+                    world.shoot(backend, &baseline, number, &mut Occlusion::default())?,
+                ]
             };
             if !is_measured {
                 continue;

@@ -45,18 +45,16 @@ impl Part {
         let others = Culling::all().filter(|culling| *culling != baseline);
         let mut parts = vec![Self::culling(baseline)];
         parts.extend(others.map(Self::culling));
-        parts.extend([
-            Self::lossless("occlusion", "Occlusion culling", Setting::Occlusion, |s| s.occlusion = true),
-        ]);
+        parts.extend([Self::lossless(
+            "occlusion",
+            "Occlusion culling",
+            Setting::Occlusion,
+            |s| s.occlusion = true,
+        )]);
         parts
     }
 
-    fn lossless(
-        name: &str,
-        title: &str,
-        setting: Setting,
-        change: fn(&mut Settings),
-    ) -> Self {
+    fn lossless(name: &str, title: &str, setting: Setting, change: fn(&mut Settings)) -> Self {
         Self {
             name: name.to_owned(),
             title: title.to_owned(),
@@ -106,7 +104,10 @@ impl Part {
 }
 
 /// Combinations that a study measures beside the techniques alone: title and parts.
-const COMBINATIONS: &[(&str, &str)] = &[("Superfrustum and occlusion culling", "superfrustum+occlusion")];
+const COMBINATIONS: &[(&str, &str)] = &[(
+    "Superfrustum and occlusion culling",
+    "superfrustum+occlusion",
+)];
 
 /// A technique or a combination of some, measured as one.
 #[derive(Clone, Debug)]

@@ -7,6 +7,7 @@ use crate::study::world::World;
 use anyhow::bail;
 use raster::lavapipe::Lavapipe;
 use shell::Progress;
+use std::collections::HashMap;
 use std::time::Duration;
 use visibility::Occlusion;
 
@@ -53,6 +54,7 @@ pub fn choose(
             trace_frames: Vec::new(),
             repeats: SEARCH_REPEATS,
         },
+        references: HashMap::new(),
         progress,
     };
     let found = match search(&mut bench, &options, budget)? {

@@ -9,6 +9,7 @@ use anyhow::Context;
 use image_error::{Mask, Picture, Reference};
 use raster::lavapipe::Lavapipe;
 use shell::Progress;
+use std::collections::HashMap;
 use techniques::Settings;
 use visibility::Occlusion;
 
@@ -22,6 +23,8 @@ pub struct Bench<'a> {
     pub budget: Budget,
     /// Frames and repeats of the search.
     pub extent: Extent,
+    /// The baseline's pictures of the frames of the search, as far as they were asked for.
+    pub references: HashMap<u32, Vec<Reference>>,
     /// How far it is.
     pub progress: &'a Progress,
 }
@@ -31,35 +34,45 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// Driver errors.
-    pub fn error(
-        &mut self,
-        row: &Row,
-        frame: u32,
-        memory: &mut Occlusion,
-    ) -> anyhow::Result<f64> {
-        let shot = self.world.shoot(self.backend, &row.settings, frame, memory)?;
+    pub fn error(&mut self, row: &Row, frame: u32, memory: &mut Occlusion) -> anyhow::Result<f64> {
+        let shot = self
+            .world
+            .shoot(self.backend, &row.settings, frame, memory)?;
         if let Budget::Pixels(_) = self.budget {
             let shift = shot.frame.plan.predicted.disparity_px;
             return Ok(shift.map_or(0.0, f64::from));
         }
         let pictures = self.world.pictures(self.backend, &shot)?;
-        let baseline = self
-            .world
-            .shoot(self.backend, &Settings::default(), frame)?;
-        let references = self.world.pictures(self.backend, &baseline)?;
+        let references = match self.references.remove(&frame) {
+            Some(known) => known,
+            None => self.references(frame)?,
+        };
         let mut worst = 0.0_f64;
-        for (eye, (picture, reference)) in pictures.iter().zip(&references).enumerate() {
-            let hmd = &self.world.hmd;
-            let lens = self.world.lens[eye];
-            let (fov, size_px) = (&hmd.fov[eye], hmd.eye_size_px);
-            let mask = Mask::circle(size_px, fov, lens.center, lens.radius);
-            let ppd = image_error::pixels_per_degree(size_px[0], fov);
-            let error = Reference::new(of_rgba(size_px, reference), mask, ppd)
-                .and_then(|reference| reference.error(&of_rgba(size_px, picture)))
-                .context("comparing pictures")?;
+        for (picture, reference) in pictures.iter().zip(&references) {
+            let picture = of_rgba(self.world.hmd.eye_size_px, picture);
+            let error = reference.error(&picture).context("comparing pictures")?;
             worst = worst.max(error.flip_mean);
         }
+        // Those of the whole path would take too much memory.
+        if self.extent.frames().contains(&frame) {
+            self.references.insert(frame, references);
+        }
         Ok(worst)
+    }
+
+    /// The baseline's pictures of a frame, left and right.
+    fn references(&mut self, frame: u32) -> anyhow::Result<Vec<Reference>> {
+        let (world, baseline) = (self.world, Settings::default());
+        let shot = world.shoot(self.backend, &baseline, frame, &mut Occlusion::default())?;
+        let pictures = world.pictures(self.backend, &shot)?;
+        let size_px = world.hmd.eye_size_px;
+        (pictures.iter().zip(world.hmd.fov).zip(world.lens))
+            .map(|((picture, fov), lens)| {
+                let mask = Mask::circle(size_px, &fov, lens.center, lens.radius);
+                let ppd = image_error::pixels_per_degree(size_px[0], &fov);
+                Reference::new(of_rgba(size_px, picture), mask, ppd).context("comparing pictures")
+            })
+            .collect()
     }
 }
 
@@ -74,7 +87,8 @@ impl Judge for Bench<'_> {
             if measured {
                 error = error.max(self.error(row, frame, &mut memory)?);
             } else {
-                self.world.shoot(self.backend, &row.settings, frame, &mut memory)?;
+                self.world
+                    .shoot(self.backend, &row.settings, frame, &mut memory)?;
             }
         }
         let times = time(self.world, self.backend, &extent, |_| &row.settings, || ())?;
