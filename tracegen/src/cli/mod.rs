@@ -2,7 +2,9 @@
 
 mod cache_args;
 pub mod path_args;
+mod prepared;
 pub mod raster;
+mod raster_auto;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;

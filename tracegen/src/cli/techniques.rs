@@ -2,17 +2,15 @@
 
 use super::cache_args::CacheArgs;
 use super::path_args::PathArgs;
-use super::raster::{self, CASCADES};
+use super::prepared::{Prepared, prepare};
+use super::raster;
 use super::scene_args::SceneArgs;
 use crate::study::auto::{AutoRecord, Budget, Choice, choose};
 use crate::study::folder::{self, Folder, RowRecord, Subject};
 use crate::study::frames;
 use crate::study::measure::{Bench, Extent};
 use crate::study::rows::Row;
-use crate::study::world::World;
-use ::raster::draws::DrawList;
-use ::raster::lavapipe::{Lavapipe, device};
-use ::raster::lighting::Lighting;
+use ::raster::lavapipe::device;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::view::Lens;
@@ -20,7 +18,6 @@ use scene::LoadOptions;
 use shell::{Progress, Threads, note};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use textures::TextureSet;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Eye size where neither `--size` nor `--hmd` is given: half the default display's.
@@ -82,7 +79,7 @@ pub struct TechniquesArgs {
 pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     raster::prepare_environment(args.threads.count);
     args.threads.start()?;
-    let rows = match &args.only {
+    let mut rows = match &args.only {
         Some(list) => Row::parse_list(list).context("--only")?,
         None => Row::all(),
     };
@@ -96,7 +93,6 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         args.frames
     );
     let gpu = device::open(args.adapter.as_deref())?;
-    let cache = args.cache.open()?;
     let progress = Progress::new("loading the scene", 0, "");
     let setup = args.scene.setup(
         Some(SIZE_PX),
@@ -104,72 +100,58 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         0..args.path_frames,
         &LoadOptions::ALL,
     )?;
-    let lens = setup.hmd.fov.map(|fov| Lens::of(&fov));
-    for row in &rows {
-        row.settings
-            .check(&setup.hmd)
-            .with_context(|| row.name.clone())?;
-    }
     let extent = args.extent();
     progress.stage("preparing textures and shaders", 0, "");
-    let cascades = if args.shadows {
-        CASCADES
-    } else {
-        setup.scene.shadow_cascades.min(CASCADES)
-    };
-    let draws = DrawList::new(&setup.scene, cascades)?;
-    // Techniques and frames may sample what others do not.
-    let uploads = TextureSet::prepare(&setup.scene, |_| Some(0), cache.as_ref())?;
-    for note in &uploads.notes {
-        shell::warn(note);
-    }
     let (adapter, captures) = (gpu.adapter.clone(), gpu.no_capture.is_none());
     if let Some(what) = &gpu.no_capture {
         shell::warn(&format!(
             "{adapter} lacks {what}: no traces, no counts of fragments"
         ));
     }
-    let software_driver = gpu.is_software;
-    let size_px = setup.hmd.eye_size_px;
-    let (scene, spec) = (&setup.scene, &args.scene.scene);
-    let mut backend = Lavapipe::on(gpu, scene, &draws, &uploads, size_px, RECORD_BUDGET)?;
-    let tables = raster::tables(&setup, spec, &draws, &uploads, &backend, Vec::new());
-    drop(uploads);
-    let subject = Subject {
+    let cascades = raster::cascades(&setup.scene, args.shadows);
+    let mut subject = Subject {
         tool: super::tool(),
-        scene: spec.clone(),
-        scene_triangles: scene.triangle_count(),
-        instances: scene.instances.len() as u64,
+        scene: args.scene.scene.clone(),
+        scene_triangles: setup.scene.triangle_count(),
+        instances: setup.scene.instances.len() as u64,
         camera: setup.camera.name.clone(),
         path: args.path.path.to_string(),
         path_frames: args.path_frames,
         frames: extent.frames(),
         fps: args.path.fps,
-        size_px,
+        size_px: setup.hmd.eye_size_px,
         hmd: setup.hmd.clone(),
-        lens,
-        pixels_per_degree: image_error::pixels_per_degree(size_px[0], &setup.hmd.fov[0]),
+        lens: setup.hmd.fov.map(|fov| Lens::of(&fov)),
+        pixels_per_degree: image_error::pixels_per_degree(
+            setup.hmd.eye_size_px[0],
+            &setup.hmd.fov[0],
+        ),
         adapter,
-        driver: tables.meta.driver.clone(),
-        software_driver,
+        driver: gpu.driver.clone(),
+        software_driver: gpu.is_software,
         baseline: Row::baseline().name,
         repeats: args.repeats,
         trace_frames: extent.trace_frames.clone(),
         shadow_cascades: cascades,
         input_checksum: checksum(&inputs)?,
     };
-    let bounds = scene.bounds().unwrap_or_default();
-    let world = World {
-        draws,
-        lighting: Lighting::new(scene),
-        bounds,
-        shadow_range_m: raster::shadow_range_m(&setup, bounds),
-        lens,
-        tables,
-        hmd: setup.hmd,
-        views: setup.frames,
-        scene: setup.scene,
-    };
+    if !captures {
+        subject.trace_frames.clear();
+    }
+    let sizes = [cascades.into(), RECORD_BUDGET];
+    let prepared = prepare(setup, &args.scene.scene, gpu, sizes, args.cache)?;
+    let Prepared { world, mut backend } = prepared;
+    let mut impossible = Vec::new();
+    for row in &rows {
+        if let Err(error) = world.check(&row.settings) {
+            if args.only.is_some() {
+                return Err(error.context(row.name.clone()));
+            }
+            shell::warn(&format!("{} is left out: {error}", row.name));
+            impossible.push(row.name.clone());
+        }
+    }
+    rows.retain(|row| !impossible.contains(&row.name));
     let folder = Folder::create(&args.output, &subject)?;
     let mut bench = Bench {
         world: &world,

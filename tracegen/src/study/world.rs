@@ -72,6 +72,16 @@ impl World {
         }
     }
 
+    /// Checks that settings do not contradict each other and suit the display.
+    ///
+    /// # Errors
+    /// They do not.
+    pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
+        settings.check(&self.hmd)?;
+        self.job(settings).frame(&self.views[0])?;
+        Ok(())
+    }
+
     /// Renders a frame of the path without capture, and leaves its pictures on the device. `memory` is
     /// what the technique remembers of the frame before.
     ///

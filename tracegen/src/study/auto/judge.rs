@@ -79,6 +79,10 @@ impl Bench<'_> {
 impl Judge for Bench<'_> {
     type Error = anyhow::Error;
 
+    fn can(&self, row: &Row) -> bool {
+        self.world.check(&row.settings).is_ok()
+    }
+
     fn judge(&mut self, row: &Row) -> anyhow::Result<Verdict> {
         let extent = self.extent.clone();
         let mut error = 0.0_f64;

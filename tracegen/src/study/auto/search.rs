@@ -20,7 +20,10 @@ pub trait Judge {
     /// Its errors.
     type Error;
 
-    /// Measures a combination.
+    /// Whether a combination can be rendered at all.
+    fn can(&self, row: &Row) -> bool;
+
+    /// Measures a combination that can be rendered.
     ///
     /// # Errors
     /// Its own.
@@ -78,10 +81,9 @@ pub fn search<J: Judge>(
     let baseline = search.try_row(Row::baseline())?;
     let mut alone = Vec::new();
     for option in options {
-        let Ok(row) = Row::of(vec![option.clone()]) else {
-            continue;
-        };
-        alone.push(search.try_row(row)?);
+        if let Some(row) = search.with(&baseline.row, std::slice::from_ref(option)) {
+            alone.push(search.try_row(row)?);
+        }
     }
     let fits_error = |tried: &Tried| match budget.search_limit() {
         Some(limit) => tried.row.lossless || tried.verdict.error <= limit,
@@ -157,7 +159,7 @@ impl<J: Judge> Search<'_, J> {
         loop {
             let mut improved = false;
             for option in options {
-                let Some(row) = with(&best.row, &option.row.parts) else {
+                let Some(row) = self.with(&best.row, &option.row.parts) else {
                     continue;
                 };
                 let candidate = self.try_row(row)?;
@@ -188,45 +190,52 @@ impl<J: Judge> Search<'_, J> {
             }
         }
         while !open.is_empty() {
-            let mut candidates = Vec::new();
+            let mut candidates: Vec<(Setting, Tried)> = Vec::new();
             for option in options {
-                if !open.contains(&option.row.parts[0].setting()) {
+                let setting = option.row.parts[0].setting();
+                if !open.contains(&setting) {
                     continue;
                 }
-                if let Some(row) = with(&best.row, &option.row.parts) {
-                    candidates.push(self.try_row(row)?);
+                if let Some(row) = self.with(&best.row, &option.row.parts) {
+                    candidates.push((setting, self.try_row(row)?));
                 }
             }
+            let kept = candidates
+                .iter()
+                .map(|(_, tried)| tried)
+                .filter(|t| fits(t));
             let error = |t: &&Tried| t.verdict.error;
-            let kept = candidates.iter().filter(|t| fits(t));
             if let Some(kept) = kept.min_by(|a, b| error(a).total_cmp(&error(b))) {
                 return Ok(kept.clone());
             }
-            let time = |t: &&Tried| t.verdict.frame_s;
-            let fastest = candidates.iter().min_by(|a, b| time(a).total_cmp(&time(b)));
-            let Some(fastest) = fastest.filter(|fastest| saves(fastest, &best)) else {
+            let time = |(_, t): &(Setting, Tried)| t.verdict.frame_s;
+            let fastest = candidates
+                .into_iter()
+                .min_by(|a, b| time(a).total_cmp(&time(b)));
+            let Some((taken, fastest)) = fastest.filter(|(_, fastest)| saves(fastest, &best))
+            else {
                 return Ok(best);
             };
-            let taken = |setting: &Setting| {
-                let has = |row: &Row| row.parts.iter().any(|p| p.setting() == *setting);
-                has(&fastest.row) && !has(&best.row)
-            };
-            open.retain(|setting| !taken(setting));
-            best = fastest.clone();
+            open.retain(|setting| *setting != taken);
+            best = fastest;
         }
         Ok(best)
+    }
+
+    /// `row` with more parts, in the place of those that they exclude; none where nothing changes or
+    /// it cannot be rendered.
+    fn with(&self, row: &Row, parts: &[Part]) -> Option<Row> {
+        let replaced = |part: &&Part| parts.iter().any(|new| new.setting() == part.setting());
+        let kept = row.parts.iter().filter(|part| !replaced(part));
+        // The baseline is what is there without any part.
+        let baseline = Row::baseline().parts;
+        let kept = kept.filter(|part| !baseline.contains(part)).cloned();
+        let all: Vec<Part> = kept.chain(parts.iter().cloned()).collect();
+        let new = Row::of(all).ok()?;
+        (new.settings != row.settings && self.judge.can(&new)).then_some(new)
     }
 }
 
 fn saves(a: &Tried, b: &Tried) -> bool {
     a.verdict.frame_time_ratio < b.verdict.frame_time_ratio * (1.0 - LEAST_GAIN)
-}
-
-/// `row` with more parts, in the place of those that they exclude; none where nothing changes.
-fn with(row: &Row, parts: &[Part]) -> Option<Row> {
-    let replaced = |part: &&Part| parts.iter().any(|new| new.setting() == part.setting());
-    let kept = row.parts.iter().filter(|part| !replaced(part)).cloned();
-    let all: Vec<Part> = kept.chain(parts.iter().cloned()).collect();
-    let row_with = Row::of(all).ok()?;
-    (row_with.settings != row.settings).then_some(row_with)
 }

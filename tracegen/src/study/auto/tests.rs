@@ -14,6 +14,10 @@ struct Made<'a> {
 impl Judge for Made<'_> {
     type Error = Infallible;
 
+    fn can(&self, row: &Row) -> bool {
+        row.parts.len() < 3
+    }
+
     fn judge(&mut self, row: &Row) -> Result<Verdict, Infallible> {
         self.judged += 1;
         let mut verdict = Verdict {
