@@ -16,6 +16,8 @@ use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRe
 use techniques::{Layer, Settings, Skips};
 use textures::TextureSet;
 
+mod culling;
+
 const SIZE_PX: [u32; 2] = [200, 136];
 const BUDGET: u64 = 128 << 20;
 
