@@ -77,7 +77,7 @@ impl ShownMesh {
 
     fn bounds(&self, scene: &Scene, instance: &Instance) -> [Vec3; 2] {
         let positions = &scene.meshes[instance.mesh].positions;
-        transformed_box(positions, self.object_box, &instance.transform)
+        world_box(positions, self.object_box, &instance.transform)
     }
 }
 
@@ -166,8 +166,8 @@ impl DrawList {
                     })?;
             }
         }
-        let moving = moving(scene, &calls);
         let bounds: Vec<[Vec3; 2]> = calls.iter().map(|call| call.bounds).collect();
+        let moving = moving(scene, &calls);
         Ok(Self {
             hierarchy: Hierarchy::new(&bounds),
             calls,
@@ -189,9 +189,11 @@ impl DrawList {
             if let Some(transform) = moved.get(&call.instance) {
                 let mesh = &scene.meshes[call.mesh];
                 call.transform = *transform;
-                call.bounds = transformed_box(&mesh.positions, mesh.bounds(), transform);
+                call.bounds = world_box(&mesh.positions, mesh.bounds(), transform);
             }
         }
+        let bounds = |&draw: &u32| (draw, self.calls[draw as usize].bounds);
+        self.hierarchy.refit(self.moving.iter().map(bounds));
         &self.moving
     }
 
@@ -329,6 +331,20 @@ fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
             samplers.len() - 1
         });
     index as u16
+}
+
+/// World-space bounds of a mesh, rounding of its vertices on the way through any driver included;
+/// `object_box` is its box in object space.
+fn world_box(positions: &[Vec3], object_box: [Vec3; 2], transform: &Affine3A) -> [Vec3; 2] {
+    // Parts of the magnitude of the sums that a coordinate comes from: 8 units in the last place.
+    const ROUNDING: f32 = 8.0 * f32::EPSILON / 2.0;
+    let m = &transform.matrix3;
+    let p = object_box[0].abs().max(object_box[1].abs());
+    let axes = [m.x_axis, m.y_axis, m.z_axis].map(|axis| Vec3::from(axis.abs()));
+    let start = Vec3::from(transform.translation.abs());
+    let margin = (axes[0] * p.x + axes[1] * p.y + axes[2] * p.z + start) * ROUNDING;
+    let [low, high] = transformed_box(positions, object_box, transform);
+    [low - margin, high + margin]
 }
 
 /// The draws whose instances move.
