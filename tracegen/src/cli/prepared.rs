@@ -25,6 +25,7 @@ pub struct Prepared {
 /// Unreadable textures, driver errors.
 pub fn prepare(
     setup: SceneSetup,
+    fps: f32,
     spec: &str,
     gpu: Gpu,
     [cascades, record_budget]: [u64; 2],
@@ -47,6 +48,7 @@ pub fn prepare(
         shadow_range_m: raster::shadow_range_m(&setup, bounds),
         lens: setup.hmd.fov.map(|fov| Lens::of(&fov)),
         tables,
+        fps,
         hmd: setup.hmd,
         views: setup.frames,
         scene: setup.scene,

@@ -28,23 +28,24 @@ pub fn run(args: &RasterArgs, budget: Budget) -> anyhow::Result<()> {
     ];
     progress.stage("preparing textures and shaders", 0, "");
     let gpu = device::open(None)?;
-    let prepared = prepare(setup, &args.scene.scene, gpu, sizes, args.cache)?;
+    let prepared = prepare(setup, args.path.fps, &args.scene.scene, gpu, sizes, args.cache)?;
     let Prepared { world, mut backend } = prepared;
     let choice = choose(&world, &mut backend, budget, &progress)?;
     let frames: Vec<u32> = (0..args.frames).collect();
-    let settings = |frame: u32| &choice.held.row(frame).settings;
-    let tables = world.trace_tables(settings, &frames);
+    let planners = choice.planners(&world)?;
+    let planner = |frame: u32| &planners[choice.held.of_frame[frame as usize]];
+    let tables = world.trace_tables(planner, &frames);
     let mut tracer = Tracer::new(&tables, TextraceWriter::create(&args.output, &tables)?);
     progress.stage("capturing", frames.len() as u64, "frames");
     let mut memory = Occlusion::default();
     let mut counts = CaptureCounts::default();
     let mut first = None;
     for &frame in &frames {
-        let shot = world.shoot(&mut backend, settings(frame), frame, &mut memory)?;
+        let shot = world.shoot(&mut backend, planner(frame), frame, &mut memory)?;
         if first.is_none() {
             first = Some(world.pictures(&mut backend, &shot)?);
         }
-        counts += tracer.capture(&world.job(settings(frame)), &mut backend, &shot.frame)?;
+        counts += tracer.capture(&world.job(planner(frame)), &mut backend, &shot.frame)?;
         progress.advance(1);
     }
     drop(progress);

@@ -5,7 +5,7 @@ use super::path_args::PathArgs;
 use super::prepared::{Prepared, prepare};
 use super::raster;
 use super::scene_args::SceneArgs;
-use crate::study::auto::{AutoRecord, Budget, Choice, choose};
+use crate::study::auto::{AutoRecord, Budget, choose};
 use crate::study::folder::{self, Folder, RowRecord, Subject};
 use crate::study::frames;
 use crate::study::measure::{Bench, Extent};
@@ -139,7 +139,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         subject.trace_frames.clear();
     }
     let sizes = [cascades.into(), RECORD_BUDGET];
-    let prepared = prepare(setup, &args.scene.scene, gpu, sizes, args.cache)?;
+    let prepared = prepare(setup, args.path.fps, &args.scene.scene, gpu, sizes, args.cache)?;
     let Prepared { world, mut backend } = prepared;
     let mut impossible = Vec::new();
     for row in &rows {
@@ -205,8 +205,9 @@ fn measure(bench: &mut Bench<'_>, rows: &[Row]) -> anyhow::Result<Vec<RowRecord>
         .stage("measuring", open as u64 * bench.extent.steps(), "frames");
     for (row, record) in rows.iter().zip(&mut records) {
         if record.is_none() {
+            let planner = bench.world.planner(&row.settings)?;
             let measured = bench
-                .measure(row, |_| &row.settings)
+                .measure(row, |_| &planner)
                 .with_context(|| row.name.clone())?;
             bench.folder.keep(&measured)?;
             *record = Some(measured);
@@ -221,18 +222,18 @@ fn measure_auto(bench: &mut Bench<'_>, budget: Budget) -> anyhow::Result<(AutoRe
     if let Some(kept) = bench.folder.kept(&name, &budget) {
         return Ok(kept);
     }
-    let Choice { record, held } = choose(bench.world, bench.backend, budget, bench.progress)?;
+    let choice = choose(bench.world, bench.backend, budget, bench.progress)?;
+    let (held, planners) = (&choice.held, choice.planners(bench.world)?);
     let chosen = &held.chain[0];
     let row = Row {
         title: format!("Chosen for {budget}: {}", chosen.title),
         name: name.clone(),
         ..chosen.clone()
     };
-    bench
-        .progress
-        .stage("measuring what was chosen", bench.extent.steps(), "frames");
-    let measured = bench.measure(&row, |frame| &held.row(frame).settings)?;
-    let kept = (record, measured);
+    let steps = bench.extent.steps();
+    bench.progress.stage("measuring what was chosen", steps, "frames");
+    let measured = bench.measure(&row, |frame| &planners[held.of_frame[frame as usize]])?;
+    let kept = (choice.record, measured);
     bench.folder.write_kept(&name, &budget, &kept)?;
     Ok(kept)
 }

@@ -12,7 +12,7 @@ use shell::Progress;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
-use techniques::Settings;
+use techniques::{Planner, Settings};
 use visibility::Occlusion;
 
 /// What is measured of every row.
@@ -84,19 +84,19 @@ pub struct Times {
 }
 
 impl Bench<'_> {
-    /// Measures a row, whose frames may each have settings of their own.
+    /// Measures a row, whose frames may each have a planner of their own.
     ///
     /// # Errors
     /// Driver errors, and errors of writing.
     pub fn measure<'s>(
         &mut self,
         row: &Row,
-        settings: impl Fn(u32) -> &'s Settings,
+        planner: impl Fn(u32) -> &'s Planner,
     ) -> anyhow::Result<RowRecord> {
         let can_forget = memory::forget_peak();
-        let (mut frames, trace) = self.take(row, &settings)?;
+        let (mut frames, trace) = self.take(row, &planner)?;
         let advance = || self.progress.advance(1);
-        let times = time(self.world, self.backend, self.extent, settings, advance)?;
+        let times = time(self.world, self.backend, self.extent, planner, advance)?;
         for (frame, times) in frames.iter_mut().zip(times) {
             let seconds = |times: &[Duration]| times.iter().map(Duration::as_secs_f64).collect();
             frame.frame_s = seconds(&times.frame);
@@ -127,12 +127,12 @@ impl Bench<'_> {
     fn take<'s>(
         &mut self,
         row: &Row,
-        settings: &impl Fn(u32) -> &'s Settings,
+        planner: &impl Fn(u32) -> &'s Planner,
     ) -> anyhow::Result<(Vec<FrameRecord>, Option<String>)> {
         let (world, extent) = (self.world, self.extent);
         let (kept, left_out): (Vec<u32>, Vec<u32>) =
             (extent.frames().into_iter()).partition(|frame| extent.trace_frames.contains(frame));
-        let tables = [&kept, &left_out].map(|frames| world.trace_tables(settings, frames));
+        let tables = [&kept, &left_out].map(|frames| world.trace_tables(planner, frames));
         let (trace_name, trace_path) = self.folder.trace(&row.name);
         let mut traced = match kept.is_empty() || !self.captures {
             true => None,
@@ -152,7 +152,7 @@ impl Bench<'_> {
         let mut frames = Vec::new();
         let mut memory = Occlusion::default();
         for (number, measured) in extent.rendered(row.settings.occlusion) {
-            let shot = world.shoot(self.backend, settings(number), number, &mut memory)?;
+            let shot = world.shoot(self.backend, planner(number), number, &mut memory)?;
             if !measured {
                 continue;
             }
@@ -161,7 +161,7 @@ impl Bench<'_> {
             let images = self
                 .folder
                 .write_images(&row.name, number, &pictures, size_px)?;
-            let job = world.job(settings(number));
+            let job = world.job(planner(number));
             let counts = if kept.contains(&number) {
                 traced
                     .as_mut()
@@ -212,8 +212,8 @@ impl Bench<'_> {
         if !self.captures {
             return Ok(None);
         }
-        let settings = Settings::default();
-        let job = self.world.job(&settings);
+        let planner = self.world.planner(&Settings::default())?;
+        let job = self.world.job(&planner);
         let truth = match self.truth.entry(number) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(open) => open.insert(job.truth(self.backend, &shot.frame)?),
@@ -226,7 +226,7 @@ impl Bench<'_> {
     }
 }
 
-/// Times frames with `settings` and with the baseline, which take turns, several times over: one entry
+/// Times frames with a row's planners and with the baseline's, which take turns, several times over: one entry
 /// a measured frame.
 ///
 /// # Errors
@@ -235,12 +235,12 @@ pub fn time<'s>(
     world: &World,
     backend: &mut Lavapipe,
     extent: &Extent,
-    settings: impl Fn(u32) -> &'s Settings,
+    planner: impl Fn(u32) -> &'s Planner,
     mut advance: impl FnMut(),
 ) -> anyhow::Result<Vec<Times>> {
-    let baseline = Settings::default();
+    let baseline = world.planner(&Settings::default())?;
     let mut times: Vec<Times> = extent.frames().iter().map(|_| Times::default()).collect();
-    let remembers = (extent.frames().into_iter()).any(|frame| settings(frame).occlusion);
+    let remembers = (extent.frames().into_iter()).any(|frame| planner(frame).settings().occlusion);
     for repeat in 0..extent.repeats {
         let mut measured = times.iter_mut();
         let mut memory = Occlusion::default();
@@ -249,11 +249,11 @@ pub fn time<'s>(
             let [row, beside] = if repeat % 2 == 0 {
                 let beside = world.shoot(backend, &baseline, number, &mut Occlusion::default())?;
                 [
-                    world.shoot(backend, settings(number), number, &mut memory)?,
+                    world.shoot(backend, planner(number), number, &mut memory)?,
                     beside,
                 ]
             } else {
-                let row = world.shoot(backend, settings(number), number, &mut memory)?;
+                let row = world.shoot(backend, planner(number), number, &mut memory)?;
                 [
                     row,
                     world.shoot(backend, &baseline, number, &mut Occlusion::default())?,

@@ -12,7 +12,7 @@ use record::CaptureCounts;
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::{Settings, Skips};
+use techniques::{Planner, Settings, SettingsError, Skips};
 use visibility::Occlusion;
 
 const EYES: &[Eye] = &[Eye::Left, Eye::Right];
@@ -34,6 +34,8 @@ pub struct World {
     pub hmd: Hmd,
     /// What the user sees of the left and right eye's picture.
     pub lens: [Lens; 2],
+    /// Frames a second along the path.
+    pub fps: f32,
     /// The path, by frame number.
     pub views: Vec<FrameViews>,
     /// Tables of the traces, without frames and passes.
@@ -54,19 +56,24 @@ pub struct Shot {
 }
 
 impl World {
-    /// The job of capturing with `settings`.
+    /// Plans frames with `settings`.
+    ///
+    /// # Errors
+    /// Settings that contradict each other or do not suit the display.
+    pub fn planner(&self, settings: &Settings) -> Result<Planner, SettingsError> {
+        Planner::new(settings, &self.hmd, self.lens, EYES, self.fps)
+    }
+
+    /// The job of capturing what `planner` plans.
     #[must_use]
-    pub fn job<'a>(&'a self, settings: &'a Settings) -> CaptureJob<'a> {
+    pub fn job<'a>(&'a self, planner: &'a Planner) -> CaptureJob<'a> {
         CaptureJob {
             scene: &self.scene,
             draws: &self.draws,
             lighting: self.lighting.clone(),
             bounds: self.bounds,
             shadow_range_m: self.shadow_range_m,
-            hmd: &self.hmd,
-            lenses: self.lens,
-            eyes: EYES,
-            settings,
+            planner,
             // What is searched for anew in every frame would hide what the techniques find.
             skips: Skips::NONE,
         }
@@ -77,8 +84,8 @@ impl World {
     /// # Errors
     /// They do not.
     pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
-        settings.check(&self.hmd)?;
-        self.job(settings).frame(&self.views[0])?;
+        let planner = self.planner(settings)?;
+        self.job(&planner).frame(&self.views[0])?;
         Ok(())
     }
 
@@ -90,14 +97,14 @@ impl World {
     pub fn shoot(
         &self,
         backend: &mut dyn CaptureBackend,
-        settings: &Settings,
+        planner: &Planner,
         number: u32,
         memory: &mut Occlusion,
     ) -> Result<Shot, RasterError> {
-        let job = self.job(settings);
+        let job = self.job(planner);
         let start = Instant::now();
         let mut frame = job.frame(&self.views[number as usize])?;
-        if settings.occlusion {
+        if planner.settings().occlusion {
             job.occlude(backend, &mut frame, memory)?;
         }
         let planned = start.elapsed();
@@ -130,11 +137,11 @@ impl World {
             .collect()
     }
 
-    /// The tables of a trace of some frames, each with its settings.
+    /// The tables of a trace of some frames, each with its planner.
     #[must_use]
     pub fn trace_tables<'s>(
         &self,
-        settings: impl Fn(u32) -> &'s Settings,
+        planner: impl Fn(u32) -> &'s Planner,
         frames: &[u32],
     ) -> Tables {
         let mut tables = self.tables.clone();
@@ -143,7 +150,7 @@ impl World {
             .collect();
         tables.passes = (tables.meta.frames.iter())
             .flat_map(|views| {
-                let job = self.job(settings(views.frame));
+                let job = self.job(planner(views.frame));
                 job.passes(std::slice::from_ref(views))
             })
             .collect();

@@ -9,6 +9,7 @@ use raster::lavapipe::Lavapipe;
 use shell::Progress;
 use std::collections::HashMap;
 use std::time::Duration;
+use techniques::{Planner, SettingsError};
 use visibility::Occlusion;
 
 /// Frames of a path that the search sees.
@@ -23,6 +24,18 @@ pub struct Choice {
     pub record: AutoRecord,
     /// By frame.
     pub held: Held,
+}
+
+impl Choice {
+    /// Planners of the combinations that the frames are rendered with; frame `i` has
+    /// `[held.of_frame[i]]`.
+    ///
+    /// # Errors
+    /// None that the search has not met.
+    pub fn planners(&self, world: &World) -> Result<Vec<Planner>, SettingsError> {
+        let rows = self.held.chain.iter();
+        rows.map(|row| world.planner(&row.settings)).collect()
+    }
 }
 
 /// Searches for the best combination of techniques under a budget on a few frames of the path, and
@@ -55,6 +68,7 @@ pub fn choose(
             repeats: SEARCH_REPEATS,
         },
         references: HashMap::new(),
+        planners: Vec::new(),
         progress,
     };
     let found = match search(&mut bench, &options, budget)? {
@@ -84,10 +98,11 @@ pub fn choose(
             })?
         }
         None => {
+            let planner = world.planner(&chosen.settings)?;
             let mut times: Vec<Duration> = Vec::new();
             let mut memory = Occlusion::default();
             for frame in 0..path_frames {
-                let shot = world.shoot(bench.backend, &chosen.settings, frame, &mut memory)?;
+                let shot = world.shoot(bench.backend, &planner, frame, &mut memory)?;
                 times.push(shot.total);
                 progress.advance(1);
             }

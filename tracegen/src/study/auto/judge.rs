@@ -10,7 +10,8 @@ use image_error::{Mask, Picture, Reference};
 use raster::lavapipe::Lavapipe;
 use shell::Progress;
 use std::collections::HashMap;
-use techniques::Settings;
+use std::sync::Arc;
+use techniques::{Planner, Settings};
 use visibility::Occlusion;
 
 /// Renders combinations and the baseline beside them.
@@ -25,6 +26,8 @@ pub struct Bench<'a> {
     pub extent: Extent,
     /// The baseline's pictures of the frames of the search, as far as they were asked for.
     pub references: HashMap<u32, Vec<Reference>>,
+    /// Planners made so far.
+    pub planners: Vec<Arc<Planner>>,
     /// How far it is.
     pub progress: &'a Progress,
 }
@@ -60,9 +63,19 @@ impl Bench<'_> {
         Ok(worst)
     }
 
+    /// The planner of some settings: what it has worked out is kept.
+    fn planner(&mut self, settings: &Settings) -> anyhow::Result<Arc<Planner>> {
+        if let Some(known) = self.planners.iter().find(|p| p.settings() == settings) {
+            return Ok(Arc::clone(known));
+        }
+        let planner = Arc::new(self.world.planner(settings)?);
+        self.planners.push(Arc::clone(&planner));
+        Ok(planner)
+    }
+
     /// The baseline's pictures of a frame, left and right.
     fn references(&mut self, frame: u32) -> anyhow::Result<Vec<Reference>> {
-        let (world, baseline) = (self.world, Settings::default());
+        let (world, baseline) = (self.world, self.planner(&Settings::default())?);
         let shot = world.shoot(self.backend, &baseline, frame, &mut Occlusion::default())?;
         let pictures = world.pictures(self.backend, &shot)?;
         let size_px = world.hmd.eye_size_px;
@@ -85,6 +98,7 @@ impl Judge for Bench<'_> {
 
     fn judge(&mut self, row: &Row) -> anyhow::Result<Verdict> {
         let extent = self.extent.clone();
+        let planner = self.planner(&row.settings)?;
         let mut error = 0.0_f64;
         let mut memory = Occlusion::default();
         for (frame, measured) in extent.rendered(row.settings.occlusion) {
@@ -92,10 +106,10 @@ impl Judge for Bench<'_> {
                 error = error.max(self.error(row, frame, &mut memory)?);
             } else {
                 self.world
-                    .shoot(self.backend, &row.settings, frame, &mut memory)?;
+                    .shoot(self.backend, &planner, frame, &mut memory)?;
             }
         }
-        let times = time(self.world, self.backend, &extent, |_| &row.settings, || ())?;
+        let times = time(self.world, self.backend, &extent, |_| &*planner, || ())?;
         let mut ratios = Vec::new();
         let mut frame = Vec::new();
         for times in &times {
