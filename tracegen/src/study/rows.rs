@@ -1,6 +1,7 @@
 //! The techniques by name, and the rows of a study: each technique alone, and combinations.
 
-use techniques::Settings;
+use techniques::settings::{Foveation, FoveationKind, Rates};
+use techniques::{Gaze, Settings};
 use visibility::Culling;
 
 /// One technique: what it changes of the baseline.
@@ -28,6 +29,10 @@ pub enum Setting {
     Culling,
     /// Whether hidden ones are left out.
     Occlusion,
+    /// Whether what the lens hides is drawn.
+    Mask,
+    /// How the periphery is coarsened.
+    Foveation,
 }
 
 impl PartialEq for Part {
@@ -45,20 +50,53 @@ impl Part {
         let others = Culling::all().filter(|culling| *culling != baseline);
         let mut parts = vec![Self::culling(baseline)];
         parts.extend(others.map(Self::culling));
-        parts.extend([Self::lossless(
-            "occlusion",
-            "Occlusion culling",
-            Setting::Occlusion,
-            |s| s.occlusion = true,
-        )]);
+        // Name, title, whether no visible pixel changes, what it excludes, how it is set.
+        parts.extend([
+            Self::new("occlusion", "Occlusion culling", true, Setting::Occlusion, |s| {
+                s.occlusion = true;
+            }),
+            Self::new("hidden-area-mask", "Hidden-area mask", true, Setting::Mask, |s| {
+                s.hidden_area_mask = true;
+            }),
+            Self::new("foveation-rings", "Foveation by rings", false, Setting::Foveation, |s| {
+                s.foveation = Some(foveation(FoveationKind::Rings, Rates::default()));
+            }),
+            Self::new("multi-resolution", "Multi-resolution", false, Setting::Foveation, |s| {
+                s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default()));
+            }),
+            Self::new("radial-density", "Radial density mask", false, Setting::Foveation, |s| {
+                s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default()));
+            }),
+        ]);
         parts
     }
 
-    fn lossless(name: &str, title: &str, setting: Setting, change: fn(&mut Settings)) -> Self {
+    /// Every technique with the settings that are worth a search.
+    #[must_use]
+    pub fn options() -> Vec<Self> {
+        let mut parts = Self::all();
+        parts.extend([
+            Self::new("foveation-rings-wide", "Foveation by rings, 1.5 times as wide", false, Setting::Foveation, |s| {
+                s.foveation = Some(foveation(FoveationKind::Rings, wide()));
+            }),
+            Self::new("radial-density-wide", "Radial density mask, 1.5 times as wide", false, Setting::Foveation, |s| {
+                s.foveation = Some(foveation(FoveationKind::RadialDensity, wide()));
+            }),
+        ]);
+        parts
+    }
+
+    fn new(
+        name: &str,
+        title: &str,
+        lossless: bool,
+        setting: Setting,
+        change: fn(&mut Settings),
+    ) -> Self {
         Self {
             name: name.to_owned(),
             title: title.to_owned(),
-            lossless: true,
+            lossless,
             change: Change::Switch(setting, change),
         }
     }
@@ -70,12 +108,6 @@ impl Part {
             lossless: culling.is_lossless(),
             change: Change::Culling(culling),
         }
-    }
-
-    /// Every technique with the settings that are worth a search.
-    #[must_use]
-    pub fn options() -> Vec<Self> {
-        Self::all()
     }
 
     /// Its error is a shift of what is seen, in pixels, and bounded for every frame.
@@ -103,11 +135,28 @@ impl Part {
     }
 }
 
+/// Straight ahead.
+fn foveation(kind: FoveationKind, rates: Rates) -> Foveation {
+    Foveation {
+        kind,
+        gaze: Gaze::default(),
+        rates,
+    }
+}
+
+/// The usual rates, each beginning 1.5 times as far out.
+fn wide() -> Rates {
+    Rates {
+        edges_deg: Rates::default().edges_deg.map(|edge| 1.5 * edge),
+    }
+}
+
 /// Combinations that a study measures beside the techniques alone: title and parts.
-const COMBINATIONS: &[(&str, &str)] = &[(
-    "Superfrustum and occlusion culling",
-    "superfrustum+occlusion",
-)];
+const COMBINATIONS: &[(&str, &str)] = &[
+    ("Culling and occlusion", "superfrustum+occlusion"),
+    ("All that lose nothing", "superfrustum+occlusion+hidden-area-mask"),
+    ("Everything", "superfrustum+occlusion+hidden-area-mask+foveation-rings"),
+];
 
 /// A technique or a combination of some, measured as one.
 #[derive(Clone, Debug)]
