@@ -15,6 +15,7 @@ fn pass(kind: PassKind, frame: u32, eye: Option<Eye>, tiles: [u32; 2]) -> Pass {
         frame,
         kind,
         eye,
+        layer: 0,
         size_px: tiles.map(|t| t * 16),
         tiles,
     }
