@@ -1,6 +1,7 @@
 //! `tracegen raster`.
 
 use super::cache_args::CacheArgs;
+use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::picture;
 use anyhow::{Context, ensure};
@@ -22,8 +23,6 @@ use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;
-/// Most frames of a camera path.
-const MAX_FRAMES: i64 = 10_000;
 
 /// Arguments of `tracegen raster`.
 #[derive(Args, Debug)]
@@ -36,9 +35,11 @@ pub struct RasterArgs {
     /// Picture of all views side by side.
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
-    /// Frames along a slow walk: 0.4 m/s ahead with a sideways sway of 5 cm, at 72 frames a second.
+    #[command(flatten)]
+    path: PathArgs,
+    /// Frames along the path.
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Camera",
-          value_parser = clap::value_parser!(u32).range(1..=MAX_FRAMES))]
+          value_parser = frame_count())]
     frames: u32,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
@@ -92,7 +93,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let started = Instant::now();
     let cache = args.cache.open()?;
     let progress = Progress::new("loading the scene", 0, "");
-    let setup = args.scene.setup(None, args.frames, &LoadOptions::ALL)?;
+    let setup = args
+        .scene
+        .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
     let loaded = started.elapsed();
     let cascades = if args.shadows {
         CASCADES

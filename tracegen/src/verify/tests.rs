@@ -44,7 +44,7 @@ fn display(size_px: [u32; 2]) -> Hmd {
 }
 
 fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
-    cameras::frame_views(&scene.cameras[0], &display(size_px), 1)
+    cameras::still_frame(&scene.cameras[0], &display(size_px))
         .unwrap()
         .remove(0)
 }
