@@ -8,7 +8,6 @@ use super::frame::Frame;
 use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
 use formats::view::{FrameViews, TILE_SIZE_PX};
-use scene::cameras::PATH_FPS;
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
@@ -35,7 +34,7 @@ impl CaptureJob<'_> {
     /// How a frame is rendered.
     #[must_use]
     pub fn plan(&self, views: &FrameViews) -> FramePlan {
-        self.planner.plan(views, views.frame as f32 / PATH_FPS)
+        self.planner.plan(views)
     }
 
     /// Passes of the frames in the order in which [`Self::capture_frame`] writes them.

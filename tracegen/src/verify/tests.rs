@@ -18,6 +18,8 @@ use techniques::layer::Predicted;
 use techniques::{Layer, Planner, Settings};
 use textures::TextureSet;
 
+mod layers;
+
 const SIZE_PX: [u32; 2] = [200, 136];
 const BUDGET: u64 = 128 << 20;
 
@@ -57,7 +59,7 @@ fn baseline(size_px: [u32; 2], eyes: &[Eye]) -> Planner {
 fn planner(settings: &Settings, size_px: [u32; 2], eyes: &[Eye]) -> Planner {
     let hmd = display(size_px);
     let lenses = hmd.fov.map(|fov| Lens::of(&fov));
-    Planner::new(settings, &hmd, lenses, eyes).unwrap()
+    Planner::new(settings, &hmd, lenses, eyes, 72.0).unwrap()
 }
 
 fn job<'a>(scene: &Scene, draws: &'a DrawList, planner: &'a Planner) -> CaptureJob<'a> {
@@ -95,7 +97,7 @@ fn capture_as(
     budget: u64,
     plain: bool,
 ) -> Result<Captured, RasterError> {
-    let size_px = planner.picture_px();
+    let size_px = planner.hmd().eye_size_px;
     let draws = DrawList::new(scene, cascades).unwrap();
     let set = TextureSet::compress(scene).unwrap();
     let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;

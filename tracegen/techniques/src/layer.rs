@@ -159,7 +159,8 @@ mod tests {
                 Vec3::new(random(), random(), random()),
             );
             let c = clip * p.extend(1.0);
-            if c.w > 0.1 && c.x.abs() <= c.w && c.y.abs() <= c.w && (c.x / c.w + 1.0) * 32.0 < 16.0 {
+            if c.w > 0.1 && c.x.abs() <= c.w && c.y.abs() <= c.w && (c.x / c.w + 1.0) * 32.0 < 16.0
+            {
                 drawn += 1;
                 assert!(layer.may_draw([p.min(q), p.max(q)]), "{p} {q}");
                 assert!(layer.may_draw([p, p]), "{p}");

@@ -1,9 +1,9 @@
 //! The layers of one eye before they have a pose: the same for every frame with the same gaze.
 
+use crate::Mask;
 use crate::eye::EyePicture;
 use crate::layer::{Layer, Stage};
 use crate::plan::{Filter, Part};
-use crate::Mask;
 use formats::view::{Eye, EyeView, TILE_SIZE_PX};
 use glam::{DMat4, DVec4, Mat4};
 use std::sync::Arc;
@@ -49,12 +49,7 @@ impl Patch {
 
     /// Fills the tiles of a picture that `owned` holds from a layer over the whole of it: pixels
     /// that the lens shows, and those around them from which the picture's are interpolated.
-    pub fn of_tiles(
-        picture: &EyePicture,
-        number: u16,
-        coarseness: [u32; 2],
-        owned: Mask,
-    ) -> Self {
+    pub fn of_tiles(picture: &EyePicture, number: u16, coarseness: [u32; 2], owned: Mask) -> Self {
         let cover = Patch {
             number,
             coarseness,

@@ -17,12 +17,13 @@ pub struct Planner {
     hmd: Hmd,
     lenses: [Lens; 2],
     eyes: Vec<Eye>,
+    fps: f32,
     /// What the last gaze needed: it stays where the gaze does.
     last: Mutex<Option<([f32; 2], Arc<Vec<EyePatches>>)>>,
 }
 
 impl Planner {
-    /// For frames with the pictures of `eyes`, in their order, seen through `lenses`.
+    /// For frames with the pictures of `eyes`, in their order, seen through `lenses`, `fps` a second.
     ///
     /// # Errors
     /// [`Settings::check`].
@@ -31,6 +32,7 @@ impl Planner {
         hmd: &Hmd,
         lenses: [Lens; 2],
         eyes: &[Eye],
+        fps: f32,
     ) -> Result<Self, SettingsError> {
         settings.check(hmd)?;
         Ok(Self {
@@ -38,6 +40,7 @@ impl Planner {
             hmd: hmd.clone(),
             lenses,
             eyes: eyes.to_vec(),
+            fps,
             last: Mutex::new(None),
         })
     }
@@ -48,21 +51,28 @@ impl Planner {
         &self.eyes
     }
 
-    /// Width and height of an eye's picture.
-    #[must_use]
-    pub fn picture_px(&self) -> [u32; 2] {
-        self.hmd.eye_size_px
-    }
-
     /// What is left out or done more coarsely.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Plans a frame at a time of the path.
+    /// The display.
     #[must_use]
-    pub fn plan(&self, views: &FrameViews, time_s: f32) -> FramePlan {
+    pub fn hmd(&self) -> &Hmd {
+        &self.hmd
+    }
+
+    /// What the user sees of the left and right eye's picture.
+    #[must_use]
+    pub fn lenses(&self) -> &[Lens; 2] {
+        &self.lenses
+    }
+
+    /// Plans a frame.
+    #[must_use]
+    pub fn plan(&self, views: &FrameViews) -> FramePlan {
+        let time_s = views.frame as f32 / self.fps;
         let gaze = (self.settings.foveation.as_ref())
             .map_or([0.0; 2], |foveation| foveation.gaze.at(time_s));
         let eyes = self.patches(gaze);

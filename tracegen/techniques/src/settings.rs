@@ -185,9 +185,7 @@ fn in_view(hmd: &Hmd, deg: [f32; 2]) -> bool {
         let fov = &hmd.fov[eye];
         let seen = gaze::direction(hmd, eye, deg);
         let [x, y] = [seen.x / -seen.z, seen.y / -seen.z];
-        seen.z < 0.0
-            && (-fov.left..=fov.right).contains(&x)
-            && (-fov.down..=fov.up).contains(&y)
+        seen.z < 0.0 && (-fov.left..=fov.right).contains(&x) && (-fov.down..=fov.up).contains(&y)
     };
     gaze::is_ahead(deg) && (sees(0) || sees(1))
 }

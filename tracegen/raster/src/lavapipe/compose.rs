@@ -63,7 +63,13 @@ impl Composer {
                 bias: wgpu::DepthBiasState::default(),
             };
             let compose = |entry_point| {
-                pipeline(gpu, &module, &[&mask_layout, &part_layout], entry_point, None)
+                pipeline(
+                    gpu,
+                    &module,
+                    &[&mask_layout, &part_layout],
+                    entry_point,
+                    None,
+                )
             };
             Self {
                 mask: pipeline(gpu, &module, &[&mask_layout], "fragment_mask", Some(depth)),
@@ -125,8 +131,8 @@ impl Composer {
             });
             for ((part, layer), bindings) in parts.iter().zip(&bound) {
                 let covers = |axis: usize| {
-                    let end = part.origin_px[axis]
-                        + layer.color.size_px[axis] * part.coarseness[axis];
+                    let end =
+                        part.origin_px[axis] + layer.color.size_px[axis] * part.coarseness[axis];
                     end.min(picture.size_px[axis]) - part.origin_px[axis]
                 };
                 let [x, y] = part.origin_px;

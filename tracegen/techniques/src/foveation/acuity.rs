@@ -24,7 +24,9 @@ impl Rates {
                 _ => fov.up + fov.down,
             });
             let span = f64::from(spans[0].max(spans[1]));
-            (span / f64::from(hmd.eye_size_px[axis])).atan().to_degrees()
+            (span / f64::from(hmd.eye_size_px[axis]))
+                .atan()
+                .to_degrees()
         };
         let pixel_deg = [pixel_deg(0), pixel_deg(1)];
         let mut edges_deg = [0.0_f32; 4];
@@ -34,5 +36,32 @@ impl Rates {
             *edge = angle.clamp(0.0, 180.0) as f32;
         }
         Self { edges_deg }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use formats::view::FovTangents;
+
+    #[test]
+    fn the_rates_begin_where_their_cycles_are_as_small_as_the_eye_resolves() {
+        let fov = FovTangents {
+            left: 1.191_753_6,
+            right: 1.191_753_6,
+            up: 1.191_753_6,
+            down: 1.191_753_6,
+        };
+        let hmd = Hmd {
+            eye_size_px: [960, 960],
+            fov: [fov; 2],
+            ..Hmd::default()
+        };
+        // 7.03 pixels a degree: cycles of 4 and 8 pixels are 0.569 and 1.138 degrees.
+        let edges = Rates::of_acuity(&hmd).edges_deg;
+        for (edge, cycle_deg) in edges.into_iter().zip([0.569, 0.569, 1.138, 1.138]) {
+            let resolved = 1.32 / 60.0 * edge + 1.0 / 48.0;
+            assert!((resolved - cycle_deg).abs() < 2e-3, "{edges:?}");
+        }
     }
 }

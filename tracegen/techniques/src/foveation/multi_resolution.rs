@@ -47,7 +47,9 @@ pub(crate) fn patches(picture: &EyePicture) -> EyePatches {
 fn cuts(size_px: u32, gaze_px: f64) -> [u32; 4] {
     let tile = f64::from(TILE_SIZE_PX);
     let tiles = f64::from(size_px.div_ceil(TILE_SIZE_PX));
-    let length = (f64::from(size_px) * CENTER_SHARE / tile).round().clamp(1.0, tiles);
+    let length = (f64::from(size_px) * CENTER_SHARE / tile)
+        .round()
+        .clamp(1.0, tiles);
     let first = (gaze_px / tile - length / 2.0)
         .round()
         .clamp(0.0, tiles - length);
