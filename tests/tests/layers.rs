@@ -70,7 +70,11 @@ fn every_order_replays_all_quads_of_all_layers() {
                 &["run", "--json", "--mode", "functional", "--order", order],
                 &trace,
             );
-            assert_eq!(run["result"]["quads"].as_u64(), Some(quads), "{kind} {order}");
+            assert_eq!(
+                run["result"]["quads"].as_u64(),
+                Some(quads),
+                "{kind} {order}"
+            );
             lines.insert(run["result"]["access_hash"].to_string());
         }
         assert_eq!(

@@ -17,35 +17,36 @@ pub fn plan(order: &dyn TileOrder, passes: &[Pass]) -> Vec<Phase> {
     let mut frames: Vec<u32> = passes.iter().map(|p| p.frame).collect();
     frames.sort_unstable();
     frames.dedup();
+    let plan = |frame| plan_frame(order, passes, frame);
+    frames.into_iter().flat_map(plan).collect()
+}
+
+/// The work of one frame.
+#[must_use]
+pub fn plan_frame(order: &dyn TileOrder, passes: &[Pass], frame: u32) -> Vec<Phase> {
     let view = |(index, pass): (usize, &Pass)| View {
         pass: index as u32,
         tiles: pass.tiles,
     };
-    let mut phases = Vec::new();
-    for frame in frames {
-        let of_frame = passes.iter().enumerate().filter(|(_, p)| p.frame == frame);
-        let (seen, before): (Vec<_>, Vec<_>) = of_frame
-            .partition(|(_, p)| p.kind == PassKind::Layer || (p.is_seen() && p.eye.is_some()));
-        phases.extend(before.into_iter().map(|pass| order.mono(view(pass))));
-        let mut open = seen.into_iter();
-        while let Some(pass) = open.next() {
-            let partner = open
-                .as_slice()
-                .iter()
-                .position(|other| pair(pass.1, other.1));
-            let Some(partner) = partner else {
-                phases.push(order.mono(view(pass)));
-                continue;
-            };
-            let mut rest: Vec<_> = open.collect();
-            let other = rest.remove(partner);
-            open = rest.into_iter();
-            let (left, right) = match pass.1.eye {
-                Some(Eye::Left) => (pass, other),
-                _ => (other, pass),
-            };
-            phases.push(order.stereo(view(left), view(right)));
-        }
+    let of_frame = passes.iter().enumerate().filter(|(_, p)| p.frame == frame);
+    let (seen, before): (Vec<_>, Vec<_>) =
+        of_frame.partition(|(_, p)| p.kind == PassKind::Layer || (p.is_seen() && p.eye.is_some()));
+    let mut phases: Vec<Phase> = (before.into_iter())
+        .map(|pass| order.mono(view(pass)))
+        .collect();
+    let mut open = seen;
+    while !open.is_empty() {
+        let pass = open.remove(0);
+        let Some(partner) = open.iter().position(|other| pair(pass.1, other.1)) else {
+            phases.push(order.mono(view(pass)));
+            continue;
+        };
+        let other = open.remove(partner);
+        let (left, right) = match pass.1.eye {
+            Some(Eye::Left) => (pass, other),
+            _ => (other, pass),
+        };
+        phases.push(order.stereo(view(left), view(right)));
     }
     phases
 }

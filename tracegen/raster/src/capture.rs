@@ -9,13 +9,16 @@ use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
 use formats::view::{FrameViews, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
+use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::{FramePlan, Planner};
+use techniques::{FramePlan, Planner, Skips};
 
 /// What to capture, the same for plain rendering and capture.
 pub struct CaptureJob<'a> {
-    /// Draws.
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its draws.
     pub draws: &'a DrawList,
     /// Lights; cascades are fitted per frame.
     pub lighting: Lighting,
@@ -25,6 +28,8 @@ pub struct CaptureJob<'a> {
     pub shadow_range_m: [f32; 2],
     /// Which layers the frames have.
     pub planner: &'a Planner,
+    /// What is left out because nobody sees it.
+    pub skips: Skips,
 }
 
 /// The pictures of one frame, one an eye: sRGB RGBA8.
@@ -59,6 +64,13 @@ impl CaptureJob<'_> {
     /// layer may see.
     #[must_use]
     pub fn frame(&self, views: &FrameViews) -> Frame {
+        let mut frame = self.boxes_seen(views);
+        self.skip(&mut frame);
+        frame
+    }
+
+    /// The frame as the boxes of its draws tell it.
+    pub(crate) fn boxes_seen(&self, views: &FrameViews) -> Frame {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
         lighting.cascades = cascades::fit(
@@ -150,6 +162,7 @@ impl CaptureJob<'_> {
                 backend: &mut *backend,
                 draws: self.draws,
                 view,
+                skip_regions: self.skips.regions,
             };
             let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
             counts += recorded.counts;
@@ -190,6 +203,7 @@ struct ViewCapturer<'a> {
     backend: &'a mut dyn CaptureBackend,
     draws: &'a DrawList,
     view: View<'a>,
+    skip_regions: bool,
 }
 
 impl Capturer for ViewCapturer<'_> {
@@ -201,7 +215,11 @@ impl Capturer for ViewCapturer<'_> {
 
     fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, RasterError> {
         // A part of the layer needs only the draws that may touch it.
-        let touching = self.draws.touching(&self.view, region);
+        let touching = if self.skip_regions {
+            self.draws.touching(&self.view, region)
+        } else {
+            self.view.visible.to_vec()
+        };
         let view = View {
             visible: &touching,
             ..self.view

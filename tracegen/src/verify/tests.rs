@@ -15,7 +15,7 @@ use raster::lighting::Lighting;
 use record::CaptureCounts;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
 use techniques::layer::Predicted;
-use techniques::{Layer, Planner, Settings};
+use techniques::{Layer, Planner, Settings, Skips};
 use textures::TextureSet;
 
 mod layers;
@@ -62,13 +62,15 @@ fn planner(settings: &Settings, size_px: [u32; 2], eyes: &[Eye]) -> Planner {
     Planner::new(settings, &hmd, lenses, eyes, 72.0).unwrap()
 }
 
-fn job<'a>(scene: &Scene, draws: &'a DrawList, planner: &'a Planner) -> CaptureJob<'a> {
+fn job<'a>(scene: &'a Scene, draws: &'a DrawList, planner: &'a Planner) -> CaptureJob<'a> {
     CaptureJob {
+        scene,
         draws,
         lighting: Lighting::new(scene),
         bounds: scene.bounds().unwrap_or_default(),
         shadow_range_m: [0.1, 40.0],
         planner,
+        skips: Skips::default(),
     }
 }
 

@@ -14,6 +14,7 @@ mod patch;
 pub mod plan;
 pub mod planner;
 pub mod settings;
+pub mod skips;
 
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};
@@ -21,3 +22,4 @@ pub use mask::Mask;
 pub use plan::FramePlan;
 pub use planner::Planner;
 pub use settings::{Settings, SettingsError};
+pub use skips::Skips;

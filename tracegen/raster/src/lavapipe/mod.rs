@@ -270,6 +270,9 @@ impl CaptureBackend for Lavapipe {
         let stand_in = ShadowMaps::new(&self.gpu, 0);
         for (number, (cascade, visible)) in lighting.cascades.iter().zip(&frame.casters).enumerate()
         {
+            if !frame.cascades_seen[number] {
+                continue;
+            }
             let plan = self.plan(draws, visible, Purpose::Shadow)?;
             self.work.shadow_maps += 1;
             let uniform = self
