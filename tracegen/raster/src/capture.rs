@@ -7,12 +7,12 @@ use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
-use formats::view::{Eye, FrameViews, Hmd, Lens, TILE_SIZE_PX};
+use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::{FramePlan, Layer, Settings, Skips};
+use techniques::{FramePlan, Planner, Skips};
 use visibility::Rig;
 
 /// What to capture, the same for plain rendering and capture.
@@ -27,14 +27,8 @@ pub struct CaptureJob<'a> {
     pub bounds: (glam::Vec3, glam::Vec3),
     /// Distances from the head that the cascades span, metres.
     pub shadow_range_m: [f32; 2],
-    /// The display.
-    pub hmd: &'a Hmd,
-    /// What the user sees of the left and right eye's picture.
-    pub lenses: [Lens; 2],
-    /// The eyes whose pictures each frame has, in their order.
-    pub eyes: &'a [Eye],
-    /// What is left out or done more coarsely.
-    pub settings: &'a Settings,
+    /// Which layers the frames have.
+    pub planner: &'a Planner,
     /// What is left out because nobody sees it.
     pub skips: Skips,
 }
@@ -46,17 +40,16 @@ impl CaptureJob<'_> {
     /// How a frame is rendered.
     #[must_use]
     pub fn plan(&self, views: &FrameViews) -> FramePlan {
-        FramePlan::new(self.settings, self.hmd, self.eyes, views)
+        self.planner.plan(views)
     }
 
     /// Passes of the frames in the order in which [`Self::capture_frame`] writes them.
     #[must_use]
     pub fn passes(&self, frames: &[FrameViews]) -> Vec<Pass> {
         let of_frame = |views: &FrameViews| {
-            let (plan, frame) = (self.plan(views), views.frame);
-            plan.layers
-                .into_iter()
-                .map(move |layer| pass(frame, &layer))
+            let plan = self.plan(views);
+            let pass = |number| pass(views.frame, &plan, number);
+            (0..plan.layers.len()).map(pass).collect::<Vec<_>>()
         };
         frames.iter().flat_map(of_frame).collect()
     }
@@ -91,7 +84,7 @@ impl CaptureJob<'_> {
             near,
             far,
         );
-        let (culling, number) = (self.settings.culling, views.frame);
+        let (culling, number) = (self.planner.settings().culling, views.frame);
         let (plan, rig) = (self.plan(views), self.rig(views));
         Ok(Frame::new(
             self.draws, lighting, plan, rig, culling, number,
@@ -103,10 +96,10 @@ impl CaptureJob<'_> {
     pub fn rig(&self, views: &FrameViews) -> Rig {
         let eye = |eye: &Eye| visibility::Eye {
             view: views.eyes[*eye as usize],
-            lens: self.lenses[*eye as usize],
-            size_px: self.hmd.eye_size_px,
+            lens: self.planner.lenses()[*eye as usize],
+            size_px: self.planner.hmd().eye_size_px,
         };
-        Rig::new(self.eyes.iter().map(eye).collect())
+        Rig::new(self.planner.eyes().iter().map(eye).collect())
     }
 
     /// Renders the frame's shadow maps: once for all its pictures.
@@ -211,11 +204,18 @@ impl CaptureJob<'_> {
 }
 
 /// The pass that a layer of a frame is written as.
-fn pass(frame: u32, layer: &Layer) -> Pass {
+fn pass(frame: u32, plan: &FramePlan, number: usize) -> Pass {
+    let layer = &plan.layers[number];
+    let (kind, number) = if plan.is_picture(number) {
+        (PassKind::Main, 0)
+    } else {
+        (PassKind::Layer, layer.number)
+    };
     Pass {
         frame,
-        kind: PassKind::Main,
+        kind,
         eye: layer.eye,
+        layer: number,
         size_px: layer.size_px,
         tiles: layer.size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
     }

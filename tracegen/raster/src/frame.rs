@@ -1,6 +1,6 @@
 //! What one frame draws: its light, its layers, and which draws enter each of them.
 
-use super::backend::{View, clip_from_world};
+use super::backend::View;
 use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
 use super::skips::Skipped;
@@ -65,9 +65,12 @@ impl Frame {
                 let mut visible = if whole {
                     kept.clone()
                 } else {
-                    draws.visible_of(&kept, clip_from_world(&layer.view))
+                    draws.visible_of(&kept, layer.clip_from_world())
                 };
-                visible.retain(|&draw| enters(layer.draws, draws.calls[draw as usize].mode));
+                visible.retain(|&draw| {
+                    let call = &draws.calls[draw as usize];
+                    enters(layer.draws, call.mode) && layer.may_draw(call.bounds)
+                });
                 visible
             })
             .collect();

@@ -67,7 +67,7 @@ impl CaptureJob<'_> {
         backend: &mut dyn CaptureBackend,
         frame: &Frame,
     ) -> Result<Vec<Vec<Marks>>, RasterError> {
-        (self.eyes.iter().zip(frame.rig.eyes()))
+        (self.planner.eyes().iter().zip(frame.rig.eyes()))
             .map(|(eye, seen)| {
                 let layer = Layer::whole(*eye, seen.view, seen.size_px);
                 let mut view = frame.view(0);
@@ -103,7 +103,8 @@ impl CaptureJob<'_> {
             listed.dedup();
             Judgement::new(&listed, visible)
         };
-        self.eyes.iter().copied().zip(truth).map(judge).collect()
+        let eyes = self.planner.eyes().iter().copied();
+        eyes.zip(truth).map(judge).collect()
     }
 }
 

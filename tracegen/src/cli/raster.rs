@@ -24,8 +24,9 @@ use scene::{LoadOptions, Scene};
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use techniques::Skips;
+use techniques::layer::Predicted;
 use techniques::skips::Skip;
+use techniques::{Planner, Skips};
 use textures::TextureSet;
 use visibility::Occlusion;
 
@@ -125,18 +126,20 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
-    let settings = args.techniques.settings();
-    let lenses = args.techniques.lenses(&setup.hmd)?;
+    let planner = Planner::new(
+        &args.techniques.settings(&setup.hmd)?,
+        &setup.hmd,
+        args.techniques.lenses(&setup.hmd)?,
+        args.views.eyes(),
+        args.path.fps,
+    )?;
     let job = CaptureJob {
         scene: &setup.scene,
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
         shadow_range_m: shadow_range_m(&setup, bounds),
-        hmd: &setup.hmd,
-        lenses,
-        eyes: args.views.eyes(),
-        settings: &settings,
+        planner: &planner,
         skips: Skips::without(&args.no_skip),
     };
     let finest = job.finest_levels(&setup.frames)?;
@@ -211,6 +214,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         summary.sorting += sorting;
         summary.captured += start.elapsed();
         summary.counts += counts;
+        summary.predicted.push(frame.plan.predicted);
         if let Some(plain) = plain {
             summary.identical = Some(summary.identical.unwrap_or(true) && plain == pictures);
         }
@@ -240,7 +244,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
-    let views = [setup.frames.len(), job.eyes.len()];
+    let views = [setup.frames.len(), planner.eyes().len()];
     note(&texels);
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
@@ -303,6 +307,7 @@ struct Summary {
     captured: Duration,
     sorting: Duration,
     counts: CaptureCounts,
+    predicted: Vec<Predicted>,
     identical: Option<bool>,
     looking: Duration,
     culling: Duration,
@@ -323,7 +328,7 @@ impl Summary {
     ) -> Result<Frame, RasterError> {
         let start = Instant::now();
         let mut frame = job.frame(views)?;
-        if job.settings.occlusion {
+        if job.planner.settings().occlusion {
             job.occlude(backend, &mut frame, &mut self.occlusion)?;
         }
         self.looking += start.elapsed();
@@ -353,6 +358,17 @@ impl Summary {
             size_px[1],
             fragments as f64 / pixels
         ));
+        let mean = |share: fn(&Predicted) -> Option<f32>| {
+            let shares: Option<Vec<f32>> = self.predicted.iter().map(share).collect();
+            shares.map(|shares| shares.iter().sum::<f32>() / shares.len().max(1) as f32)
+        };
+        if let (Some(rate), Some(shaded)) = (mean(|p| p.rate_share), mean(|p| p.shaded_share)) {
+            note(&format!(
+                "{:.2} % of the pixels are open to be shaded: {:.2} % by their rates, the rest for reconstruction",
+                shaded * 100.0,
+                rate * 100.0
+            ));
+        }
         if masked_lanes_killed > 0 {
             note(&format!(
                 "{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw"

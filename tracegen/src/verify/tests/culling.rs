@@ -1,7 +1,7 @@
 //! Culling against the truth: everything drawn, on the driver.
 
-use super::{BOTH, BUDGET, checker, display, job, random, scene, textured, triangles};
-use formats::view::{FrameViews, Hmd};
+use super::{BOTH, BUDGET, checker, display, job, planner, random, scene, textured, triangles};
+use formats::view::{FrameViews, Hmd, Lens};
 use glam::{Affine3A, Quat, Vec3};
 use raster::backend::{CaptureBackend, Marks};
 use raster::capture::{CaptureJob, Pictures};
@@ -13,7 +13,7 @@ use record::Region;
 use scene::{AlphaMode, Camera, Instance, LoadOptions, Scene, cameras, hmd};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use techniques::Settings;
+use techniques::{Planner, Settings};
 use textures::TextureSet;
 use visibility::{Culling, Occlusion};
 
@@ -30,6 +30,11 @@ fn settings(culling: Culling, occlusion: bool) -> Settings {
         occlusion,
         ..Settings::default()
     }
+}
+
+/// Frames of the tests' display, culled in some way.
+fn plans(culling: Culling, occlusion: bool) -> Planner {
+    planner(&settings(culling, occlusion), SIZE_PX, BOTH)
 }
 
 /// Frames of a head that walks and turns, 3 degrees a frame.
@@ -59,7 +64,7 @@ fn listed(
     occlusion: &mut Occlusion,
 ) -> Frame {
     let mut frame = job.frame(views).unwrap();
-    if job.settings.occlusion {
+    if job.planner.settings().occlusion {
         job.occlude(backend, &mut frame, occlusion).unwrap();
     }
     frame
@@ -120,8 +125,8 @@ fn every_mark_is_seen_in_the_depth_and_unmarked_draws_are_seen_nowhere() {
     let draws = DrawList::new(&scene, 0).unwrap();
     let set = TextureSet::compress(&scene).unwrap();
     let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
-    let (hmd, settings) = (display(SIZE_PX), settings(Culling::NONE, false));
-    let job = job(&scene, &draws, &hmd, BOTH, &settings);
+    let (hmd, planner) = (display(SIZE_PX), plans(Culling::NONE, false));
+    let job = job(&scene, &draws, &planner);
     let views = frames(&scene.cameras[0], &hmd, 1).remove(0);
     let frame = job.frame(&views).unwrap();
     let truth = job.truth(&mut backend, &frame).unwrap();
@@ -158,7 +163,7 @@ fn every_mark_is_seen_in_the_depth_and_unmarked_draws_are_seen_nowhere() {
         }
         // In the lens: the same of its pixels.
         let in_lens = marked(|m| m.lens);
-        let (fov, lens) = (hmd.fov[number], job.lenses[number]);
+        let (fov, lens) = (hmd.fov[number], planner.lenses()[number]);
         let through_lens = picture(&in_lens);
         let differs = |pixel: &u32| {
             let at = 4 * *pixel as usize..4 * *pixel as usize + 4;
@@ -180,8 +185,8 @@ fn pictures_are_the_same_whatever_is_culled_and_whatever_is_hidden() {
     let set = TextureSet::compress(&scene).unwrap();
     let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
     let hmd = display(SIZE_PX);
-    let everything = settings(Culling::NONE, false);
-    let everything = job(&scene, &draws, &hmd, BOTH, &everything);
+    let everything = plans(Culling::NONE, false);
+    let everything = job(&scene, &draws, &everything);
     let frames = frames(&scene.cameras[0], &hmd, 4);
     let expected: Vec<Pictures> = frames
         .iter()
@@ -192,8 +197,8 @@ fn pictures_are_the_same_whatever_is_culled_and_whatever_is_hidden() {
         .collect();
     for culling in PICTURE.into_iter().chain(LENS) {
         for hides in [false, true] {
-            let settings = settings(culling, hides);
-            let job = job(&scene, &draws, &hmd, BOTH, &settings);
+            let planner = plans(culling, hides);
+            let job = job(&scene, &draws, &planner);
             let (mut occlusion, mut occluded) = (Occlusion::default(), Vec::new());
             for (views, expected) in frames.iter().zip(&expected) {
                 let frame = listed(&job, &mut backend, views, &mut occlusion);
@@ -207,7 +212,7 @@ fn pictures_are_the_same_whatever_is_culled_and_whatever_is_hidden() {
                     let pixels = found.chunks_exact(4).zip(expected.chunks_exact(4));
                     for (number, (found, expected)) in (0..).zip(pixels) {
                         let at = [number % SIZE_PX[0], number / SIZE_PX[0]];
-                        let seen = job.lenses[eye].pixel_visible(&hmd.fov[eye], SIZE_PX, at);
+                        let seen = planner.lenses()[eye].pixel_visible(&hmd.fov[eye], SIZE_PX, at);
                         assert!(!seen || found == expected, "{culling}, pixel {at:?}");
                     }
                 }
@@ -262,6 +267,10 @@ fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
     let draws = DrawList::new(&scene, 0).unwrap();
     let set = TextureSet::compress(&scene).unwrap();
     let hmd = canted();
+    let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+    let plans = |culling, occlusion| {
+        Planner::new(&settings(culling, occlusion), &hmd, lenses, BOTH, 72.0).unwrap()
+    };
     let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, 1 << 20).unwrap();
     let camera = cameras::find(&scene, camera).unwrap();
     let mut remembered = [(); 2].map(|()| Occlusion::default());
@@ -270,15 +279,15 @@ fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
     // Draws that round robin lost, by technique and eye: in the frame before, and in all.
     let mut lost = [(); 4].map(|()| (BTreeSet::new(), 0_usize));
     for views in frames(camera, &hmd, count) {
-        let none = settings(Culling::NONE, false);
-        let everything = job(&scene, &draws, &hmd, BOTH, &none);
+        let none = plans(Culling::NONE, false);
+        let everything = job(&scene, &draws, &none);
         let truth = {
             let frame = everything.frame(&views).unwrap();
             everything.truth(&mut backend, &frame).unwrap()
         };
         let mut of = |culling: Culling, occlusion: Option<&mut Occlusion>| {
-            let settings = settings(culling, occlusion.is_some());
-            let job = job(&scene, &draws, &hmd, BOTH, &settings);
+            let planner = plans(culling, occlusion.is_some());
+            let job = job(&scene, &draws, &planner);
             let remembered = &mut Occlusion::default();
             let frame = listed(&job, &mut backend, &views, occlusion.unwrap_or(remembered));
             let judged = judged(&frame, &truth);
