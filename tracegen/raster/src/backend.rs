@@ -86,6 +86,7 @@ impl std::ops::Sub for Work {
             bytes_uploaded: self.bytes_uploaded - earlier.bytes_uploaded,
             submitting: self.submitting - earlier.submitting,
             waiting: self.waiting - earlier.waiting,
+            composing: self.composing - earlier.composing,
             shadow_maps: self.shadow_maps - earlier.shadow_maps,
             pipelines: self.pipelines - earlier.pipelines,
             samplers: self.samplers - earlier.samplers,

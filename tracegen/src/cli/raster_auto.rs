@@ -28,7 +28,14 @@ pub fn run(args: &RasterArgs, budget: Budget) -> anyhow::Result<()> {
     ];
     progress.stage("preparing textures and shaders", 0, "");
     let gpu = device::open(None)?;
-    let prepared = prepare(setup, args.path.fps, &args.scene.scene, gpu, sizes, args.cache)?;
+    let prepared = prepare(
+        setup,
+        args.path.fps,
+        &args.scene.scene,
+        gpu,
+        sizes,
+        args.cache,
+    )?;
     let Prepared { world, mut backend } = prepared;
     let choice = choose(&world, &mut backend, budget, &progress)?;
     let frames: Vec<u32> = (0..args.frames).collect();

@@ -139,7 +139,14 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         subject.trace_frames.clear();
     }
     let sizes = [cascades.into(), RECORD_BUDGET];
-    let prepared = prepare(setup, args.path.fps, &args.scene.scene, gpu, sizes, args.cache)?;
+    let prepared = prepare(
+        setup,
+        args.path.fps,
+        &args.scene.scene,
+        gpu,
+        sizes,
+        args.cache,
+    )?;
     let Prepared { world, mut backend } = prepared;
     let mut impossible = Vec::new();
     for row in &rows {
@@ -231,7 +238,9 @@ fn measure_auto(bench: &mut Bench<'_>, budget: Budget) -> anyhow::Result<(AutoRe
         ..chosen.clone()
     };
     let steps = bench.extent.steps();
-    bench.progress.stage("measuring what was chosen", steps, "frames");
+    bench
+        .progress
+        .stage("measuring what was chosen", steps, "frames");
     let measured = bench.measure(&row, |frame| &planners[held.of_frame[frame as usize]])?;
     let kept = (choice.record, measured);
     bench.folder.write_kept(&name, &budget, &kept)?;

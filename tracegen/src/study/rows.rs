@@ -52,21 +52,51 @@ impl Part {
         parts.extend(others.map(Self::culling));
         // Name, title, whether no visible pixel changes, what it excludes, how it is set.
         parts.extend([
-            Self::new("occlusion", "Occlusion culling", true, Setting::Occlusion, |s| {
-                s.occlusion = true;
-            }),
-            Self::new("hidden-area-mask", "Hidden-area mask", true, Setting::Mask, |s| {
-                s.hidden_area_mask = true;
-            }),
-            Self::new("foveation-rings", "Foveation by rings", false, Setting::Foveation, |s| {
-                s.foveation = Some(foveation(FoveationKind::Rings, Rates::default()));
-            }),
-            Self::new("multi-resolution", "Multi-resolution", false, Setting::Foveation, |s| {
-                s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default()));
-            }),
-            Self::new("radial-density", "Radial density mask", false, Setting::Foveation, |s| {
-                s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default()));
-            }),
+            Self::new(
+                "occlusion",
+                "Occlusion culling",
+                true,
+                Setting::Occlusion,
+                |s| {
+                    s.occlusion = true;
+                },
+            ),
+            Self::new(
+                "hidden-area-mask",
+                "Hidden-area mask",
+                true,
+                Setting::Mask,
+                |s| {
+                    s.hidden_area_mask = true;
+                },
+            ),
+            Self::new(
+                "foveation-rings",
+                "Foveation by rings",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::Rings, Rates::default()));
+                },
+            ),
+            Self::new(
+                "multi-resolution",
+                "Multi-resolution",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default()));
+                },
+            ),
+            Self::new(
+                "radial-density",
+                "Radial density mask",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default()));
+                },
+            ),
         ]);
         parts
     }
@@ -76,12 +106,24 @@ impl Part {
     pub fn options() -> Vec<Self> {
         let mut parts = Self::all();
         parts.extend([
-            Self::new("foveation-rings-wide", "Foveation by rings, 1.5 times as wide", false, Setting::Foveation, |s| {
-                s.foveation = Some(foveation(FoveationKind::Rings, wide()));
-            }),
-            Self::new("radial-density-wide", "Radial density mask, 1.5 times as wide", false, Setting::Foveation, |s| {
-                s.foveation = Some(foveation(FoveationKind::RadialDensity, wide()));
-            }),
+            Self::new(
+                "foveation-rings-wide",
+                "Foveation by rings, 1.5 times as wide",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::Rings, wide()));
+                },
+            ),
+            Self::new(
+                "radial-density-wide",
+                "Radial density mask, 1.5 times as wide",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::RadialDensity, wide()));
+                },
+            ),
         ]);
         parts
     }
@@ -154,8 +196,14 @@ fn wide() -> Rates {
 /// Combinations that a study measures beside the techniques alone: title and parts.
 const COMBINATIONS: &[(&str, &str)] = &[
     ("Culling and occlusion", "superfrustum+occlusion"),
-    ("All that lose nothing", "superfrustum+occlusion+hidden-area-mask"),
-    ("Everything", "superfrustum+occlusion+hidden-area-mask+foveation-rings"),
+    (
+        "All that lose nothing",
+        "superfrustum+occlusion+hidden-area-mask",
+    ),
+    (
+        "Everything",
+        "superfrustum+occlusion+hidden-area-mask+foveation-rings",
+    ),
 ];
 
 /// A technique or a combination of some, measured as one.

@@ -139,11 +139,7 @@ impl World {
 
     /// The tables of a trace of some frames, each with its planner.
     #[must_use]
-    pub fn trace_tables<'s>(
-        &self,
-        planner: impl Fn(u32) -> &'s Planner,
-        frames: &[u32],
-    ) -> Tables {
+    pub fn trace_tables<'s>(&self, planner: impl Fn(u32) -> &'s Planner, frames: &[u32]) -> Tables {
         let mut tables = self.tables.clone();
         tables.meta.frames = (frames.iter())
             .map(|&number| self.views[number as usize].clone())

@@ -38,9 +38,8 @@ impl Bench<'_> {
     /// # Errors
     /// Driver errors.
     pub fn error(&mut self, row: &Row, frame: u32, memory: &mut Occlusion) -> anyhow::Result<f64> {
-        let shot = self
-            .world
-            .shoot(self.backend, &row.settings, frame, memory)?;
+        let planner = self.planner(&row.settings)?;
+        let shot = (self.world).shoot(self.backend, &planner, frame, memory)?;
         if let Budget::Pixels(_) = self.budget {
             let shift = shot.frame.plan.predicted.disparity_px;
             return Ok(shift.map_or(0.0, f64::from));
