@@ -112,15 +112,15 @@ pub fn with_instances(instances: u32) -> Scene {
         vec3(nave(20.5), 9.9, -end + 1.0),
         vec3(nave(10.0), 3.0, end),
     );
-    scene.sun(vec3(-0.42, -1.0, 0.3), vec3(1.5, 1.45, 1.35));
+    scene.sun(vec3(-0.42, -1.0, 0.3), vec3(1.2, 1.16, 1.08));
     for k in 0..8 {
         let (x, z) = (
             nave(6.0 + 12.0 * (k % 2) as f32),
             end - 10.0 - 12.0 * (k / 2) as f32,
         );
-        scene.lamp(vec3(x, 9.0, z), vec3(16.0, 15.0, 13.0));
+        scene.lamp(vec3(x, 9.0, z), vec3(11.0, 10.4, 9.2));
     }
-    scene.finish(vec3(0.62, 0.68, 0.74), 0)
+    scene.finish(vec3(0.5, 0.55, 0.6), 0)
 }
 
 impl Layout {

@@ -196,7 +196,7 @@ fn painted(color: Rgb, wear: f32) -> Surface {
             noise.grain.at(u, v),
         );
         let chipped = wear * smoothstep(0.66, 0.74, 0.5 * mottle + 0.3 * cloud + 0.2 * grain);
-        let dirt = smoothstep(0.45, 0.9, cloud) * 0.35;
+        let dirt = smoothstep(0.5, 0.95, cloud) * 0.2;
         let paint = shade(color, (0.92 + 0.14 * grain) * (1.0 - dirt));
         let rust = shade(mix(rgb(0x6b4630), rgb(0x3b3634), mottle), 0.7 + 0.5 * grain);
         Texel {
@@ -232,7 +232,7 @@ fn concrete() -> Surface {
         let pores = smoothstep(0.75, 0.95, grain) * 0.4;
         let mut color = mix(rgb(0x8e8d88), rgb(0x77767a), cloud);
         color = shade(color, 0.9 + 0.2 * mottle - 0.25 * pores);
-        color = shade(color, 1.0 - 0.45 * stain - 0.3 * marks.min(1.0) - 0.6 * cut);
+        color = shade(color, 1.0 - 0.28 * stain - 0.3 * marks.min(1.0) - 0.6 * cut);
         let polish = smoothstep(0.3, 0.6, mottle);
         Texel {
             open: 1.0 - 0.4 * cut,
@@ -342,11 +342,7 @@ fn machine_paint(color: Rgb) -> Surface {
         let corner = vec3((x - 0.5).abs() - 0.46, (y - 0.5).abs() - 0.46, 0.0).length();
         let screw = smoothstep(0.014, 0.010, corner);
         let louvres = u > 0.58 && u < 0.92 && v > 0.1 && v < 0.32;
-        let slot = if louvres {
-            (v * 44.0 * TAU / TAU).fract()
-        } else {
-            0.5
-        };
+        let slot = if louvres { (v * 44.0).fract() } else { 0.5 };
         let shadow = if louvres {
             smoothstep(0.5, 0.9, slot)
         } else {

@@ -144,20 +144,14 @@ fn elbow(radius: f32, sides: usize) -> MeshBuilder {
     m
 }
 
-/// A disc about the z axis, the joint of two pipes.
+/// A disc about the z axis: the joint of two pipes, or the blind end of one.
 fn flange(radius: f32, sides: usize) -> MeshBuilder {
     let (r, h) = (1.55 * radius, 0.22 * radius + 0.012);
-    let mut disc = MeshBuilder::new();
-    disc.lathe(
-        &[
-            sharp(radius * 0.9, -h),
-            sharp(r, -h),
-            sharp(r, h),
-            sharp(radius * 0.9, h),
-        ],
+    let mut m = MeshBuilder::new();
+    let disc = lathe(
+        &[sharp(0.0, -h), sharp(r, -h), sharp(r, h), sharp(0.0, h)],
         sides,
     );
-    let mut m = MeshBuilder::new();
     m.merge(&disc, Affine3A::from_rotation_x(FRAC_PI_2));
     m
 }

@@ -110,21 +110,11 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         setup.scene.shadow_cascades.min(CASCADES)
     };
     progress.stage("preparing textures and shaders", 0, "");
-    let draws = DrawList::new(&setup.scene, cascades)?;
+    let mut draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
     let settings = Settings::default();
-    let job = CaptureJob {
-        scene: &setup.scene,
-        draws: &draws,
-        lighting: Lighting::new(&setup.scene),
-        bounds,
-        shadow_range_m: shadow_range_m(&setup, bounds),
-        hmd: &setup.hmd,
-        eyes: args.views.eyes(),
-        settings: &settings,
-        skips: Skips::without(&args.no_skip),
-    };
+    let job = job(args, &setup, &draws, &settings, bounds);
     let finest = job.finest_levels(&setup.frames);
     let searched = started.elapsed();
     let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
@@ -174,7 +164,12 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let mut writer = TextraceWriter::create(&args.output, &tables)?;
     let mut first_pictures: Option<Pictures> = None;
     let mut first_pass = 0;
+    let pictures_a_frame = job.eyes.len();
     for views in &setup.frames {
+        let time_s = setup.moments.time_s(views.frame);
+        draws.pose(&setup.scene, time_s);
+        backend.pose(&draws);
+        let job = self::job(args, &setup, &draws, &settings, bounds);
         let frame = match first.take() {
             Some(first) => first,
             None => {
@@ -226,10 +221,31 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
-    let views = [setup.frames.len(), job.eyes.len()];
+    let views = [setup.frames.len(), pictures_a_frame];
     note(&texels);
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
+}
+
+/// What to capture of the draws where they stand.
+fn job<'a>(
+    args: &RasterArgs,
+    setup: &'a SceneSetup,
+    draws: &'a DrawList,
+    settings: &'a Settings,
+    bounds: (glam::Vec3, glam::Vec3),
+) -> CaptureJob<'a> {
+    CaptureJob {
+        scene: &setup.scene,
+        draws,
+        lighting: Lighting::new(&setup.scene),
+        bounds,
+        shadow_range_m: shadow_range_m(setup, bounds),
+        hmd: &setup.hmd,
+        eyes: args.views.eyes(),
+        settings,
+        skips: Skips::without(&args.no_skip),
+    }
 }
 
 /// Near and far end of the cascades: from the near plane to where the scene ends.
