@@ -149,7 +149,7 @@ pub const BUILTINS: &[Builtin] = &[
     Builtin {
         name: "plant",
         description: "industrial hall of 20,000 instances (plant:N has N) under moving cranes",
-        triangles: 1037726,
+        triangles: 1_037_726,
         cameras: &["default", "aisle", "walkway", "pumps", "overview"],
         instances: Some(plant::INSTANCES),
         builder: Builder::Sized(plant::DEFAULT_INSTANCES, plant::with_instances),
