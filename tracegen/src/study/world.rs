@@ -95,21 +95,23 @@ impl World {
     /// # Errors
     /// Driver errors, and eyes that the culling technique is not made for.
     pub fn shoot(
-        &self,
+        &mut self,
         backend: &mut dyn CaptureBackend,
         planner: &Planner,
         number: u32,
         memory: &mut Occlusion,
     ) -> Result<Shot, RasterError> {
-        let job = self.job(planner);
+        let before = backend.work();
         let start = Instant::now();
+        self.draws.pose(&self.scene, number as f32 / self.fps);
+        backend.pose(&self.draws);
+        let job = self.job(planner);
         let mut frame = job.frame(&self.views[number as usize])?;
         if planner.settings().occlusion {
             job.occlude(backend, &mut frame, memory)?;
         }
         let planned = start.elapsed();
         job.light(backend, &frame)?;
-        let before = backend.work();
         let start = Instant::now();
         job.render_layers(backend, &frame)?;
         let rendered = start.elapsed();
