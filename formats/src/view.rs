@@ -70,6 +70,65 @@ impl FovTangents {
     }
 }
 
+/// The part of an eye's picture that the user sees through the round lens: a circle in the eye's
+/// tangent space (x right, y up, at distance 1 along the viewing direction).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Lens {
+    /// Tangents of the centre, right and up of straight ahead.
+    pub center: [f32; 2],
+    /// Radius, as a tangent.
+    pub radius: f32,
+}
+
+impl Lens {
+    /// Where nothing is known of the lens: a circle around the viewing direction that touches the
+    /// edges of the picture's longer axis (their mean where the two differ). It hides the corners
+    /// of any picture and, of a square and symmetric one, 1 - pi/4 of all pixels.
+    #[must_use]
+    pub fn of(fov: &FovTangents) -> Self {
+        let longer = (fov.left + fov.right).max(fov.up + fov.down);
+        Self {
+            center: [0.0; 2],
+            radius: longer / 2.0,
+        }
+    }
+
+    /// Whether the tangents (right, up) are seen; the circle itself is.
+    #[must_use]
+    pub fn contains(&self, [x, y]: [f32; 2]) -> bool {
+        let [dx, dy] = [x - self.center[0], y - self.center[1]].map(f64::from);
+        dx * dx + dy * dy <= f64::from(self.radius) * f64::from(self.radius)
+    }
+
+    /// Whether a pixel's centre is seen; columns count from the left, rows from the top.
+    #[must_use]
+    pub fn pixel_visible(&self, fov: &FovTangents, size_px: [u32; 2], pixel: [u32; 2]) -> bool {
+        let along = |axis: usize, from: f32, to: f32| {
+            let part = (pixel[axis] as f32 + 0.5) / size_px[axis] as f32;
+            from + part * (to - from)
+        };
+        self.contains([along(0, -fov.left, fov.right), along(1, fov.up, -fov.down)])
+    }
+
+    /// Checks that there is something to see.
+    ///
+    /// # Errors
+    /// The figure that is out of range.
+    pub fn check(&self) -> Result<(), Broken> {
+        let figures = [self.center[0], self.center[1], self.radius];
+        let fits = figures.iter().all(|t| t.abs() <= MAX_TANGENT) && self.radius > 0.0;
+        ensure(fits, || {
+            Broken::new(
+                "lens",
+                format!(
+                    "centre x and y from -{MAX_TANGENT} to {MAX_TANGENT}, radius above 0 to {MAX_TANGENT}"
+                ),
+                format_args!("{figures:?}"),
+            )
+        })
+    }
+}
+
 /// Checks the size of an eye's image.
 pub(crate) fn check_eye_size(size_px: [u32; 2]) -> Result<(), Broken> {
     ensure(
@@ -165,4 +224,49 @@ pub struct FrameViews {
     pub frame: u32,
     /// Left and right eye.
     pub eyes: [EyeView; 2],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_square_pictures_lens_shows_a_circle_of_its_pixels() {
+        let fov = FovTangents {
+            left: 1.2,
+            right: 1.2,
+            up: 1.2,
+            down: 1.2,
+        };
+        let lens = Lens::of(&fov);
+        let size_px = [200, 200];
+        let seen = |x, y| lens.pixel_visible(&fov, size_px, [x, y]);
+        let pixels = (0..200).flat_map(|y| (0..200).map(move |x| (x, y)));
+        let share = pixels.filter(|(x, y)| seen(*x, *y)).count() as f64 / 40_000.0;
+        let circle = std::f64::consts::FRAC_PI_4;
+        assert!((share - circle).abs() < 1e-3, "{share}");
+        assert!(seen(0, 100) && seen(100, 199) && !seen(20, 20));
+    }
+
+    #[test]
+    fn an_off_centre_lens_shows_what_lies_on_its_side() {
+        let fov = FovTangents {
+            left: 1.0,
+            right: 1.0,
+            up: 1.0,
+            down: 1.0,
+        };
+        let lens = Lens {
+            center: [0.5, 0.5],
+            radius: 0.3,
+        };
+        // Right and up of the middle: rows count downwards.
+        assert!(lens.pixel_visible(&fov, [100, 100], [75, 25]));
+        assert!(!lens.pixel_visible(&fov, [100, 100], [75, 75]));
+        assert!(!lens.pixel_visible(&fov, [100, 100], [25, 25]));
+        assert_eq!(lens.check(), Ok(()));
+        for radius in [0.0, -1.0, f32::NAN, 1e9] {
+            assert!(Lens { radius, ..lens }.check().is_err(), "{radius}");
+        }
+    }
 }
