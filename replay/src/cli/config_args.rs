@@ -152,8 +152,16 @@ impl ConfigArgs {
     /// # Errors
     /// The file cannot be read, has an unknown key, or the result is impossible.
     pub fn resolve(&self) -> Result<RunConfig> {
+        self.resolve_over(RunConfig::default())
+    }
+
+    /// The configuration: `defaults`, or `--config` where it is given, then the flags.
+    ///
+    /// # Errors
+    /// As [`Self::resolve`].
+    pub fn resolve_over(&self, defaults: RunConfig) -> Result<RunConfig> {
         let mut config = match &self.config {
-            None => RunConfig::default(),
+            None => defaults,
             Some(path) => toml::from_str(&read_toml(path)?)
                 .map_err(|e| anyhow!("{}: {}", path.display(), e.to_string().trim()))?,
         };

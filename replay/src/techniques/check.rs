@@ -128,7 +128,10 @@ fn check_frame(key: &str, frame: &Frame, is_baseline: bool) -> Checked {
         format!("{times} times, one for each of `frame_s`"),
         baseline,
     )?;
-    for (name, list) in [("frame_s", &frame.frame_s), ("baseline_s", &frame.baseline_s)] {
+    for (name, list) in [
+        ("frame_s", &frame.frame_s),
+        ("baseline_s", &frame.baseline_s),
+    ] {
         for (i, time) in list.iter().enumerate() {
             positive(&format!("{key}.{name}[{i}]"), *time)?;
         }

@@ -79,6 +79,19 @@ impl Folder {
         name.to_string_lossy().into_owned()
     }
 
+    /// Every file that is read of the folder.
+    ///
+    /// # Errors
+    /// As [`Self::file`].
+    pub fn files(&self) -> Result<Vec<PathBuf>, FolderError> {
+        let rows = &self.manifest.rows;
+        let images = rows.iter().flat_map(|r| &r.frames).flat_map(|f| &f.images);
+        let traces = rows.iter().filter_map(|row| row.trace.as_ref());
+        let named = images.chain(traces).map(|relative| self.file(relative));
+        let manifest = std::iter::once(Ok(self.path.join("manifest.json")));
+        manifest.chain(named).collect()
+    }
+
     /// A file that the manifest names.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 //! Keys that are not read here are ignored, so that a capturer may say more.
 
 use formats::view::{Hmd, Lens};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 /// Schema of the manifest.
@@ -127,7 +127,7 @@ pub struct Frame {
 }
 
 /// A search for the cheapest techniques inside a budget.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Auto {
     /// What must hold.
     pub budget: Value,

@@ -19,9 +19,9 @@ pub(crate) mod testing;
 mod tests;
 
 pub use folder::{Folder, FolderError};
-pub use measured::{CacheFigures, Measured, Measures, OrderGain};
+pub use measured::{CacheFigures, Gain, Measured, Measures, OrderGain};
 pub use pareto::dominated;
 pub use pictures::{PictureFigures, picture_figures};
 pub use sharing::{Sharing, sharing};
-pub use skipped::{Difference, differences};
+pub use skipped::{Difference, DifferenceError, differences};
 pub use timing::{REFRESH_HZ, Spread, Timing};

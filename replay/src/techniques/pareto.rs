@@ -16,10 +16,14 @@ mod tests {
 
     #[test]
     fn only_what_another_beats_is_dominated() {
-        let points = [(1.0, 0.0), (0.8, 0.1), (0.9, 0.1), (0.5, 0.4), (1.0, 0.0), (1.1, 0.0)];
-        assert_eq!(
-            dominated(&points),
-            [false, false, true, false, false, true]
-        );
+        let points = [
+            (1.0, 0.0),
+            (0.8, 0.1),
+            (0.9, 0.1),
+            (0.5, 0.4),
+            (1.0, 0.0),
+            (1.1, 0.0),
+        ];
+        assert_eq!(dominated(&points), [false, false, true, false, false, true]);
     }
 }

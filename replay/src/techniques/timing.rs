@@ -92,7 +92,8 @@ impl Timing {
             }
         }
         let median = |values: Vec<f64>| Spread::of(values).map_or(0.0, |s| s.median);
-        let of_frame = |f: &super::manifest::Frame| median(f.frame_s.iter().map(|s| ms(*s)).collect());
+        let of_frame =
+            |f: &super::manifest::Frame| median(f.frame_s.iter().map(|s| ms(*s)).collect());
         Some(Self {
             ratio: Spread::of(times().zip(beside()).map(|(own, base)| own / base))?,
             frame_ms: Spread::of(times().map(ms))?,
