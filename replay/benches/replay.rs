@@ -1,21 +1,20 @@
-//! Replay speed on a generated stereo frame, in footprints per second: the stream of lines alone,
-//! and the whole replay by mode and order.
+//! Replay speed on a generated stereo frame, in footprints per second: quads to lines alone, and
+//! the whole replay by mode and order.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use replay::config::{Mode, Order, RunConfig};
 use replay::engine::replay;
-use replay::order::plan;
 use replay::stream::synthetic::Synthetic;
-use replay::stream::{LineSet, MemoryTrace, Stream, interleave};
+use replay::stream::{Expander, LineMemory, MemoryTrace, TraceCounts};
 
 /// Distinct lines of the trace, without caches.
 fn lines(trace: &MemoryTrace, config: &RunConfig) -> u64 {
-    let mut stream = Stream::new(trace, config).expect("a generated trace streams");
-    let phases = plan(&*config.order.build(config.seed), &trace.tables.passes);
-    let mut touched = LineSet::new(stream.lines());
-    interleave(&mut stream, &phases, config.assign, &mut touched)
-        .expect("a generated trace streams");
-    touched.count()
+    let expander = Expander::new(trace, config).expect("a generated trace expands");
+    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+    let mut counts = TraceCounts::new(expander.bins());
+    let frame = expander.frame(0, &memory, &mut counts);
+    assert!(frame.is_ok());
+    counts.unique_lines
 }
 
 fn replay_modes(criterion: &mut Criterion) {

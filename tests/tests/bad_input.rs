@@ -140,6 +140,43 @@ fn a_scene_with_a_nan_position_names_the_place() {
 }
 
 #[test]
+fn a_path_with_a_nan_pose_is_refused_by_every_command_that_follows_one() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("path.csv");
+    let header = "time_s,x_m,y_m,z_m,qx,qy,qz,qw";
+    fs::write(
+        &path,
+        format!("{header}\n0,0,0,0,0,0,0,1\n1,0,NaN,0,0,0,0,1\n"),
+    )
+    .expect("a file");
+    for (subcommand, out) in [("raster", "out.textrace"), ("rays", "out.raytrace")] {
+        refuse(
+            program("tracegen")
+                .args([subcommand, "teapot", "--path"])
+                .arg(&path)
+                .arg("-o")
+                .arg(folder.path().join(out)),
+            &["path.csv: line 3, column y_m: expected a finite number, found 'NaN'"],
+        );
+    }
+    fs::write(
+        &path,
+        format!("{header}\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"),
+    )
+    .expect("a file");
+    refuse(
+        program("tracegen")
+            .args(["raster", "teapot", "--frames", "100", "-o"])
+            .arg(folder.path().join("out.textrace"))
+            .arg("--path")
+            .arg(&path),
+        &["path.csv", "at most 73 frames", "found 100 frames"],
+    );
+    let left = fs::read_dir(folder.path()).expect("folder").count();
+    assert_eq!(left, 1, "something was left behind");
+}
+
+#[test]
 fn a_damaged_ray_trace_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let bytes = fs::read(root().join("traces/teapot-rays.raytrace")).expect("golden trace");

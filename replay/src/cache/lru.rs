@@ -6,7 +6,7 @@
 use super::{AnyCache, Cache, boxed};
 
 /// Associativity, fixed at compile time where speed matters.
-pub trait Ways: Copy {
+pub trait Ways: Copy + Send {
     /// Number of ways.
     fn ways(self) -> usize;
 }

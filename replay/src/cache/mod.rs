@@ -5,12 +5,14 @@
 //! [`Cache::fill`] when it is there.
 
 mod fifo;
+mod forest;
 mod in_flight;
 mod levels;
 mod lru;
 mod random;
 mod tree_plru;
 
+pub use forest::Forest;
 pub use in_flight::InFlight;
 pub use levels::Levels;
 #[cfg(test)]
@@ -89,7 +91,7 @@ struct Geometry {
 const EMPTY: u32 = u32::MAX;
 
 /// A cache that holds whole lines.
-pub trait Cache {
+pub trait Cache: Send {
     /// True if the line is there; marks it used.
     fn lookup(&mut self, line: u32) -> bool;
 

@@ -119,6 +119,30 @@ proptest! {
     }
 
     #[test]
+    fn a_forest_counts_as_each_of_its_caches(
+        trace in trace(),
+        shapes in prop::collection::btree_map(0_u32..7, 1_u32..9, 1..5),
+    ) {
+        let trees: Vec<(u32, u32)> = shapes.into_iter().map(|(bits, ways)| (1 << bits, ways)).collect();
+        let mut forest = Forest::new(&trees);
+        let mut alone: Vec<_> = trees
+            .iter()
+            .flat_map(|&(sets, most)| (1..=most).map(move |ways| (sets, ways)))
+            .map(|(sets, ways)| (sets, ways, cache(u64::from(sets * ways), ways, Replacement::LRU)))
+            .collect();
+        let mut depths = vec![0; trees.len()];
+        for &line in &trace {
+            let repeats = forest.repeats(&[line]) == 1;
+            forest.access(line, &mut depths);
+            prop_assert!(!repeats || depths.iter().all(|&depth| depth == 0));
+            for (sets, ways, cache) in &mut alone {
+                let tree = trees.iter().position(|tree| tree.0 == *sets).unwrap();
+                prop_assert_eq!(cache.access(line), u32::from(depths[tree]) < *ways);
+            }
+        }
+    }
+
+    #[test]
     fn a_larger_lru_cache_with_the_same_sets_holds_whatever_the_smaller_holds(trace in trace()) {
         let (mut small, mut large) = (cache(16, 2, Replacement::LRU), cache(32, 4, Replacement::LRU));
         for &line in &trace {

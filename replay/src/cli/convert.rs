@@ -4,7 +4,7 @@ use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
 use crate::order;
-use crate::stream::Feed;
+use crate::stream::for_quads;
 use anyhow::{Context, Result, bail};
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
@@ -160,10 +160,8 @@ fn accesses(
         line_bytes: config.line_bytes,
     };
     let order = config.order.build(config.seed);
-    let mut feed = Feed::default();
     for item in order::plan(&*order, &tables.passes).iter().flatten() {
-        feed.load(trace, item)?;
-        while let Some(quad) = feed.next_quad() {
+        for_quads(trace, item, |quad| -> Result<()> {
             let origin = Origin {
                 pass: quad.at.pass,
                 tile: quad.at.tile,
@@ -173,7 +171,8 @@ fn accesses(
             for record in quad.records {
                 expander.expand(origin, record, |access| sink.write(access))?;
             }
-        }
+            Ok(())
+        })?;
     }
     Ok(())
 }

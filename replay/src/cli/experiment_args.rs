@@ -86,6 +86,7 @@ impl ExperimentArgs {
         let progress = Progress::new("replaying", replays as u64, "replays");
         let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
         drop(progress);
+        shell::note(&outcome.shared());
         let report = PaperReport::new(&outcome);
         print(&report)?;
         if let Some(problem) = report.not_conserved() {

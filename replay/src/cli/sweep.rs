@@ -73,11 +73,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let done = |done| progress.advance(done);
     let outcome = experiment::run(&plan, &subjects, Some(&store), &done)?;
     drop(progress);
-    shell::note(&format!(
-        "{points} points: {} replayed, the others taken from {} or equal to one of these",
-        outcome.replays,
-        out.display()
-    ));
+    shell::note(&outcome.shared());
 
     let report = SweepReport::new(&file, &outcome);
     let json = report.json()?;

@@ -1,9 +1,9 @@
 //! Counts of what a cache hierarchy makes of the accesses.
 
-use crate::stream::{Bins, LineSet};
+use crate::stream::Bins;
 
 /// Misses of one level.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Misses {
     /// Footprints with any line that had to be fetched.
     pub footprints: u64,
@@ -14,7 +14,7 @@ pub struct Misses {
 }
 
 /// Misses of both levels. What misses the L1 is what comes to the L2.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CellMisses {
     /// First level.
     pub l1: Misses,
@@ -23,7 +23,7 @@ pub struct CellMisses {
 }
 
 /// Misses of one tile.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileMisses {
     /// Footprints with an L1 miss.
     pub l1_footprints: u32,
@@ -45,24 +45,22 @@ pub struct FootprintMisses {
 }
 
 /// All misses of a replay.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CacheCounts {
     /// By cell, see [`Bins`].
     pub cells: Vec<CellMisses>,
-    /// By tile.
+    /// By tile; empty where nobody asked for them.
     pub tiles: Vec<TileMisses>,
-    /// Lines that missed an L1. A line's first access always does, so these are all lines touched.
-    pub touched: LineSet,
 }
 
 impl CacheCounts {
-    /// All zero, for line numbers below `lines`.
+    /// All zero.
     #[must_use]
-    pub fn new(bins: &Bins, lines: u64) -> Self {
+    pub fn new(bins: &Bins, tile_maps: bool) -> Self {
+        let tiles = if tile_maps { bins.tiles() } else { 0 };
         Self {
             cells: vec![CellMisses::default(); bins.cells()],
-            tiles: vec![TileMisses::default(); bins.tiles()],
-            touched: LineSet::new(lines),
+            tiles: vec![TileMisses::default(); tiles],
         }
     }
 
@@ -77,8 +75,9 @@ impl CacheCounts {
         l2.footprints += u64::from(missed_l2);
         l2.lines += u64::from(misses.l2_lines);
         l2.secondary += u64::from(misses.l2_secondary);
-        let tile = &mut self.tiles[tile];
-        tile.l1_footprints = tile.l1_footprints.wrapping_add(u32::from(missed_l1));
-        tile.l2_lines = tile.l2_lines.wrapping_add(misses.l2_lines);
+        if let Some(tile) = self.tiles.get_mut(tile) {
+            tile.l1_footprints = tile.l1_footprints.wrapping_add(u32::from(missed_l1));
+            tile.l2_lines = tile.l2_lines.wrapping_add(misses.l2_lines);
+        }
     }
 }

@@ -1,72 +1,79 @@
-//! Caches without latencies: a miss fills at once.
+//! Caches without latencies, of any policy: a miss fills at once.
 
+use super::Machine;
+use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
 use crate::cache::{Cache, Levels};
-use crate::stream::{Consumer, Lines};
+use crate::config::{Assign, RunConfig};
+use crate::order::Phase;
+use crate::stream::{Consumer, Cores, QuadLines, StreamError, interleave};
 
 /// L1 caches over a shared L2.
 pub struct Functional<C> {
     levels: Levels<C>,
     /// What missed.
     pub counts: CacheCounts,
-    /// The current quad's.
-    core: usize,
-    tile: usize,
 }
 
 impl<C: Cache> Functional<C> {
     /// Empty caches.
     pub fn new(levels: Levels<C>, counts: CacheCounts) -> Self {
-        Self {
-            levels,
-            counts,
-            core: 0,
-            tile: 0,
-        }
+        Self { levels, counts }
     }
 
     /// A footprint's lines that missed the L1 go to the L2.
     #[inline(never)]
-    fn missed(&mut self, cell: usize, lines: &[u32]) {
+    fn missed(&mut self, cell: usize, tile: usize, lines: &[u32]) {
         let mut misses = FootprintMisses {
             l1_lines: lines.len() as u32,
             ..FootprintMisses::default()
         };
         for &line in lines {
-            self.counts.touched.insert(line);
             misses.l2_lines += u32::from(!self.levels.l2.access(line));
         }
-        self.counts.footprint(cell, self.tile, &misses);
+        self.counts.footprint(cell, tile, &misses);
     }
 }
 
 impl<C: Cache> Consumer for Functional<C> {
-    #[inline(always)]
-    fn quad(&mut self, core: usize, tile: usize) {
-        (self.core, self.tile) = (core, tile);
+    fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
+        let safe_lines = self.levels.l1[core].repeat_safe_lines() as usize;
+        for footprint in quad.footprints() {
+            // Repeats that would find everything there need no simulation.
+            let repeats_are_idle = footprint.lines.len() <= safe_lines;
+            let repeats = if repeats_are_idle {
+                0
+            } else {
+                footprint.repeats
+            };
+            for _ in 0..=repeats {
+                let l1 = &mut self.levels.l1[core];
+                let (mut missing, mut count) = ([0; 4], 0);
+                for &line in footprint.lines {
+                    if !l1.access(line) {
+                        missing[count & 3] = line;
+                        count += 1;
+                    }
+                }
+                if count > 0 {
+                    self.missed(footprint.cell, quad.tile(), &missing[..count]);
+                }
+            }
+        }
+    }
+}
+
+impl<C: Cache> Machine for Functional<C> {
+    fn run(
+        &mut self,
+        cores: &mut Cores<'_>,
+        phases: &[Phase],
+        assign: Assign,
+    ) -> Result<(), StreamError> {
+        interleave(cores, phases, assign, self)
     }
 
-    #[inline(always)]
-    fn footprint(&mut self, cell: usize, lines: Lines<'_>) -> bool {
-        let l1 = &mut self.levels.l1[self.core];
-        let safe = lines.count() <= l1.repeat_safe_lines();
-        // One line, there: what nearly all footprints find.
-        if let Some(line) = lines.only() {
-            if !l1.access(line) {
-                self.missed(cell, &[line]);
-            }
-            return safe;
-        }
-        let (mut missing, mut count) = ([0; 4], 0);
-        for line in lines.iter() {
-            if !l1.access(line) {
-                missing[count] = line;
-                count += 1;
-            }
-        }
-        if count > 0 {
-            self.missed(cell, &missing[..count]);
-        }
-        safe
+    fn outcome(&self, _config: &RunConfig) -> Outcome {
+        self.counts.clone().into()
     }
 }

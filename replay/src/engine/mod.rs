@@ -1,22 +1,22 @@
-//! Wires order, stream, caches and texture unit: replays a trace under a configuration.
+//! Wires order, stream, caches and texture unit: replays a trace under configurations.
 
+mod batch;
 mod counts;
 mod functional;
+mod one_pass;
 mod summary;
 #[cfg(test)]
 mod tests;
 mod timed;
 
-use crate::cache::{Cache, Levels};
-use crate::config::{ConfigError, Mode, RunConfig};
-use crate::order;
+pub use batch::{Work, replay_all};
+
+use crate::config::{Assign, ConfigError, RunConfig};
+use crate::order::Phase;
 use crate::result::RunResult;
-use crate::stream::{Stream, StreamError, TileSource, interleave};
-use counts::CacheCounts;
-use functional::Functional;
-use summary::summary;
+use crate::stream::{Cores, LineMemory, StreamError, TileSource};
+use std::sync::Mutex;
 use thiserror::Error;
-use timed::Timed;
 
 /// Why a replay cannot run.
 #[derive(Debug, Error)]
@@ -33,43 +33,29 @@ pub enum ReplayError {
 ///
 /// # Errors
 /// An impossible configuration, or a trace that cannot be read.
-pub fn replay<S: TileSource + ?Sized>(
-    trace: &S,
-    config: &RunConfig,
-) -> Result<RunResult, ReplayError> {
-    config.validate()?;
-    // The most common caches have a machine that is compiled for them.
-    match Levels::build(config)?.all_four_way() {
-        Ok(levels) => run(trace, config, levels),
-        Err(levels) => run(trace, config, levels),
-    }
-}
-
-fn run<S: TileSource + ?Sized, C: Cache>(
-    trace: &S,
-    config: &RunConfig,
-    levels: Levels<C>,
-) -> Result<RunResult, ReplayError> {
-    let tables = trace.tables();
-    let mut stream = Stream::new(trace, config)?;
-    let phases = order::plan(&*config.order.build(config.seed), &tables.passes);
-    let counts = CacheCounts::new(&stream.bins, stream.lines());
-    let (misses, tmu, cycles) = match config.mode {
-        Mode::Functional => {
-            let mut caches = Functional::new(levels, counts);
-            interleave(&mut stream, &phases, config.assign, &mut caches)?;
-            (caches.counts, None, None)
-        }
-        Mode::Timed => {
-            let machine = Timed::new(levels, config.tmu, counts);
-            let outcome = machine.run(&mut stream, &phases, config.assign)?;
-            (outcome.counts, Some(outcome.tmu), Some(outcome.cycles))
+pub fn replay(trace: &dyn TileSource, config: &RunConfig) -> Result<RunResult, ReplayError> {
+    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+    let answer = Mutex::new(RunResult::default());
+    let keep = |_, result| {
+        if let Ok(mut answer) = answer.lock() {
+            *answer = result;
         }
     };
-    let (bins, accesses) = (&stream.bins, &stream.counts);
-    Ok(RunResult {
-        tmu,
-        cycles,
-        ..summary(tables, bins, accesses, &misses, config.line_bytes)
-    })
+    replay_all(trace, &[*config], &memory, &keep).map_err(|(_, error)| error)?;
+    Ok(answer.into_inner().unwrap_or_default())
+}
+
+/// What runs the work of the cores: caches, with or without clocks, for one or more
+/// configurations.
+trait Machine: Send {
+    /// Runs a frame's phases, one after another.
+    fn run(
+        &mut self,
+        cores: &mut Cores<'_>,
+        phases: &[Phase],
+        assign: Assign,
+    ) -> Result<(), StreamError>;
+
+    /// What was counted for one of its configurations.
+    fn outcome(&self, config: &RunConfig) -> batch::Outcome;
 }

@@ -1,19 +1,20 @@
 //! A replay's result: counts of the trace and counts of the caches summed up.
 
 use super::counts::{CacheCounts, CellMisses, Misses};
+use crate::config::RunConfig;
 use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap};
 use crate::stream::{Bins, Cell, CellAccesses, TraceCounts};
 use formats::textrace::{Pass, Tables};
 use formats::view::TILE_SIZE_PX;
 
-/// Sums everything up; `line_bytes` turns misses into traffic. Texture unit and cycles are left
-/// out.
+/// Sums everything up; the configuration says what a line is and whether tiles are wanted. Texture
+/// unit and cycles are left out.
 pub fn summary(
     tables: &Tables,
     bins: &Bins,
     trace: &TraceCounts,
     caches: &CacheCounts,
-    line_bytes: u32,
+    config: &RunConfig,
 ) -> RunResult {
     let sums = |names: Vec<String>, bin: fn(Cell) -> usize| {
         let part = |name| Part {
@@ -50,8 +51,8 @@ pub fn summary(
             misses: all.l2.line_misses,
             counters: all.l2,
         },
-        external_bytes: all.l2.line_misses * u64::from(line_bytes),
-        unique_lines: caches.touched.count(),
+        external_bytes: all.l2.line_misses * u64::from(config.line_bytes),
+        unique_lines: trace.unique_lines,
         access_hash: format!("{:016x}", trace.hash),
         tmu: None,
         cycles: None,
@@ -61,7 +62,11 @@ pub fn summary(
             |c| c.texture,
         ),
         by_level: sums(level_names.collect(), |c| c.level),
-        tile_maps: tile_maps(tables, bins, trace, caches),
+        tile_maps: if config.tile_maps {
+            tile_maps(tables, bins, trace, caches)
+        } else {
+            Vec::new()
+        },
     }
 }
 

@@ -1,10 +1,15 @@
+use super::counts::CacheCounts;
+use super::functional::Functional;
+use super::summary::summary;
 use super::*;
-use crate::cache::AnyCache;
-use crate::config::{Assign, CacheConfig, Order};
-use crate::order::WorkItem;
+use crate::cache::{AnyCache, Levels};
+use crate::config::{CacheConfig, Mode, Order};
+use crate::order::{self, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
-use crate::stream::{Bins, Consumer, LineSet, Lines, MemoryTrace, testing};
+use crate::stream::{
+    Bins, Consumer, Expander, LineSet, MemoryTrace, QuadLines, TraceCounts, interleave, testing,
+};
 use formats::footprint::record_footprints;
 use formats::layout::Layout;
 use std::collections::{HashMap, HashSet};
@@ -125,16 +130,22 @@ fn one_core_equals_a_brute_force_replay() {
 }
 
 #[test]
-fn compiled_and_general_caches_agree() {
+fn lines_that_memory_has_no_room_for_are_expanded_again() {
     let trace = small();
-    let config = functional(Order::Z2_STA);
-    let common = replay(&trace, &config).unwrap();
-    let Levels { l1, l2 } = Levels::build(&config).unwrap();
-    let pointers = Levels {
-        l1: l1.into_iter().map(AnyCache::into_box).collect(),
-        l2: l2.into_box(),
-    };
-    assert_eq!(run(&trace, &config, pointers).unwrap(), common);
+    for order in [Order::MORTON, Order::Z2_STA_MERGE] {
+        for mode in [Mode::Functional, Mode::Timed] {
+            let config = RunConfig {
+                mode,
+                tile_maps: true,
+                ..functional(order)
+            };
+            let expected = replay(&trace, &config).unwrap();
+            for bytes in [0, 30_000] {
+                let results = all(&trace, &[config], bytes);
+                assert_eq!(results[0], expected, "{bytes} bytes");
+            }
+        }
+    }
 }
 
 #[test]
@@ -337,31 +348,88 @@ fn a_trace_without_textures_has_no_footprints() {
     }
 }
 
-/// A footprint as it was sent: core, cell and lines.
+/// Results of all configurations in one batch that may keep so many bytes of lines.
+fn all(trace: &MemoryTrace, configs: &[RunConfig], bytes: u64) -> Vec<RunResult> {
+    let results = Mutex::new(vec![None; configs.len()]);
+    let keep = |index: usize, result| results.lock().unwrap()[index] = Some(result);
+    let memory = LineMemory::new(bytes);
+    replay_all(trace, configs, &memory, &keep).unwrap();
+    let results = results.into_inner().unwrap();
+    results.into_iter().map(Option::unwrap).collect()
+}
+
+/// One configuration on a machine of its own.
+fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> RunResult {
+    let (expander, memory) = (
+        Expander::new(trace, config).unwrap(),
+        LineMemory::new(1 << 30),
+    );
+    let mut counts = TraceCounts::new(expander.bins());
+    let frame = expander.frame(0, &memory, &mut counts).unwrap();
+    let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
+    let mut cores = Cores::new(&frame, config.cores as usize);
+    machine.run(&mut cores, &phases, config.assign).unwrap();
+    let outcome = machine.outcome(config);
+    let (tmu, cycles) = (outcome.tmu, outcome.cycles);
+    RunResult {
+        tmu,
+        cycles,
+        ..summary(
+            &trace.tables,
+            expander.bins(),
+            &counts,
+            &outcome.counts,
+            config,
+        )
+    }
+}
+
+/// One functional configuration in caches of its own, behind pointers as any policy's are.
+fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
+    let Levels { l1, l2 } = Levels::build(config).unwrap();
+    let levels = Levels {
+        l1: l1.into_iter().map(AnyCache::into_box).collect(),
+        l2: l2.into_box(),
+    };
+    let bins = Bins::new(&trace.tables).unwrap();
+    let counts = CacheCounts::new(&bins, config.tile_maps);
+    alone(trace, config, &mut Functional::new(levels, counts))
+}
+
+/// A footprint as it was sent: core, cell and lines, repeats written out.
 type Sent = (usize, usize, Vec<u32>);
 
 /// Keeps the stream as it comes.
 #[derive(Default)]
 struct Recorder {
-    core: usize,
     sent: Vec<Sent>,
 }
 
 impl Consumer for Recorder {
-    fn quad(&mut self, core: usize, _tile: usize) {
-        self.core = core;
-    }
-
-    fn footprint(&mut self, cell: usize, lines: Lines<'_>) -> bool {
-        self.sent.push((self.core, cell, lines.iter().collect()));
-        false
+    fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
+        let before = self.sent.len();
+        for footprint in quad.footprints() {
+            for _ in 0..=footprint.repeats {
+                self.sent
+                    .push((core, footprint.cell, footprint.lines.to_vec()));
+            }
+        }
+        assert_eq!((self.sent.len() - before) as u32, quad.footprints);
     }
 }
 
-fn sent_to<C: Consumer>(trace: &MemoryTrace, config: &RunConfig, consumer: &mut C) {
-    let mut stream = Stream::new(trace, config).unwrap();
+fn sent(trace: &MemoryTrace, config: &RunConfig) -> Vec<Sent> {
+    let (expander, memory) = (
+        Expander::new(trace, config).unwrap(),
+        LineMemory::new(1 << 30),
+    );
+    let mut counts = TraceCounts::new(expander.bins());
+    let frame = expander.frame(0, &memory, &mut counts).unwrap();
     let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
-    interleave(&mut stream, &phases, config.assign, consumer).unwrap();
+    let mut recorder = Recorder::default();
+    let mut cores = Cores::new(&frame, config.cores as usize);
+    interleave(&mut cores, &phases, config.assign, &mut recorder).unwrap();
+    recorder.sent
 }
 
 #[test]
@@ -374,12 +442,11 @@ fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
                 cores: 3,
                 ..functional(order)
             };
-            let mut recorder = Recorder::default();
-            sent_to(&trace, &config, &mut recorder);
+            let sent = sent(&trace, &config);
             let mut l1: Vec<TwinCache> = (0..3).map(|_| TwinCache::new(&config.l1)).collect();
             let mut l2 = TwinCache::new(&config.l2);
             let (mut l1_lines, mut l2_lines) = (0, 0);
-            for (core, _, lines) in &recorder.sent {
+            for (core, _, lines) in &sent {
                 for &line in lines {
                     if !l1[*core].access(line.into()) {
                         l1_lines += 1;
@@ -388,7 +455,7 @@ fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
                 }
             }
             let result = replay(&trace, &config).unwrap();
-            assert_eq!(recorder.sent.len() as u64, result.footprints);
+            assert_eq!(sent.len() as u64, result.footprints);
             assert_eq!((result.l1.misses, result.l2.misses), (l1_lines, l2_lines));
         }
     }
@@ -397,8 +464,10 @@ fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
 #[test]
 fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
     let trace = small();
-    let mut touched = LineSet::new(1 << 24);
-    sent_to(&trace, &functional(Order::SCANLINE), &mut touched);
+    let touched = LineSet::new(1 << 24);
+    let sent = sent(&trace, &functional(Order::SCANLINE));
+    let lines = sent.iter().flat_map(|(.., lines)| lines);
+    lines.for_each(|&line| touched.insert(line));
     assert!(touched.count() > 0);
     for mode in [Mode::Functional, Mode::Timed] {
         for l1 in [64, 1 << 10, 1 << 20] {
@@ -416,15 +485,15 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
 #[test]
 fn caches_take_lines_that_no_trace_sent() {
     let config = functional(Order::MORTON);
-    let bins = Bins::new(&testing::tables(&[[64, 64]]), false);
+    let bins = Bins::new(&testing::tables(&[[64, 64]])).unwrap();
     let levels = Levels::build(&config).unwrap().all_four_way().ok().unwrap();
-    let mut caches = Functional::new(levels, CacheCounts::new(&bins, 1 << 16));
+    let mut caches = Functional::new(levels, CacheCounts::new(&bins, false));
     let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
     let (mut l1_lines, mut l2_lines) = (0, 0);
-    caches.quad(0, 0);
     for step in 0..10_000_u64 {
         let line = step * step % 1009 + step % 7;
-        caches.footprint(0, Lines::new(0, &[line as u32]));
+        let tile = testing::tile_lines(&[&[&[line as u32]]]);
+        caches.quad(0, tile.quad(0));
         if !l1.access(line) {
             l1_lines += 1;
             l2_lines += u64::from(!l2.access(line));
@@ -434,3 +503,5 @@ fn caches_take_lines_that_no_trace_sent() {
     assert_eq!((counted.l1.lines, counted.l2.lines), (l1_lines, l2_lines));
     assert!(l1_lines > l2_lines && l2_lines > 1009);
 }
+
+mod one_pass;

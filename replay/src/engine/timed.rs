@@ -1,12 +1,14 @@
 //! Timed replay: each core's texture unit runs on its own cycle clock, and the clocks decide in
 //! which order the cores' misses reach the shared L2.
 
+use super::Machine;
+use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
 use crate::cache::{Cache, InFlight, Levels};
-use crate::config::{Assign, TmuConfig};
+use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
 use crate::result::TmuResult;
-use crate::stream::{Consumer, Lines, Stream, StreamError, TileSource};
+use crate::stream::{Cores, QuadLines, StreamError};
 use crate::tmu::{Pipeline, PipelineStats, Turn};
 
 /// A cache and what is on its way into it.
@@ -61,16 +63,8 @@ pub struct Timed<C> {
     memory: Memory<C>,
     units: Vec<Pipeline>,
     busy: Vec<bool>,
-}
-
-/// What a timed replay yields.
-pub struct TimedOutcome {
-    /// What missed.
-    pub counts: CacheCounts,
-    /// Texture units together.
-    pub tmu: TmuResult,
     /// Cycles until the last core was done.
-    pub cycles: u64,
+    cycles: u64,
 }
 
 impl<C: Cache> Timed<C> {
@@ -91,45 +85,15 @@ impl<C: Cache> Timed<C> {
             },
             units: vec![Pipeline::new(tmu); cores],
             busy: vec![false; cores],
+            cycles: 0,
         }
-    }
-
-    /// Runs all phases; a phase starts when the last core is done with the one before.
-    ///
-    /// # Errors
-    /// A tile cannot be read.
-    pub fn run<S: TileSource + ?Sized>(
-        mut self,
-        stream: &mut Stream<'_, S>,
-        phases: &[Phase],
-        assign: Assign,
-    ) -> Result<TimedOutcome, StreamError> {
-        let mut cycles = 0;
-        for phase in phases {
-            self.units.iter_mut().for_each(|unit| unit.resume(cycles));
-            self.busy.fill(true);
-            self.run_phase(stream, phase, assign)?;
-            cycles = self.units.iter().map(Pipeline::clock).max().unwrap_or(0);
-        }
-        let mut sum = PipelineStats::default();
-        self.units.iter().for_each(|unit| sum.add(&unit.stats()));
-        Ok(TimedOutcome {
-            counts: self.memory.counts,
-            tmu: TmuResult {
-                utilization: sum.utilization(),
-                wasted_issues: sum.wasted,
-                threads: sum.threads,
-                loops: sum.loops,
-            },
-            cycles,
-        })
     }
 
     /// Always advances the core whose clock is furthest behind, so that what the cores share sees
     /// their accesses in the order of time.
-    fn run_phase<S: TileSource + ?Sized>(
+    fn run_phase(
         &mut self,
-        stream: &mut Stream<'_, S>,
+        work: &mut Cores<'_>,
         phase: &[WorkItem],
         assign: Assign,
     ) -> Result<(), StreamError> {
@@ -139,9 +103,9 @@ impl<C: Cache> Timed<C> {
                 Turn::Looped => {}
                 Turn::Done => self.busy[core] = false,
                 Turn::Free => {
-                    if !self.start_thread(core, stream) {
+                    if !self.start_thread(core, work) {
                         match items.next(core) {
-                            Some(item) => stream.load(core, item)?,
+                            Some(item) => work.load(core, item)?,
                             None => self.units[core].drain(),
                         }
                     }
@@ -159,17 +123,14 @@ impl<C: Cache> Timed<C> {
 
     /// Starts the core's next quad; false if its item has none left.
     #[inline]
-    fn start_thread<S: TileSource + ?Sized>(
-        &mut self,
-        core: usize,
-        stream: &mut Stream<'_, S>,
-    ) -> bool {
+    fn start_thread(&mut self, core: usize, work: &mut Cores<'_>) -> bool {
         let unit = &mut self.units[core];
-        self.memory.now = unit.clock();
-        match stream.next_quad(core, &mut self.memory) {
-            None => return false,
-            Some(0) => {}
-            Some(footprints) => unit.start(footprints, &self.memory.pending),
+        let Some(quad) = work.next_quad(core) else {
+            return false;
+        };
+        if quad.footprints > 0 {
+            self.memory.look_up(core, unit.clock(), &quad);
+            unit.start(quad.footprints, &self.memory.pending);
         }
         true
     }
@@ -209,33 +170,38 @@ impl<'a> Items<'a> {
     }
 }
 
-impl<C: Cache> Consumer for Memory<C> {
-    #[inline(always)]
-    fn quad(&mut self, core: usize, tile: usize) {
-        (self.core, self.tile) = (core, tile);
-        self.l1[core].arrive(self.now);
-        self.l2.arrive(self.now);
+impl<C: Cache> Memory<C> {
+    /// Looks up all footprints of a thread that enters now.
+    fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) {
+        (self.core, self.tile, self.now) = (core, quad.tile(), now);
+        self.l1[core].arrive(now);
+        self.l2.arrive(now);
         self.pending.clear();
         self.fetches = 0;
+        let safe_lines = self.l1[core].cache.repeat_safe_lines() as usize;
+        for footprint in quad.footprints() {
+            for _ in 0..=footprint.repeats {
+                let hit = self.footprint(footprint.cell, footprint.lines);
+                // Repeats that would find everything there need no simulation.
+                if hit && footprint.lines.len() <= safe_lines {
+                    break;
+                }
+            }
+        }
     }
 
+    /// True if all lines are there.
     #[inline(always)]
-    fn footprint(&mut self, cell: usize, lines: Lines<'_>) -> bool {
-        let l1 = &mut self.l1[self.core].cache;
-        let safe = lines.count() <= l1.repeat_safe_lines();
-        // One line, there: what nearly all footprints find.
-        if lines.only().is_some_and(|line| l1.lookup(line)) {
-            return safe;
-        }
+    fn footprint(&mut self, cell: usize, lines: &[u32]) -> bool {
         let mut misses = FootprintMisses::default();
         let mut ready = 0;
-        for line in lines.iter() {
+        for &line in lines {
             if !self.l1[self.core].cache.lookup(line) {
                 ready = self.request(line, &mut misses).max(ready);
             }
         }
         if misses.l1_lines + misses.l1_secondary == 0 {
-            return safe;
+            return true;
         }
         if ready > self.now {
             self.pending.push(ready);
@@ -243,9 +209,7 @@ impl<C: Cache> Consumer for Memory<C> {
         self.counts.footprint(cell, self.tile, &misses);
         false
     }
-}
 
-impl<C: Cache> Memory<C> {
     /// Asks for a line that is not in the L1, unless it is on its way already; says when it
     /// arrives.
     #[inline(never)]
@@ -255,7 +219,6 @@ impl<C: Cache> Memory<C> {
             misses.l1_secondary += 1;
             return arrival;
         }
-        self.counts.touched.insert(line);
         misses.l1_lines += 1;
         let tmu = &self.tmu;
         let trip = self.fetches / u64::from(tmu.fetches_per_trip);
@@ -281,5 +244,39 @@ impl<C: Cache> Memory<C> {
         let in_l1 = in_l2 + u64::from(tmu.l1_penalty_cycles) + wait;
         l1.enter(line, self.now, in_l1);
         in_l1
+    }
+}
+
+impl<C: Cache> Machine for Timed<C> {
+    /// A phase starts when the last core is done with the one before.
+    fn run(
+        &mut self,
+        work: &mut Cores<'_>,
+        phases: &[Phase],
+        assign: Assign,
+    ) -> Result<(), StreamError> {
+        for phase in phases {
+            let cycles = self.cycles;
+            self.units.iter_mut().for_each(|unit| unit.resume(cycles));
+            self.busy.fill(true);
+            self.run_phase(work, phase, assign)?;
+            self.cycles = self.units.iter().map(Pipeline::clock).max().unwrap_or(0);
+        }
+        Ok(())
+    }
+
+    fn outcome(&self, _config: &RunConfig) -> Outcome {
+        let mut sum = PipelineStats::default();
+        self.units.iter().for_each(|unit| sum.add(&unit.stats()));
+        Outcome {
+            counts: self.memory.counts.clone(),
+            tmu: Some(TmuResult {
+                utilization: sum.utilization(),
+                wasted_issues: sum.wasted,
+                threads: sum.threads,
+                loops: sum.loops,
+            }),
+            cycles: Some(self.cycles),
+        }
     }
 }

@@ -3,9 +3,11 @@
 use super::plan::functional;
 use super::{Plan, Point, Setting, Subject, frame_count};
 use crate::config::Order;
+use crate::engine::Work;
 use crate::paper::z2::{self, PublishedRow};
 use crate::result::RunResult;
 use std::collections::HashMap;
+use std::fmt::Write as _;
 
 /// What a plan yields.
 pub struct Outcome<'a> {
@@ -13,8 +15,8 @@ pub struct Outcome<'a> {
     pub subjects: &'a [Subject<'a>],
     /// The points.
     pub plan: &'a Plan,
-    /// Replays that were run now; other results came from the store or were the same point's.
-    pub replays: usize,
+    /// What was replayed now; other results came from the store or were the same point's.
+    pub work: Work,
     /// `results[subject * points + point]`.
     results: Vec<RunResult>,
 }
@@ -56,14 +58,33 @@ impl<'a> Outcome<'a> {
         plan: &'a Plan,
         subjects: &'a [Subject<'a>],
         results: Vec<RunResult>,
-        replays: usize,
+        work: Work,
     ) -> Self {
         Self {
             subjects,
             plan,
-            replays,
+            work,
             results,
         }
+    }
+
+    /// What the results share, for whoever waited for them.
+    #[must_use]
+    pub fn shared(&self) -> String {
+        let Work {
+            replays,
+            passes,
+            expansions,
+        } = self.work;
+        let skipped = self.results.len() - replays;
+        let mut text = format!(
+            "{} points: {replays} replayed in {passes} passes over {expansions} expanded traces",
+            self.results.len()
+        );
+        if skipped > 0 {
+            let _ = write!(text, ", {skipped} known or equal to one of these");
+        }
+        text
     }
 
     /// A row for every point of every trace, in that order.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::config::{Mode, Order, RunConfig};
+use crate::engine::Work;
 use crate::result::TraceId;
 use crate::stream::MemoryTrace;
 use crate::stream::testing::tables;
@@ -121,9 +122,9 @@ fn a_second_run_computes_nothing_and_gives_the_same() {
     let subjects = [Subject::new(&trace, id("1"), "empty".into())];
     let plan = plan("[axes]\norder = [\"morton\", \"z2-sta\"]\nseed = [1, 2, 3]\n");
     let first = run(&plan, &subjects, Some(&store), &|_| ()).unwrap();
-    assert_eq!(first.replays, 6);
+    assert_eq!(first.work.replays, 6);
     let second = run(&plan, &subjects, Some(&store), &|_| ()).unwrap();
-    assert_eq!(second.replays, 0);
+    assert_eq!(second.work.replays, 0);
     let results = |outcome: &Outcome| -> Vec<_> {
         let rows = outcome.rows();
         rows.iter().map(|row| row.result.clone()).collect()
@@ -137,7 +138,7 @@ fn equal_configurations_are_replayed_once() {
     let subjects = [Subject::new(&trace, id("1"), "empty".into())];
     let plan = plan("[axes]\nseed = [1, 2]\n[one-at-a-time]\ncores = [2, 4]\n");
     let outcome = run(&plan, &subjects, None, &|_| ()).unwrap();
-    assert_eq!((outcome.rows().len(), outcome.replays), (6, 4));
+    assert_eq!((outcome.rows().len(), outcome.work.replays), (6, 4));
 }
 
 #[test]
@@ -153,7 +154,7 @@ fn rows_know_the_points_they_are_held_against() {
             ..Default::default()
         })
         .collect();
-    let outcome = Outcome::new(&plan, &subjects, results, 0);
+    let outcome = Outcome::new(&plan, &subjects, results, Work::default());
     let quads = |result: Option<&crate::result::RunResult>| result.map(|r| r.quads);
     let rows = outcome.rows();
     let of = |i: usize| {

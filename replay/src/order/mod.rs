@@ -15,7 +15,7 @@ mod z2_sta;
 mod z2_sta_merge;
 mod zig_zag;
 
-pub use plan::{Phase, plan};
+pub use plan::{Phase, plan, plan_frame};
 pub use work::{Interleave, TileRef, View, WorkItem};
 
 use crate::palette::{BLUE, GREEN, GREY, ORANGE, PURPLE, Rgb, SKY_BLUE, VERMILION, YELLOW};

@@ -16,28 +16,32 @@ pub fn plan(order: &dyn TileOrder, passes: &[Pass]) -> Vec<Phase> {
     let mut frames: Vec<u32> = passes.iter().map(|p| p.frame).collect();
     frames.sort_unstable();
     frames.dedup();
-    let mut phases = Vec::new();
-    for frame in frames {
-        let views = |eye: Option<Eye>| {
-            let of_frame = passes
-                .iter()
-                .enumerate()
-                .filter(move |(_, p)| p.frame == frame);
-            of_frame.filter(move |(_, p)| eye == p.eye.filter(|_| p.kind == PassKind::Main))
-        };
-        let view = |(index, pass): (usize, &Pass)| View {
-            pass: index as u32,
-            tiles: pass.tiles,
-        };
-        phases.extend(views(None).map(|mono| order.mono(view(mono))));
-        let mut lefts = views(Some(Eye::Left)).map(view);
-        let mut rights = views(Some(Eye::Right)).map(view);
-        loop {
-            match (lefts.next(), rights.next()) {
-                (Some(left), Some(right)) => phases.push(order.stereo(left, right)),
-                (Some(alone), None) | (None, Some(alone)) => phases.push(order.mono(alone)),
-                (None, None) => break,
-            }
+    let plan = |frame| plan_frame(order, passes, frame);
+    frames.into_iter().flat_map(plan).collect()
+}
+
+/// The work of one frame.
+#[must_use]
+pub fn plan_frame(order: &dyn TileOrder, passes: &[Pass], frame: u32) -> Vec<Phase> {
+    let views = |eye: Option<Eye>| {
+        let of_frame = passes
+            .iter()
+            .enumerate()
+            .filter(move |(_, p)| p.frame == frame);
+        of_frame.filter(move |(_, p)| eye == p.eye.filter(|_| p.kind == PassKind::Main))
+    };
+    let view = |(index, pass): (usize, &Pass)| View {
+        pass: index as u32,
+        tiles: pass.tiles,
+    };
+    let mut phases: Vec<Phase> = views(None).map(|mono| order.mono(view(mono))).collect();
+    let mut lefts = views(Some(Eye::Left)).map(view);
+    let mut rights = views(Some(Eye::Right)).map(view);
+    loop {
+        match (lefts.next(), rights.next()) {
+            (Some(left), Some(right)) => phases.push(order.stereo(left, right)),
+            (Some(alone), None) | (None, Some(alone)) => phases.push(order.mono(alone)),
+            (None, None) => break,
         }
     }
     phases

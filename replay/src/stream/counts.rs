@@ -1,9 +1,8 @@
 //! Counts of what a trace accesses: the same for every order and every cache.
 
-use super::Accesses;
+use super::{StreamError, Tag};
 use crate::order::TileRef;
 use formats::textrace::Tables;
-use formats::textrace::tables::MAX_TEXTURE_SIZE;
 use formats::view::Eye;
 
 /// Left, right, and passes that belong to no eye.
@@ -13,19 +12,20 @@ const VIEWS: [&str; 3] = ["left", "right", "shared"];
 /// tile. All counters of a replay are lists by these numbers.
 #[derive(Debug)]
 pub struct Bins {
-    textures: usize,
+    /// First cell of each texture within a view, and the number of a view's cells.
+    first_levels: Vec<usize>,
     /// View by pass.
     views: Vec<usize>,
-    /// First tile by pass; empty where tiles are not counted and all share one number.
+    /// First tile by pass.
     first_tiles: Vec<usize>,
     tiles: usize,
 }
 
-/// Where a quad counts: its view's first cell and its tile.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    first_cell: usize,
-    pub(super) tile: usize,
+/// Where a tile's accesses count: its view's first cell and its number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    pub(super) first_cell: u32,
+    pub(super) tile: u32,
 }
 
 /// What a cell stands for.
@@ -40,38 +40,56 @@ pub struct Cell {
 }
 
 impl Bins {
-    /// Levels of the largest texture that a trace can have.
-    pub const LEVELS: usize = MAX_TEXTURE_SIZE.ilog2() as usize + 1;
-
     /// Bins for the textures and passes of a trace.
-    #[must_use]
-    pub fn new(tables: &Tables, tile_maps: bool) -> Self {
+    ///
+    /// # Errors
+    /// More mip levels than a [`Tag`] can name, or more than 2^32 tiles.
+    pub fn new(tables: &Tables) -> Result<Self, StreamError> {
+        let mut first_levels = vec![0];
+        let mut levels = 0;
+        for texture in &tables.textures {
+            levels += texture.levels as usize;
+            first_levels.push(levels);
+        }
+        if levels > Tag::CELLS {
+            return Err(StreamError::Tables(format!(
+                "textures have {levels} levels: expected at most {}",
+                Tag::CELLS
+            )));
+        }
         let mut tiles = 0;
         let mut first_tiles = Vec::new();
         for pass in &tables.passes {
             first_tiles.push(tiles);
             tiles += pass.tile_count() as usize;
         }
-        if !tile_maps {
-            (tiles, first_tiles) = (1, Vec::new());
+        if u32::try_from(tiles).is_err() {
+            return Err(StreamError::Tables(format!(
+                "passes have {tiles} tiles: expected fewer than 2^32"
+            )));
         }
         let view = |eye| match eye {
             Some(Eye::Left) => 0,
             Some(Eye::Right) => 1,
             None => 2,
         };
-        Self {
-            textures: tables.textures.len(),
+        Ok(Self {
+            first_levels,
             views: tables.passes.iter().map(|pass| view(pass.eye)).collect(),
             first_tiles,
             tiles,
-        }
+        })
+    }
+
+    /// Cells of one view.
+    fn view_cells(&self) -> usize {
+        self.first_levels.last().copied().unwrap_or(0)
     }
 
     /// Number of cells.
     #[must_use]
     pub fn cells(&self) -> usize {
-        VIEWS.len() * self.textures * Self::LEVELS
+        VIEWS.len() * self.view_cells()
     }
 
     /// Number of tiles.
@@ -80,7 +98,7 @@ impl Bins {
         self.tiles
     }
 
-    /// First tile of each pass; empty if tiles are not counted.
+    /// First tile of each pass.
     #[must_use]
     pub fn first_tiles(&self) -> &[usize] {
         &self.first_tiles
@@ -101,26 +119,37 @@ impl Bins {
     /// What a cell stands for.
     #[must_use]
     pub fn meaning(&self, cell: usize) -> Cell {
+        let (view, within) = (cell / self.view_cells(), cell % self.view_cells());
+        // Textures without levels share their first cell with the one that has it.
+        let texture = self.first_levels.partition_point(|&first| first <= within) - 1;
         Cell {
-            view: cell / (Self::LEVELS * self.textures),
-            texture: cell / Self::LEVELS % self.textures,
-            level: cell % Self::LEVELS,
+            view,
+            texture,
+            level: within - self.first_levels[texture],
         }
     }
 
-    #[inline]
     pub(super) fn place(&self, at: TileRef) -> Place {
-        let pass = at.pass as usize;
-        let tile = self.first_tiles.get(pass);
         Place {
-            first_cell: self.views[pass] * self.textures * Self::LEVELS,
-            tile: tile.map_or(0, |first| first + at.tile as usize),
+            first_cell: self.first_cell(at) as u32,
+            tile: self.tile(at) as u32,
         }
     }
 
+    /// First cell of the tile's view.
+    pub(super) fn first_cell(&self, at: TileRef) -> usize {
+        self.views[at.pass as usize] * self.view_cells()
+    }
+
+    /// Number of the tile.
+    pub(super) fn tile(&self, at: TileRef) -> usize {
+        self.first_tiles[at.pass as usize] + at.tile as usize
+    }
+
+    /// Cell within a view.
     #[inline(always)]
-    pub(super) fn cell(&self, place: Place, texture: u32, level: u8) -> usize {
-        place.first_cell + texture as usize * Self::LEVELS + usize::from(level)
+    pub(super) fn cell(&self, texture: u32, level: u8) -> u32 {
+        (self.first_levels[texture as usize] + usize::from(level)) as u32
     }
 }
 
@@ -143,7 +172,7 @@ pub struct TileAccesses {
 }
 
 /// All that is counted of a trace.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct TraceCounts {
     /// Quads.
     pub quads: u64,
@@ -151,6 +180,8 @@ pub struct TraceCounts {
     pub lanes: u64,
     /// Hash of all line accesses, which does not depend on their order.
     pub hash: u64,
+    /// Distinct lines.
+    pub unique_lines: u64,
     /// By cell.
     pub cells: Vec<CellAccesses>,
     /// By tile.
@@ -158,31 +189,35 @@ pub struct TraceCounts {
 }
 
 impl TraceCounts {
-    pub(super) fn new(bins: &Bins) -> Self {
+    /// All zero.
+    #[must_use]
+    pub fn new(bins: &Bins) -> Self {
+        Self {
+            tiles: vec![TileAccesses::default(); bins.tiles()],
+            ..Self::without_tiles(bins)
+        }
+    }
+
+    /// What a worker counts.
+    pub(super) fn without_tiles(bins: &Bins) -> Self {
         Self {
             quads: 0,
             lanes: 0,
             hash: 0,
+            unique_lines: 0,
             cells: vec![CellAccesses::default(); bins.cells()],
-            tiles: vec![TileAccesses::default(); bins.tiles()],
+            tiles: Vec::new(),
         }
     }
 
-    #[inline]
-    pub(super) fn quad(&mut self, tile: usize, lanes: u32) {
-        self.quads += 1;
-        self.lanes += u64::from(lanes);
-        let tile = &mut self.tiles[tile];
-        tile.lanes = tile.lanes.wrapping_add(lanes);
-    }
-
-    #[inline(always)]
-    pub(super) fn footprints(&mut self, cell: usize, tile: usize, accesses: &Accesses) {
-        self.hash = self.hash.wrapping_add(accesses.hash);
-        let cell = &mut self.cells[cell];
-        cell.footprints += u64::from(accesses.footprints);
-        cell.line_lookups += u64::from(accesses.line_lookups);
-        let tile = &mut self.tiles[tile];
-        tile.footprints = tile.footprints.wrapping_add(accesses.footprints);
+    /// Adds what a worker counted.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.quads += other.quads;
+        self.lanes += other.lanes;
+        self.hash = self.hash.wrapping_add(other.hash);
+        for (cell, other) in self.cells.iter_mut().zip(&other.cells) {
+            cell.footprints += other.footprints;
+            cell.line_lookups += other.line_lookups;
+        }
     }
 }

@@ -1,7 +1,8 @@
-//! What a core works on: the quads of its work item, one after another.
+//! Work items as quads with their records, for whoever wants the records themselves.
 
+use super::lines::interleaved;
 use super::{StreamError, TileSource};
-use crate::order::{Interleave, TileRef, WorkItem};
+use crate::order::{TileRef, WorkItem};
 use formats::textrace::{PrimitiveRun, QuadRecord, Tile};
 
 /// One quad of one primitive: the unit that a shader core runs as a thread.
@@ -17,101 +18,73 @@ pub struct Quad<'a> {
     pub records: &'a [QuadRecord],
 }
 
-impl Quad<'_> {
-    /// Covered lanes, whatever they sample.
-    #[must_use]
-    pub fn lanes(&self) -> u32 {
-        self.records
-            .iter()
-            .fold(0, |all, r| all | r.mask & 15)
-            .count_ones()
+/// Sends the quads of a work item to `send`, in the order in which a core runs them.
+///
+/// # Errors
+/// A tile cannot be read, or its runs point outside its records; what `send` says.
+pub fn for_quads<E: From<StreamError>>(
+    source: &dyn TileSource,
+    item: &WorkItem,
+    mut send: impl FnMut(Quad<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut tiles = Vec::new();
+    for at in item.tiles() {
+        let mut tile = Tile::default();
+        read(source, at, &mut tile)?;
+        tiles.push((at, tile));
     }
+    let mut runs = Vec::new();
+    match (*item, &*tiles) {
+        (WorkItem::Pair(_, _, interleave), [(_, left), (_, right)]) => {
+            let mut primitives = [left, right].map(|t| t.runs.iter().map(|run| run.primitive));
+            let [left, right] = &mut primitives;
+            interleaved(interleave, [left, right], &mut runs);
+        }
+        _ => runs.extend(
+            (0..)
+                .zip(tiles.iter().flat_map(|(_, tile)| &tile.runs))
+                .map(|(run, _)| (0, run)),
+        ),
+    }
+    for (slot, run) in runs {
+        let (at, tile) = &tiles[usize::from(slot)];
+        let run = &tile.runs[run as usize];
+        for records in quads(tile, run) {
+            send(Quad {
+                at: *at,
+                draw: run.draw,
+                primitive: run.primitive,
+                records,
+            })?;
+        }
+    }
+    Ok(())
 }
 
-/// A work item's decoded tiles and the position in them.
-#[derive(Debug, Default)]
-pub struct Feed {
-    tiles: [Tile; 2],
-    at: [Option<TileRef>; 2],
-    /// Runs left to do in order: which tile, which run.
-    runs: Vec<(u8, u32)>,
-    next_run: usize,
-    /// Records of the current run that are left: tile, first, end, draw.
-    slot: usize,
-    next: usize,
-    end: usize,
-    draw: u32,
-    primitive: u32,
+/// Reads a tile and checks what the tables of the trace say about it.
+pub(super) fn read(
+    source: &dyn TileSource,
+    at: TileRef,
+    tile: &mut Tile,
+) -> Result<(), StreamError> {
+    source.read_tile(at.pass, at.tile, tile)?;
+    check(tile, at, source.tables().draws.len())
 }
 
-impl Feed {
-    /// Reads the tiles of the next item. Whatever was left of the last one is dropped.
-    ///
-    /// # Errors
-    /// A tile cannot be read, or its runs point outside its records.
-    pub fn load<S: TileSource + ?Sized>(
-        &mut self,
-        source: &S,
-        item: &WorkItem,
-    ) -> Result<(), StreamError> {
-        self.at = [None; 2];
-        self.runs.clear();
-        (self.next_run, self.next, self.end) = (0, 0, 0);
-        for (slot, at) in item.tiles().enumerate() {
-            let tile = &mut self.tiles[slot];
-            source.read_tile(at.pass, at.tile, tile)?;
-            check(tile, at, source.tables().draws.len())?;
-            self.at[slot] = Some(at);
-        }
-        let count = |slot: usize| self.tiles[slot].runs.len() as u32;
-        match item {
-            WorkItem::Tile(_) => self.runs.extend((0..count(0)).map(|run| (0, run))),
-            WorkItem::Pair(_, _, Interleave::Alternate) => {
-                let (left, right) = (count(0), count(1));
-                for run in 0..left.max(right) {
-                    self.runs.extend((run < left).then_some((0, run)));
-                    self.runs.extend((run < right).then_some((1, run)));
-                }
-            }
-            WorkItem::Pair(_, _, Interleave::Merge) => {
-                self.runs.extend(
-                    (0..2).flat_map(|slot| (0..count(slot)).map(move |run| (slot as u8, run))),
-                );
-                // Stable: a primitive's left run stays before its right one.
-                let tiles = &self.tiles;
-                self.runs.sort_by_key(|&(slot, run)| {
-                    tiles[usize::from(slot)].runs[run as usize].primitive
-                });
-            }
-        }
-        Ok(())
-    }
+/// The quads of a run: records at one position.
+pub(super) fn quads<'a>(
+    tile: &'a Tile,
+    run: &PrimitiveRun,
+) -> impl Iterator<Item = &'a [QuadRecord]> {
+    let records = &tile.records[run.first as usize..][..run.count as usize];
+    records.chunk_by(|a, b| (a.x, a.y) == (b.x, b.y))
+}
 
-    /// The next quad, until the item is done.
-    #[inline]
-    pub fn next_quad(&mut self) -> Option<Quad<'_>> {
-        while self.next == self.end {
-            let &(slot, run) = self.runs.get(self.next_run)?;
-            self.next_run += 1;
-            self.slot = usize::from(slot);
-            let run: PrimitiveRun = self.tiles[self.slot].runs[run as usize];
-            self.next = run.first as usize;
-            self.end = run.first as usize + run.count as usize;
-            self.draw = run.draw;
-            self.primitive = run.primitive;
-        }
-        let left = &self.tiles[self.slot].records[self.next..self.end];
-        let position = |r: &QuadRecord| (r.x, r.y);
-        let first = position(&left[0]);
-        let count = left.iter().take_while(|r| position(r) == first).count();
-        self.next += count;
-        Some(Quad {
-            at: self.at[self.slot]?,
-            draw: self.draw,
-            primitive: self.primitive,
-            records: &left[..count],
-        })
-    }
+/// Covered lanes of a quad, whatever they sample.
+#[inline]
+pub(super) fn lanes(records: &[QuadRecord]) -> u32 {
+    let all = records.iter().fold(0, |all, r| all | r.mask & 15);
+    all.count_ones()
 }
 
 /// Refuses runs that a damaged or hand-made trace might hold.
@@ -136,6 +109,7 @@ fn check(tile: &Tile, at: TileRef, draws: usize) -> Result<(), StreamError> {
 mod tests {
     use super::super::MemoryTrace;
     use super::*;
+    use crate::order::Interleave;
     use crate::stream::testing::{record, tables, tile};
 
     fn trace() -> MemoryTrace {
@@ -152,10 +126,18 @@ mod tests {
     const RIGHT: TileRef = TileRef { pass: 1, tile: 0 };
 
     /// Pass and number of records of each quad, in order.
+    fn quads(trace: &MemoryTrace, item: WorkItem) -> Result<Vec<(u32, usize)>, StreamError> {
+        let mut quads = Vec::new();
+        let send = |quad: Quad<'_>| -> Result<(), StreamError> {
+            quads.push((quad.at.pass, quad.records.len()));
+            Ok(())
+        };
+        for_quads(trace, &item, send).map(|()| quads)
+    }
+
     fn order(item: WorkItem) -> Vec<u32> {
-        let mut feed = Feed::default();
-        feed.load(&trace(), &item).unwrap();
-        std::iter::from_fn(|| feed.next_quad().map(|q| q.at.pass)).collect()
+        let quads = quads(&trace(), item).unwrap();
+        quads.iter().map(|(pass, _)| *pass).collect()
     }
 
     #[test]
@@ -181,20 +163,15 @@ mod tests {
         tile.records = vec![record(0, 0), record(0, 0), record(1, 0)];
         tile.runs.truncate(1);
         tile.runs[0].count = 3;
-        let mut feed = Feed::default();
-        feed.load(&trace, &WorkItem::Tile(LEFT)).unwrap();
-        let counts: Vec<usize> =
-            std::iter::from_fn(|| feed.next_quad().map(|q| q.records.len())).collect();
-        assert_eq!(counts, [2, 1]);
+        let quads = quads(&trace, WorkItem::Tile(LEFT)).unwrap();
+        assert_eq!(quads, [(0, 2), (0, 1)]);
     }
 
     #[test]
     fn a_run_outside_the_records_is_refused() {
         let mut trace = trace();
         trace.tiles[0][0].runs[2].count = 7;
-        let error = Feed::default()
-            .load(&trace, &WorkItem::Tile(LEFT))
-            .unwrap_err();
+        let error = quads(&trace, WorkItem::Tile(LEFT)).unwrap_err();
         assert!(error.to_string().contains("records 3 + 7"), "{error}");
     }
 }

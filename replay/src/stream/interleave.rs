@@ -1,86 +1,113 @@
 //! The order in which the cores' quads meet in what they share, where no latencies are known: a
 //! footprint is the unit of time.
 
-use super::{Consumer, Stream, StreamError, TileSource};
+use super::{Cores, QuadLines, StreamError};
 use crate::config::Assign;
 use crate::order::{Phase, WorkItem};
 
-/// A core's state.
-#[derive(Clone, Copy, Debug, Default)]
-struct Core {
-    busy: bool,
-    /// Footprints done, the clock of first-idle assignment.
-    clock: u64,
+/// Takes the quads of a trace in the order in which the cores come to them.
+pub trait Consumer {
+    /// `core` runs a quad.
+    fn quad(&mut self, core: usize, quad: QuadLines<'_>);
 }
 
 /// Sends all quads of `phases` to `consumer`. What comes when does not depend on the consumer.
 ///
 /// # Errors
 /// A tile that cannot be read.
-pub fn interleave<S: TileSource + ?Sized>(
-    stream: &mut Stream<'_, S>,
+pub fn interleave(
+    cores: &mut Cores<'_>,
     phases: &[Phase],
     assign: Assign,
     consumer: &mut impl Consumer,
 ) -> Result<(), StreamError> {
-    let mut cores = vec![Core::default(); stream.cores()];
     for phase in phases {
         match assign {
-            Assign::FirstIdle => first_idle(stream, &mut cores, phase, consumer)?,
-            Assign::Static => lockstep(stream, phase, consumer)?,
+            Assign::FirstIdle => first_idle(cores, phase, consumer)?,
+            Assign::Static => lockstep(cores, phase, consumer)?,
         }
-        let end = cores.iter().map(|core| core.clock).max().unwrap_or(0);
-        cores.iter_mut().for_each(|core| core.clock = end);
     }
     Ok(())
 }
 
-/// The core that is furthest behind runs a quad; if it has none left, it takes the next item.
-fn first_idle<S: TileSource + ?Sized>(
-    stream: &mut Stream<'_, S>,
-    cores: &mut [Core],
+/// The core that is furthest behind, in footprints, runs a quad; if it has none left, it takes the
+/// next item.
+fn first_idle(
+    cores: &mut Cores<'_>,
     phase: &[WorkItem],
     consumer: &mut impl Consumer,
 ) -> Result<(), StreamError> {
     let mut items = phase.iter();
-    cores.iter_mut().for_each(|core| core.busy = true);
-    while let Some(behind) = furthest_behind(cores) {
-        if let Some(footprints) = stream.next_quad(behind, consumer) {
-            // An untextured quad takes its turn, too.
-            cores[behind].clock += u64::from(footprints.max(1));
-            continue;
-        }
-        match items.next() {
-            Some(item) => stream.load(behind, item)?,
-            None => cores[behind].busy = false,
+    // All cores start a phase together. A core without work is at the end of time.
+    let mut clocks = vec![0_u64; cores.count()];
+    while let Some((behind, until)) = furthest_behind(&clocks) {
+        let clock = &mut clocks[behind];
+        // Nobody else's clock moves until this one has passed the next.
+        while *clock <= until {
+            if let Some(quad) = cores.next_quad(behind) {
+                // An untextured quad takes its turn, too.
+                *clock += u64::from(quad.footprints.max(1));
+                consumer.quad(behind, quad);
+            } else if let Some(item) = items.next() {
+                cores.load(behind, item)?;
+            } else {
+                *clock = u64::MAX;
+            }
         }
     }
     Ok(())
 }
 
-/// The busy core with the lowest clock, the first of equals.
+/// The core with the lowest clock, the first of equals, and the last cycle at which it still is.
 #[inline]
-fn furthest_behind(cores: &[Core]) -> Option<usize> {
-    let busy = cores.iter().enumerate().filter(|(_, core)| core.busy);
-    busy.min_by_key(|(_, core)| core.clock)
-        .map(|(index, _)| index)
+pub fn furthest_behind(clocks: &[u64]) -> Option<(usize, u64)> {
+    let (behind, &lowest) = clocks.iter().enumerate().min_by_key(|(_, clock)| **clock)?;
+    if lowest == u64::MAX {
+        return None;
+    }
+    // A core before it keeps the turn from its own cycle on, one after it only past it.
+    let before = clocks[..behind].iter().map(|&clock| clock - 1);
+    let after = clocks[behind + 1..].iter().copied();
+    let until = before.chain(after).min().unwrap_or(u64::MAX);
+    Some((behind, until.min(u64::MAX - 1)))
 }
 
 /// Round robin: the cores' i-th items start together and run quad by quad in turn; who is done
 /// first waits. Free-running streams would drift apart and invent locality effects.
-fn lockstep<S: TileSource + ?Sized>(
-    stream: &mut Stream<'_, S>,
+fn lockstep(
+    cores: &mut Cores<'_>,
     phase: &[WorkItem],
     consumer: &mut impl Consumer,
 ) -> Result<(), StreamError> {
-    for items in phase.chunks(stream.cores()) {
+    for items in phase.chunks(cores.count()) {
         for (core, item) in items.iter().enumerate() {
-            stream.load(core, item)?;
+            cores.load(core, item)?;
         }
         let mut busy: Vec<usize> = (0..items.len()).collect();
         while !busy.is_empty() {
-            busy.retain(|&core| stream.next_quad(core, consumer).is_some());
+            busy.retain(|&core| {
+                let quad = cores.next_quad(core);
+                quad.is_some_and(|quad| {
+                    consumer.quad(core, quad);
+                    true
+                })
+            });
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::furthest_behind;
+
+    #[test]
+    fn the_first_of_the_lowest_clocks_has_the_turn_until_another_is_behind() {
+        assert_eq!(furthest_behind(&[5, 5]), Some((0, 5)));
+        assert_eq!(furthest_behind(&[6, 5]), Some((1, 5)));
+        assert_eq!(furthest_behind(&[9, 5, 7]), Some((1, 7)));
+        assert_eq!(furthest_behind(&[u64::MAX, 5]), Some((1, u64::MAX - 1)));
+        assert_eq!(furthest_behind(&[u64::MAX; 3]), None);
+        assert_eq!(furthest_behind(&[3]), Some((0, u64::MAX - 1)));
+    }
 }

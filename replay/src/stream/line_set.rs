@@ -1,11 +1,11 @@
 //! The lines that are touched at all: the misses of an infinite cache.
 
-use super::{Consumer, Lines};
+use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A set of lines, a bit each.
-#[derive(Clone, Debug)]
+/// A set of lines, a bit each, that threads fill together.
+#[derive(Debug)]
 pub struct LineSet {
-    words: Vec<u64>,
+    words: Vec<AtomicU64>,
 }
 
 impl LineSet {
@@ -13,29 +13,25 @@ impl LineSet {
     #[must_use]
     pub fn new(lines: u64) -> Self {
         Self {
-            words: vec![0; lines.div_ceil(64) as usize],
+            words: (0..lines.div_ceil(64)).map(|_| AtomicU64::new(0)).collect(),
         }
     }
 
     /// Adds a line.
     #[inline(always)]
-    pub fn insert(&mut self, line: u32) {
-        self.words[line as usize / 64] |= 1 << (line % 64);
+    pub fn insert(&self, line: u32) {
+        let word = &self.words[line as usize / 64];
+        let bit = 1 << (line % 64);
+        // Nearly all lines are there already, and a read does not take the word from the others.
+        if word.load(Ordering::Relaxed) & bit == 0 {
+            word.fetch_or(bit, Ordering::Relaxed);
+        }
     }
 
     /// Number of lines.
     #[must_use]
     pub fn count(&self) -> u64 {
-        self.words.iter().map(|w| u64::from(w.count_ones())).sum()
-    }
-}
-
-impl Consumer for LineSet {
-    fn quad(&mut self, _core: usize, _tile: usize) {}
-
-    #[inline(always)]
-    fn footprint(&mut self, _cell: usize, lines: Lines<'_>) -> bool {
-        lines.iter().for_each(|line| self.insert(line));
-        true
+        let ones = |word: &AtomicU64| u64::from(word.load(Ordering::Relaxed).count_ones());
+        self.words.iter().map(ones).sum()
     }
 }

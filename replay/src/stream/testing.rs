@@ -1,5 +1,7 @@
 //! Small traces for the tests of the engine.
 
+use super::counts::Place;
+use super::lines::{QuadEnd, Tag, TileLines};
 use formats::textrace::{
     Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta,
     UvGroup,
@@ -102,6 +104,26 @@ pub fn tile(primitives: &[(u32, u32)]) -> Tile {
         });
         tile.records
             .extend((0..quads).map(|i| record((i % 8) as u8, (i / 8) as u8)));
+    }
+    tile
+}
+
+/// Quads of footprints of lines, all in cell 0 of tile 0.
+pub fn tile_lines(quads: &[&[&[u32]]]) -> TileLines {
+    let mut tile = TileLines::default();
+    tile.begin(Place::default());
+    let [first, other] = Tag::of_footprint(0, 0);
+    for footprints in quads {
+        for lines in *footprints {
+            for (index, line) in lines.iter().enumerate() {
+                tile.lines.push(*line);
+                tile.tags.push(if index == 0 { first } else { other });
+            }
+        }
+        tile.quads.push(QuadEnd {
+            end: tile.lines.len() as u32,
+            footprints: footprints.len() as u32,
+        });
     }
     tile
 }

@@ -7,12 +7,16 @@ use super::lighting::Lighting;
 use formats::view::EyeView;
 use glam::Mat4;
 use record::{Captured, Region, Sink};
+use std::time::Duration;
+use techniques::Layer;
 
-/// One view to render: its camera, its light and its draws.
+/// One layer to render: its camera, its light and its draws.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// Matrices.
-    pub eye: EyeView,
+    /// Position of the layer in the frame's plan: the target that it is rendered into.
+    pub target: usize,
+    /// Matrices, size and mask.
+    pub layer: &'a Layer,
     /// Lights and shadow matrices of the frame.
     pub lighting: &'a Lighting,
     /// Draws that may be visible, as indices into the draw list, ascending.
@@ -23,7 +27,7 @@ impl View<'_> {
     /// World to clip space.
     #[must_use]
     pub fn clip_from_world(&self) -> Mat4 {
-        clip_from_world(&self.eye)
+        clip_from_world(&self.layer.view)
     }
 }
 
@@ -36,12 +40,24 @@ pub(crate) fn clip_from_world(eye: &EyeView) -> Mat4 {
 /// What a backend has done so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Regions of views rendered, those that overflowed counted too.
+    /// Regions of layers rendered, those that overflowed counted too.
     pub regions: u64,
     /// Draws of all passes.
     pub draws: u64,
     /// Draw calls that they took.
     pub calls: u64,
+    /// Pipelines, materials and meshes set before draw calls.
+    pub state_changes: u64,
+    /// Vertices of the draws' meshes, each once a draw.
+    pub vertices: u64,
+    /// Triangles of the draws.
+    pub triangles: u64,
+    /// Bytes written to the driver for views and lists of draws.
+    pub bytes_uploaded: u64,
+    /// Time of batching, encoding and submitting views, pictures with their records left out.
+    pub submitting: Duration,
+    /// Time of waiting for their pictures.
+    pub waiting: Duration,
     /// Shadow maps rendered, one a cascade.
     pub shadow_maps: u64,
     /// Pipelines made.
@@ -52,9 +68,10 @@ pub struct Work {
 
 /// A driver that renders a scene and hands over what its fragments sampled.
 ///
-/// A backend owns the uploaded scene. It renders one region of one view at a time, so that the
-/// memory for records stays bounded however large the frame; regions of a view may be rendered in
-/// any order and need not be disjoint in time.
+/// A backend owns the uploaded scene. It renders one region of one layer at a time, so that the
+/// memory for records stays bounded however large the frame; regions of a layer may be rendered in
+/// any order and need not be disjoint in time. Each layer of a frame has a target of its own, from
+/// which the pictures are composed.
 pub trait CaptureBackend {
     /// `lavapipe` or `osmesa`.
     fn name(&self) -> &'static str;
@@ -74,7 +91,7 @@ pub trait CaptureBackend {
     /// Driver errors.
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError>;
 
-    /// Renders a region of a view into the view's picture and, where there is a `sink`, hands it
+    /// Renders a region of a layer into the layer's target and, where there is a `sink`, hands it
     /// every record of the region (see [`record::Capturer::capture`]).
     ///
     /// # Errors
@@ -87,9 +104,16 @@ pub trait CaptureBackend {
         sink: Option<&mut Sink<'_>>,
     ) -> Result<Captured, RasterError>;
 
-    /// Reads the picture that the regions since have filled: sRGB RGBA8, row by row.
+    /// Makes the frame's pictures from its layers, all of whose regions have been rendered; those
+    /// that are layers are there already.
     ///
     /// # Errors
     /// Driver errors.
-    fn picture(&mut self) -> Result<Vec<u8>, RasterError>;
+    fn compose(&mut self, frame: &Frame) -> Result<(), RasterError>;
+
+    /// Reads one of the frame's pictures, which have been composed: sRGB RGBA8, row by row.
+    ///
+    /// # Errors
+    /// Driver errors.
+    fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError>;
 }

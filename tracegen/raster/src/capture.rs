@@ -7,10 +7,11 @@ use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
-use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
+use formats::view::{Eye, FrameViews, Hmd, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
+use techniques::{FramePlan, Layer, Settings};
 
 /// What to capture, the same for plain rendering and capture.
 pub struct CaptureJob<'a> {
@@ -22,29 +23,34 @@ pub struct CaptureJob<'a> {
     pub bounds: (glam::Vec3, glam::Vec3),
     /// Distances from the head that the cascades span, metres.
     pub shadow_range_m: [f32; 2],
-    /// Pixels of one view.
-    pub size_px: [u32; 2],
-    /// The views of each frame, in the order of their passes.
-    pub views: &'a [Eye],
+    /// The display.
+    pub hmd: &'a Hmd,
+    /// The eyes whose pictures each frame has, in their order.
+    pub eyes: &'a [Eye],
+    /// What is left out or done more coarsely.
+    pub settings: &'a Settings,
 }
 
-/// The pictures of one frame, one a view: sRGB RGBA8.
+/// The pictures of one frame, one an eye: sRGB RGBA8.
 pub type Pictures = Vec<Vec<u8>>;
 
 impl CaptureJob<'_> {
-    /// Passes of `frames` frames in the order in which [`Self::capture_frame`] writes them.
+    /// How a frame is rendered.
     #[must_use]
-    pub fn passes(&self, frames: u32) -> Vec<Pass> {
-        let pass = |frame, eye| Pass {
-            frame,
-            kind: PassKind::Main,
-            eye: Some(eye),
-            size_px: self.size_px,
-            tiles: self.size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
+    pub fn plan(&self, views: &FrameViews) -> FramePlan {
+        FramePlan::new(self.settings, self.hmd, self.eyes, views)
+    }
+
+    /// Passes of the frames in the order in which [`Self::capture_frame`] writes them.
+    #[must_use]
+    pub fn passes(&self, frames: &[FrameViews]) -> Vec<Pass> {
+        let of_frame = |views: &FrameViews| {
+            let (plan, frame) = (self.plan(views), views.frame);
+            plan.layers
+                .into_iter()
+                .map(move |layer| pass(frame, &layer))
         };
-        (0..frames)
-            .flat_map(|frame| self.views.iter().map(move |eye| pass(frame, *eye)))
-            .collect()
+        frames.iter().flat_map(of_frame).collect()
     }
 
     /// The recorder of this job's passes; `tables` are the trace's.
@@ -55,7 +61,7 @@ impl CaptureJob<'_> {
     }
 
     /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds what each
-    /// view may see.
+    /// layer may see.
     #[must_use]
     pub fn frame(&self, views: &FrameViews) -> Frame {
         let mut lighting = self.lighting.clone();
@@ -68,10 +74,7 @@ impl CaptureJob<'_> {
             near,
             far,
         );
-        let eyes: Vec<_> = (self.views.iter())
-            .map(|eye| views.eyes[*eye as usize])
-            .collect();
-        Frame::new(self.draws, lighting, &eyes)
+        Frame::new(self.draws, lighting, self.plan(views))
     }
 
     /// Renders the frame's shadow maps: once for all its pictures.
@@ -98,19 +101,19 @@ impl CaptureJob<'_> {
         backend: &mut dyn CaptureBackend,
         frame: &Frame,
     ) -> Result<(), RasterError> {
-        let corner = Region {
-            origin_px: [0, 0],
-            size_px: self.size_px.map(|s| s.min(TILE_SIZE_PX)),
-        };
         for view in frame.views() {
+            let corner = Region {
+                origin_px: [0, 0],
+                size_px: view.layer.size_px.map(|s| s.min(TILE_SIZE_PX)),
+            };
             backend.render(self.draws, &view, corner, None)?;
             backend.render(self.draws, &view, corner, Some(&mut |_| Ok(())))?;
         }
-        Ok(())
+        backend.compose(frame)
     }
 
-    /// Renders a frame without capture: every view, pictures read back. The frame's shadow maps
-    /// have been rendered.
+    /// Renders a frame without capture: every layer, pictures composed and read back. The frame's
+    /// shadow maps have been rendered.
     ///
     /// # Errors
     /// Driver errors.
@@ -120,22 +123,19 @@ impl CaptureJob<'_> {
         frame: &Frame,
     ) -> Result<(Pictures, Duration), RasterError> {
         let start = Instant::now();
-        let whole = Region {
-            origin_px: [0, 0],
-            size_px: self.size_px,
-        };
-        let pictures = frame
-            .views()
-            .map(|view| {
-                backend.render(self.draws, &view, whole, None)?;
-                backend.picture()
-            })
-            .collect::<Result<_, _>>()?;
+        for view in frame.views() {
+            let whole = Region {
+                origin_px: [0, 0],
+                size_px: view.layer.size_px,
+            };
+            backend.render(self.draws, &view, whole, None)?;
+        }
+        let pictures = pictures(backend, frame)?;
         Ok((pictures, start.elapsed()))
     }
 
     /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the
-    /// number of the first view's pass. The frame's shadow maps have been rendered. The time is
+    /// number of the first layer's pass. The frame's shadow maps have been rendered. The time is
     /// what sorting, encoding and writing took.
     ///
     /// # Errors
@@ -148,7 +148,6 @@ impl CaptureJob<'_> {
         recorder: &mut Recorder<'_>,
         writer: &mut TextraceWriter<W>,
     ) -> Result<(Pictures, CaptureCounts, Duration), RasterError> {
-        let mut pictures = Pictures::new();
         let mut counts = CaptureCounts::default();
         let mut sorting = Duration::ZERO;
         for (pass, view) in (first_pass..).zip(frame.views()) {
@@ -156,23 +155,39 @@ impl CaptureJob<'_> {
                 backend: &mut *backend,
                 draws: self.draws,
                 view,
-                size_px: self.size_px,
             };
             let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
             counts += recorded.counts;
             sorting += recorded.sorting;
-            pictures.push(backend.picture()?);
         }
-        Ok((pictures, counts, sorting))
+        Ok((pictures(backend, frame)?, counts, sorting))
     }
 }
 
-/// One view on a backend.
+/// The pass that a layer of a frame is written as.
+fn pass(frame: u32, layer: &Layer) -> Pass {
+    Pass {
+        frame,
+        kind: PassKind::Main,
+        eye: layer.eye,
+        size_px: layer.size_px,
+        tiles: layer.size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
+    }
+}
+
+/// Composes a frame's pictures and reads them back.
+fn pictures(backend: &mut dyn CaptureBackend, frame: &Frame) -> Result<Pictures, RasterError> {
+    backend.compose(frame)?;
+    (0..frame.plan.pictures.len())
+        .map(|number| backend.picture(frame, number))
+        .collect()
+}
+
+/// One layer on a backend.
 struct ViewCapturer<'a> {
     backend: &'a mut dyn CaptureBackend,
     draws: &'a DrawList,
     view: View<'a>,
-    size_px: [u32; 2],
 }
 
 impl Capturer for ViewCapturer<'_> {
@@ -183,8 +198,8 @@ impl Capturer for ViewCapturer<'_> {
     }
 
     fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, RasterError> {
-        // A part of the view needs only the draws that may touch it.
-        let touching = self.draws.touching(&self.view, region, self.size_px);
+        // A part of the layer needs only the draws that may touch it.
+        let touching = self.draws.touching(&self.view, region);
         let view = View {
             visible: &touching,
             ..self.view

@@ -149,9 +149,10 @@ impl DrawList {
         frustum::visible(self.calls.iter().map(|call| call.bounds), clip_from_world)
     }
 
-    /// The draws of a view that may touch a region of it, ascending; `size_px` is the view's.
+    /// The draws of a layer that may touch a region of it, ascending.
     #[must_use]
-    pub(crate) fn touching(&self, view: &View<'_>, region: Region, size_px: [u32; 2]) -> Vec<u32> {
+    pub(crate) fn touching(&self, view: &View<'_>, region: Region) -> Vec<u32> {
+        let size_px = view.layer.size_px;
         if region.size_px == size_px {
             return view.visible.to_vec();
         }

@@ -10,6 +10,14 @@ pub enum RasterError {
         "no lavapipe (Mesa's CPU Vulkan driver) found{0}; install it with: apt-get install mesa-vulkan-drivers libvulkan1"
     )]
     NoDriver(String),
+    /// No adapter of that name.
+    #[error("no adapter '{wanted}': expected a part of one of these names: {known}")]
+    NoAdapter {
+        /// As asked.
+        wanted: String,
+        /// Those present.
+        known: String,
+    },
     /// A driver that lacks what the capture needs.
     #[error("{driver} lacks {what}")]
     Unsupported {

@@ -1,44 +1,62 @@
-//! What one frame draws: its light, its views, and which draws enter each of them.
+//! What one frame draws: its light, its layers, and which draws enter each of them.
 
 use super::backend::{View, clip_from_world};
-use super::draws::DrawList;
+use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
-use formats::view::EyeView;
+use techniques::{FramePlan, Stage};
 
-/// One frame, ready to be drawn. Views are a list: one eye, two, or more.
+/// One frame, ready to be drawn.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// Lights, with the shadow cascades fitted to the frame.
     pub lighting: Lighting,
     /// Draws that each shadow cascade may see.
     pub casters: Vec<Vec<u32>>,
-    /// Camera of each view and the draws that it may see.
-    views: Vec<(EyeView, Vec<u32>)>,
+    /// The layers, and how the pictures come of them.
+    pub plan: FramePlan,
+    /// Draws that each layer may see.
+    visible: Vec<Vec<u32>>,
 }
 
 impl Frame {
-    /// Finds the draws that each of `views` and each of the lighting's cascades may see.
+    /// Finds the draws that each of the plan's layers and each of the lighting's cascades may see.
     #[must_use]
-    pub fn new(draws: &DrawList, lighting: Lighting, views: &[EyeView]) -> Self {
+    pub fn new(draws: &DrawList, lighting: Lighting, plan: FramePlan) -> Self {
         let casters = (lighting.cascades.iter())
             .map(|cascade| draws.visible(cascade.clip_from_world))
             .collect();
-        let views = (views.iter())
-            .map(|eye| (*eye, draws.visible(clip_from_world(eye))))
+        let visible = (plan.layers.iter())
+            .map(|layer| {
+                let mut visible = draws.visible(clip_from_world(&layer.view));
+                visible.retain(|&draw| enters(layer.draws, draws.calls[draw as usize].mode));
+                visible
+            })
             .collect();
         Self {
             lighting,
             casters,
-            views,
+            plan,
+            visible,
         }
     }
 
-    /// The views in their order.
+    /// The layers in their order, each with its draws.
     pub fn views(&self) -> impl Iterator<Item = View<'_>> {
-        self.views.iter().map(|(eye, visible)| View {
-            eye: *eye,
+        let layers = self.plan.layers.iter().zip(&self.visible).enumerate();
+        layers.map(|(target, (layer, visible))| View {
+            target,
+            layer,
             lighting: &self.lighting,
             visible,
         })
+    }
+}
+
+/// Whether draws of a mode belong to a stage.
+fn enters(stage: Stage, mode: DrawMode) -> bool {
+    match stage {
+        Stage::All => true,
+        Stage::Opaque => mode != DrawMode::Blended,
+        Stage::Transparent => mode == DrawMode::Blended,
     }
 }

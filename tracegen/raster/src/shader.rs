@@ -24,9 +24,12 @@ pub(crate) const TEXTURES_BINDING: u32 = 1;
 /// First of the sampler bindings in group 1, in the order of the textures.
 pub(crate) const SAMPLERS_BINDING: u32 = TEXTURES_BINDING + MATERIAL_TEXTURES as u32;
 
-/// The whole WGSL module.
-pub(crate) fn source() -> String {
-    let mut text = String::from("enable primitive_index;\n\n");
+/// The whole WGSL module, with what records where the device can capture.
+pub(crate) fn source(captures: bool) -> String {
+    let mut text = String::new();
+    if captures {
+        text += "enable primitive_index;\n\n";
+    }
     let mut constant = |name: &str, value: u64| {
         text += &format!("const {name}: u32 = {value}u;\n");
     };
@@ -49,9 +52,18 @@ pub(crate) fn source() -> String {
     for (number, [x, y]) in SHADOW_TAPS.iter().enumerate() {
         text += &format!("const SHADOW_TAP_{number}: vec2<i32> = vec2<i32>({x}, {y});\n");
     }
+    let recording = if captures {
+        concat!(
+            include_str!("shaders/recording.wgsl"),
+            "\n",
+            include_str!("shaders/capturing.wgsl")
+        )
+    } else {
+        include_str!("shaders/plain.wgsl")
+    };
     for part in [
         include_str!("shaders/interface.wgsl"),
-        include_str!("shaders/recording.wgsl"),
+        recording,
         include_str!("shaders/shading.wgsl"),
         include_str!("shaders/passes.wgsl"),
     ] {

@@ -321,7 +321,7 @@ fn streams(scene: &scene::Scene, soup: &Soup, bvh: &Bvh, size: u32) -> anyhow::R
     display.eye_size_px = size_px;
     display.fov = [hmd::symmetric(100.0, size_px); 2];
     let camera = cameras::find(scene, None)?;
-    let frames = cameras::frame_views(camera, &display, 1)?;
+    let frames = cameras::still_frame(camera, &display)?;
     let origin = soup.origin.to_array();
     let to_light = scene
         .lights

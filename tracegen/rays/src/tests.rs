@@ -135,7 +135,7 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
     let mut display = hmd::preset("symmetric-100").expect("a preset");
     display.eye_size_px = size_px;
     display.fov = [hmd::symmetric(90.0, size_px); 2];
-    let frames = cameras::frame_views(&camera, &display, 1).expect("views");
+    let frames = cameras::still_frame(&camera, &display).expect("views");
     let origin = scene.soup.origin.to_array();
     let eyes = std::array::from_fn(|e| {
         EyeCamera::new(&frames[0].eyes[e], display.fov[e], size_px, origin)

@@ -1,4 +1,4 @@
-//! The scene that every loader fills and every renderer reads: model, loaders, cameras, displays.
+//! The scene that every loader fills and every renderer reads: model, loaders, cameras, paths, displays.
 
 pub mod cameras;
 mod error;
@@ -13,6 +13,7 @@ mod load;
 mod model;
 mod obj;
 mod options;
+pub mod paths;
 #[cfg(test)]
 mod real_scenes;
 pub mod srgb;

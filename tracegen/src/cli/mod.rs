@@ -1,6 +1,7 @@
 //! The command line, one file a subcommand.
 
 mod cache_args;
+pub mod path_args;
 pub mod raster;
 pub mod rays;
 pub mod scene_args;

@@ -1,6 +1,7 @@
 //! `tracegen raster`.
 
 use super::cache_args::CacheArgs;
+use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::picture;
 use anyhow::{Context, ensure};
@@ -17,12 +18,11 @@ use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use techniques::Settings;
 use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;
-/// Most frames of a camera path.
-const MAX_FRAMES: i64 = 10_000;
 
 /// Arguments of `tracegen raster`.
 #[derive(Args, Debug)]
@@ -35,9 +35,11 @@ pub struct RasterArgs {
     /// Picture of all views side by side.
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
-    /// Frames along a slow walk: 0.4 m/s ahead with a sideways sway of 5 cm, at 72 frames a second.
+    #[command(flatten)]
+    path: PathArgs,
+    /// Frames along the path.
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Camera",
-          value_parser = clap::value_parser!(u32).range(1..=MAX_FRAMES))]
+          value_parser = frame_count())]
     frames: u32,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
@@ -91,7 +93,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let started = Instant::now();
     let cache = args.cache.open()?;
     let progress = Progress::new("loading the scene", 0, "");
-    let setup = args.scene.setup(None, args.frames, &LoadOptions::ALL)?;
+    let setup = args
+        .scene
+        .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
     let loaded = started.elapsed();
     let cascades = if args.shadows {
         CASCADES
@@ -102,13 +106,15 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
+    let settings = Settings::default();
     let job = CaptureJob {
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
         shadow_range_m: shadow_range_m(&setup, bounds),
-        size_px,
-        views: args.views.eyes(),
+        hmd: &setup.hmd,
+        eyes: args.views.eyes(),
+        settings: &settings,
     };
     let seen = job.seen_images(&setup.scene, &setup.frames);
     let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache.as_ref())?;
@@ -117,7 +123,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         shell::warn(note);
     }
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
-    let passes = job.passes(setup.frames.len() as u32);
+    let passes = job.passes(&setup.frames);
     let tables = tables(
         &setup,
         &args.scene.scene,
@@ -150,7 +156,8 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
 
     let mut writer = TextraceWriter::create(&args.output, &tables)?;
     let mut first_pictures: Option<Pictures> = None;
-    for (number, views) in setup.frames.iter().enumerate() {
+    let mut first_pass = 0;
+    for views in &setup.frames {
         let frame = match first.take() {
             Some(first) => first,
             None => {
@@ -167,9 +174,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
             Some(pictures)
         };
         let start = Instant::now();
-        let first_pass = number * job.views.len();
         let (pictures, counts, sorting) =
             job.capture_frame(&mut backend, &frame, first_pass, &mut recorder, &mut writer)?;
+        first_pass += frame.plan.layers.len();
         summary.sorting += sorting;
         summary.captured += start.elapsed();
         summary.counts += counts;
@@ -202,7 +209,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
-    let views = [setup.frames.len(), job.views.len()];
+    let views = [setup.frames.len(), job.eyes.len()];
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
 }

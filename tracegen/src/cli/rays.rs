@@ -1,5 +1,6 @@
 //! `tracegen rays`.
 
+use super::path_args::PathArgs;
 use super::scene_args::{SceneArgs, SceneSetup};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -13,6 +14,7 @@ use rays::picture;
 use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
 use scene::LoadOptions;
+use scene::paths::MAX_FRAMES;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -28,6 +30,12 @@ pub struct RaysArgs {
     /// The trace to write.
     #[arg(short, long, value_name = "FILE.raytrace")]
     output: PathBuf,
+    #[command(flatten)]
+    path: PathArgs,
+    /// Number of the path's frame that is traced.
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Camera",
+          value_parser = clap::value_parser!(u32).range(0..i64::from(MAX_FRAMES)))]
+    frame: u32,
     /// Also write both eyes' pictures, side by side.
     #[arg(long, value_name = "FILE.png")]
     image: Option<PathBuf>,
@@ -72,7 +80,10 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
         // Base colour, metallic-roughness and emissive: what rays look at.
         slots: [true, false, true, false, false, true],
     };
-    let setup = args.scene.setup(Some(DEFAULT_SIZE_PX), 1, &textures)?;
+    let setup = {
+        let frames = args.frame..args.frame + 1;
+        (args.scene).setup(Some(DEFAULT_SIZE_PX), &args.path, frames, &textures)?
+    };
     let loaded = start.elapsed();
     progress.stage("building the hierarchy", 0, "");
     let (camera, bounds) = (

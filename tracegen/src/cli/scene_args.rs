@@ -1,11 +1,13 @@
 //! Flags that say what is looked at, from where and through which display.
 
+use super::path_args::PathArgs;
 use clap::Args;
 use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::Vec3;
 use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd};
 use scenes::load_with;
 use shell::Output;
+use std::ops::Range;
 use std::path::Path;
 
 /// Scene, camera and display of a capture.
@@ -27,7 +29,7 @@ pub struct SceneArgs {
 pub struct SceneSetup {
     /// The scene.
     pub scene: Scene,
-    /// The head's pose in frame 0.
+    /// The pose that the head's path leaves from.
     pub camera: Camera,
     /// The display.
     pub hmd: Hmd,
@@ -51,20 +53,22 @@ impl SceneArgs {
 
     /// Loads the scene (its warnings go to stderr) and works out the views.
     ///
-    /// `default_size_px` is the eye size where neither `--size` nor `--hmd` is given; the path has
-    /// `frames` frames.
+    /// `default_size_px` is the eye size where neither `--size` nor `--hmd` is given; `frames` are
+    /// the numbers of the frames along the path.
     ///
     /// # Errors
-    /// Wrong flags, checked first, or an unreadable scene.
+    /// Wrong flags and an unreadable path, checked first, or an unreadable scene.
     pub fn setup(
         &self,
         default_size_px: Option<[u32; 2]>,
-        frames: u32,
+        path: &PathArgs,
+        frames: Range<u32>,
         options: &LoadOptions,
     ) -> anyhow::Result<SceneSetup> {
         // Flags that need no scene are checked before minutes go into loading one.
         self.hmd.resolve(default_size_px, None)?;
         self.camera.validate_alone()?;
+        let (path, moments) = path.open(frames)?;
         let scene = load_scene(&self.scene, options)?;
         let camera = self.camera.resolve(&scene)?;
         let vfov_deg = match self.camera.vfov {
@@ -73,7 +77,9 @@ impl SceneArgs {
             None => None,
         };
         let hmd = self.hmd.resolve(default_size_px, vfov_deg)?;
-        let frames = cameras::frame_views(&camera, &hmd, frames)?;
+        let heads = path.poses(&camera, &moments)?;
+        let camera = path.start(&camera)?;
+        let frames = cameras::frame_views(&camera, &hmd, moments.frames.start, &heads);
         Ok(SceneSetup {
             scene,
             camera,
@@ -329,15 +335,20 @@ mod tests {
     struct Cli {
         #[command(flatten)]
         args: SceneArgs,
+        #[command(flatten)]
+        path: PathArgs,
     }
 
     fn parse(flags: &str) -> Result<SceneArgs, String> {
+        parse_all(flags).map(|cli| cli.args)
+    }
+
+    fn parse_all(flags: &str) -> Result<Cli, String> {
         Cli::try_parse_from(
             ["test", "scene"]
                 .into_iter()
                 .chain(flags.split_whitespace()),
         )
-        .map(|cli| cli.args)
         .map_err(|e| e.to_string())
     }
 
@@ -399,6 +410,13 @@ mod tests {
             ),
             ("--fov-tangents 1,2,3", "4 numbers"),
             ("--vfov 60 --hfov 90", "cannot be used with"),
+            (
+                "--path run",
+                "walk, head, FILE.csv or FILE.gltf[#CAMERA], found 'run'",
+            ),
+            ("--path a.gltf#", "found 'a.gltf#'"),
+            ("--fps 0", "0.01 to 10000"),
+            ("--fps nan", "0.01 to 10000"),
         ] {
             let error = parse(flags).expect_err(flags);
             assert!(error.contains(part), "{flags}: {error}");
@@ -415,10 +433,12 @@ mod tests {
             ("--cant 60", "-45 to 45"),
             ("--hmd rift", "rift"),
             ("--eye 1,1,1 --target 1,1,1", "away from the eye"),
+            ("--path no-such.csv", "no-such.csv: path: cannot read"),
+            ("--path no-such.gltf#a", "no-such.gltf: path: cannot read"),
         ] {
-            let args = parse(flags).unwrap();
+            let Cli { args, path } = parse_all(flags).unwrap();
             let error = args
-                .setup(None, 1, &LoadOptions::ALL)
+                .setup(None, &path, 0..1, &LoadOptions::ALL)
                 .unwrap_err()
                 .to_string();
             assert!(error.contains(part), "{flags}: {error}");

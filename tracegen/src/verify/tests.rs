@@ -10,9 +10,10 @@ use raster::backend::{CaptureBackend, View, Work};
 use raster::capture::CaptureJob;
 use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
-use raster::lavapipe::Lavapipe;
+use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
+use techniques::{Layer, Settings};
 use textures::TextureSet;
 
 const SIZE_PX: [u32; 2] = [200, 136];
@@ -40,7 +41,7 @@ fn display(size_px: [u32; 2]) -> Hmd {
 }
 
 fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
-    cameras::frame_views(&scene.cameras[0], &display(size_px), 1)
+    cameras::still_frame(&scene.cameras[0], &display(size_px))
         .unwrap()
         .remove(0)
 }
@@ -48,16 +49,18 @@ fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
 fn job<'a>(
     scene: &Scene,
     draws: &'a DrawList,
-    size_px: [u32; 2],
-    views: &'a [Eye],
+    hmd: &'a Hmd,
+    eyes: &'a [Eye],
+    settings: &'a Settings,
 ) -> CaptureJob<'a> {
     CaptureJob {
         draws,
         lighting: Lighting::new(scene),
         bounds: scene.bounds().unwrap_or_default(),
         shadow_range_m: [0.1, 40.0],
-        size_px,
-        views,
+        hmd,
+        eyes,
+        settings,
     }
 }
 
@@ -79,7 +82,8 @@ fn try_capture(
     let set = TextureSet::compress(scene).unwrap();
     let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
     let views = views(scene, size_px);
-    let job = job(scene, &draws, size_px, eyes);
+    let (hmd, settings) = (display(size_px), Settings::default());
+    let job = job(scene, &draws, &hmd, eyes, &settings);
     let textures = draws.textures(&set);
     let (samplers, draw_table) = draws.tables(scene, &set, &textures);
     let tables = Tables {
@@ -92,13 +96,13 @@ fn try_capture(
             backend: "lavapipe".into(),
             driver: backend.driver().into(),
             seed: 0,
-            hmd: display(size_px),
+            hmd: hmd.clone(),
             frames: vec![views.clone()],
         },
         textures,
         samplers,
         draws: draw_table,
-        passes: job.passes(1),
+        passes: job.passes(std::slice::from_ref(&views)),
     };
     let frame = job.frame(&views);
     job.light(&mut backend, &frame)?;
@@ -152,7 +156,8 @@ fn agreement(
     let size_px = captured.tables.passes[pass].size_px;
     let lighting = Lighting::new(scene);
     let view = View {
-        eye: views(scene, size_px).eyes[pass],
+        target: pass,
+        layer: &Layer::whole(BOTH[pass], views(scene, size_px).eyes[pass], size_px),
         lighting: &lighting,
         visible: &[],
     };
@@ -475,7 +480,8 @@ fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
     let lighting = Lighting::new(&scene);
     for pass in 0..2 {
         let view = View {
-            eye: views(&scene, SIZE_PX).eyes[pass],
+            target: pass,
+            layer: &Layer::whole(BOTH[pass], views(&scene, SIZE_PX).eyes[pass], SIZE_PX),
             lighting: &lighting,
             visible: &[],
         };
@@ -601,4 +607,31 @@ fn vertex_colours_show_and_mask_as_the_same_base_colour_does() {
         }
         assert!(vertex.pictures != plain.pictures, "{alpha:?}");
     }
+}
+
+#[test]
+fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture() {
+    let materials = vec![
+        textured(AlphaMode::Opaque, true),
+        textured(AlphaMode::Mask(0.5), true),
+        textured(AlphaMode::Blend, true),
+    ];
+    let meshes = (0..3).map(|m| triangles(60, 71 + m as u32, m)).collect();
+    let scene = scene(meshes, materials, vec![checker()]);
+    let captured = capture(&scene, SIZE_PX, 1, BUDGET);
+    let draws = DrawList::new(&scene, 1).unwrap();
+    let set = TextureSet::compress(&scene).unwrap();
+    let mut gpu = device::open(None).unwrap_or_else(|e| panic!("{e}"));
+    gpu.no_capture = Some("what the test took away".into());
+    let mut backend = Lavapipe::on(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
+    let (hmd, settings) = (display(SIZE_PX), Settings::default());
+    let job = job(&scene, &draws, &hmd, BOTH, &settings);
+    let frame = job.frame(&views(&scene, SIZE_PX));
+    job.light(&mut backend, &frame).unwrap();
+    let (pictures, _) = job.plain_frame(&mut backend, &frame).unwrap();
+    assert!(pictures == captured.pictures);
+    let work = backend.work();
+    assert!(work.state_changes > 0 && work.triangles >= 2 * 180 && work.vertices >= 2 * 180);
+    let refused = job.warm_up(&mut backend, &frame).unwrap_err().to_string();
+    assert!(refused.contains("what the test took away"), "{refused}");
 }

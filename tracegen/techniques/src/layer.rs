@@ -21,6 +21,21 @@ pub struct Layer {
     pub draws: Stage,
 }
 
+impl Layer {
+    /// The whole picture of an eye at its full size.
+    #[must_use]
+    pub fn whole(eye: Eye, view: EyeView, size_px: [u32; 2]) -> Self {
+        Self {
+            eye: Some(eye),
+            number: 0,
+            view,
+            size_px,
+            mask: None,
+            draws: Stage::All,
+        }
+    }
+}
+
 /// A part of a frame's draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stage {

@@ -36,14 +36,17 @@ pub struct FarField {
 
 /// Where the far field begins.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case")]
 pub enum Split {
     /// At this distance.
     Metres(f32),
     /// Where a point is off by at most so many pixels.
     Pixels(f32),
-    /// Where a frame costs least.
-    LeastWork,
+    /// Where a frame costs least, no point being off by more than so many pixels.
+    LeastWork {
+        /// As for `pixels`.
+        within_px: f32,
+    },
 }
 
 /// How both eyes get the picture of the far field.
@@ -133,8 +136,7 @@ impl FarField {
     fn check(&self) -> Result<(), SettingsError> {
         let ok = match self.split {
             Split::Metres(m) => m.is_finite() && m > 0.0,
-            Split::Pixels(px) => px.is_finite() && px > 0.0,
-            Split::LeastWork => true,
+            Split::Pixels(px) | Split::LeastWork { within_px: px } => px.is_finite() && px > 0.0,
         };
         if ok {
             return Ok(());

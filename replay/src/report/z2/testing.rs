@@ -2,6 +2,7 @@
 
 use super::model::PaperReport;
 use crate::config::RunConfig;
+use crate::engine::Work;
 use crate::experiment::{Outcome, Plan, Subject};
 use crate::paper::z2;
 use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap, TmuResult, TraceId};
@@ -42,7 +43,10 @@ pub(crate) fn with_edited<T>(
         }
     }
     check(&PaperReport::new(&Outcome::new(
-        &plan, &subjects, results, 0,
+        &plan,
+        &subjects,
+        results,
+        Work::default(),
     )))
 }
 

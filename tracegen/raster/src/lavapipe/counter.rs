@@ -28,7 +28,7 @@ impl Lavapipe {
         );
         let every: Vec<u32> = (0..draws.calls.len() as u32).collect();
         let plan = self.plan(draws, &every, Purpose::Count)?;
-        let [width, height] = self.targets.size_px;
+        let [width, height] = view.layer.size_px;
         let size = wgpu::Extent3d {
             width,
             height,
@@ -55,10 +55,10 @@ impl Lavapipe {
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let data = ViewData::of_eye(view, self.targets.capacity);
+        let data = ViewData::of_eye(view, self.buffers.capacity);
         self.gpu
             .queue
-            .write_buffer(&self.targets.view_uniform, 0, bytemuck::bytes_of(&data));
+            .write_buffer(&self.buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let (count_view, depth_view) = (
             counts.create_view(&Default::default()),

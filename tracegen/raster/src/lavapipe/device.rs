@@ -1,4 +1,4 @@
-//! Finds Mesa's CPU Vulkan driver and opens it.
+//! Finds a Vulkan device and opens it: Mesa's CPU driver, which captures, or one by name.
 
 use crate::error::RasterError;
 
@@ -10,17 +10,31 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Driver string as it names itself.
     pub driver: String,
+    /// It runs on the processor.
+    pub is_software: bool,
+    /// What it lacks for captures; without it only pictures can be rendered.
+    pub no_capture: Option<String>,
 }
 
 /// Lanes of a subgroup at llvmpipe's native 256-bit vectors: two quads. At 128 bits its ballot
 /// corrupts memory (Mesa 22.3), so any other size is refused.
 const SUBGROUP_LANES: u32 = 8;
 
-/// Opens the llvmpipe adapter.
+/// What the capture asks of a device, beyond [`SUBGROUP_LANES`].
+const CAPTURE_FEATURES: wgpu::Features = wgpu::Features::PRIMITIVE_INDEX
+    .union(wgpu::Features::SHADER_EARLY_DEPTH_TEST)
+    .union(wgpu::Features::SUBGROUP)
+    .union(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
+/// What every picture asks of it.
+const PICTURE_FEATURES: wgpu::Features = wgpu::Features::TEXTURE_COMPRESSION_BC;
+
+/// Opens an adapter: the first whose name contains `wanted`, whatever the case; llvmpipe, which
+/// has to be able to capture, where none is asked for.
 ///
 /// # Errors
-/// [`RasterError::NoDriver`] with the packages to install, or [`RasterError::Unsupported`].
-pub fn open() -> Result<Gpu, RasterError> {
+/// [`RasterError::NoDriver`] with the packages to install, [`RasterError::NoAdapter`] with the
+/// names of those present, or [`RasterError::Unsupported`].
+pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: wgpu::Backends::VULKAN,
         flags: wgpu::InstanceFlags::empty(),
@@ -28,43 +42,49 @@ pub fn open() -> Result<Gpu, RasterError> {
     });
     let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
     let infos: Vec<wgpu::AdapterInfo> = adapters.iter().map(wgpu::Adapter::get_info).collect();
-    let chosen = infos.iter().position(|info| {
-        info.device_type == wgpu::DeviceType::Cpu && info.name.contains("llvmpipe")
-    });
-    let (Some(adapter), Some(info)) = (
-        chosen.and_then(|i| adapters.get(i)),
-        chosen.and_then(|i| infos.get(i)),
-    ) else {
-        let others: Vec<&str> = infos.iter().map(|i| i.name.as_str()).collect();
-        return Err(RasterError::NoDriver(if others.is_empty() {
-            String::new()
-        } else {
-            format!(" (only: {})", others.join(", "))
-        }));
+    let names: Vec<&str> = infos.iter().map(|i| i.name.as_str()).collect();
+    let chosen = match wanted {
+        Some(wanted) => named(&names, wanted).ok_or_else(|| RasterError::NoAdapter {
+            wanted: wanted.to_owned(),
+            known: names.join(", "),
+        })?,
+        None => (infos.iter())
+            .position(|i| i.device_type == wgpu::DeviceType::Cpu && i.name.contains("llvmpipe"))
+            .ok_or_else(|| {
+                RasterError::NoDriver(if names.is_empty() {
+                    String::new()
+                } else {
+                    format!(" (only: {})", names.join(", "))
+                })
+            })?,
     };
+    let (adapter, info) = (&adapters[chosen], &infos[chosen]);
     let driver = format!("{} {} ({})", info.driver, info.driver_info, info.name);
-    let unsupported = |what: String| RasterError::Unsupported {
-        driver: driver.clone(),
-        what,
+    let missing = (PICTURE_FEATURES | CAPTURE_FEATURES) - adapter.features();
+    let lanes = (info.subgroup_min_size, info.subgroup_max_size);
+    let no_capture = if !missing.is_empty() {
+        Some(format!("{missing:?}"))
+    } else if lanes != (SUBGROUP_LANES, SUBGROUP_LANES) {
+        Some(format!(
+            "subgroups of {SUBGROUP_LANES} lanes (it has {} to {}): the capture needs 256-bit vectors, that is llvmpipe on a CPU with AVX and LP_NATIVE_VECTOR_WIDTH unset",
+            lanes.0, lanes.1
+        ))
+    } else {
+        None
     };
-    if (info.subgroup_min_size, info.subgroup_max_size) != (SUBGROUP_LANES, SUBGROUP_LANES) {
-        return Err(unsupported(format!(
-            "subgroups of {SUBGROUP_LANES} lanes (it has {} to {}): the capture needs 256-bit vectors, that is a CPU with AVX and LP_NATIVE_VECTOR_WIDTH unset",
-            info.subgroup_min_size, info.subgroup_max_size
-        )));
-    }
-    let required_features = wgpu::Features::PRIMITIVE_INDEX
-        | wgpu::Features::SHADER_EARLY_DEPTH_TEST
-        | wgpu::Features::SUBGROUP
-        | wgpu::Features::TEXTURE_COMPRESSION_BC
-        | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
-    let missing = required_features - adapter.features();
-    if !missing.is_empty() {
-        return Err(unsupported(format!("{missing:?}")));
+    let no_picture = missing.intersects(PICTURE_FEATURES);
+    if let Some(what) = no_capture
+        .as_ref()
+        .filter(|_| wanted.is_none() || no_picture)
+    {
+        return Err(RasterError::Unsupported {
+            driver,
+            what: what.clone(),
+        });
     }
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         label: None,
-        required_features,
+        required_features: (PICTURE_FEATURES | CAPTURE_FEATURES) - missing,
         required_limits: adapter.limits(),
         experimental_features: wgpu::ExperimentalFeatures::disabled(),
         memory_hints: wgpu::MemoryHints::MemoryUsage,
@@ -78,7 +98,15 @@ pub fn open() -> Result<Gpu, RasterError> {
         device,
         queue,
         driver,
+        is_software: info.device_type == wgpu::DeviceType::Cpu,
+        no_capture,
     })
+}
+
+/// Position of the first name that contains `wanted`, whatever the case.
+fn named(names: &[&str], wanted: &str) -> Option<usize> {
+    let wanted = wanted.to_lowercase();
+    (names.iter()).position(|name| name.to_lowercase().contains(&wanted))
 }
 
 impl Gpu {
@@ -152,5 +180,28 @@ impl Gpu {
         };
         buffer.unmap();
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_adapter_is_found_by_a_part_of_its_name_whatever_the_case() {
+        let names = ["NVIDIA H200", "llvmpipe (LLVM 15.0.6, 256 bits)"];
+        assert_eq!(named(&names, "nvidia"), Some(0));
+        assert_eq!(named(&names, "LLVM"), Some(1));
+        assert_eq!(named(&names, "radeon"), None);
+    }
+
+    #[test]
+    fn an_absent_adapter_is_told_with_those_present() {
+        let Err(error) = open(Some("no such adapter")) else {
+            panic!("opened an adapter that does not exist");
+        };
+        let message = error.to_string();
+        assert!(message.contains("'no such adapter'"), "{message}");
+        assert!(message.contains("llvmpipe"), "{message}");
     }
 }

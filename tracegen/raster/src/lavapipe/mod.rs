@@ -1,8 +1,9 @@
 //! Capture through lavapipe, Mesa's Vulkan driver on llvmpipe.
 
 mod counter;
-mod device;
+pub mod device;
 mod pipelines;
+mod records;
 mod targets;
 mod upload;
 
@@ -17,8 +18,11 @@ use super::uniforms::ViewData;
 use device::Gpu;
 use pipelines::Pipelines;
 use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
+use records::RecordBuffers;
 use scene::Scene;
-use targets::{ShadowMaps, Targets};
+use std::time::Instant;
+use targets::{ColorTarget, LayerTarget, Readback, ShadowMaps};
+use techniques::plan::Picture;
 use textures::TextureSet;
 use upload::SceneBuffers;
 use wgpu::util::DeviceExt;
@@ -28,7 +32,12 @@ pub struct Lavapipe {
     gpu: Gpu,
     pipelines: Pipelines,
     scene: SceneBuffers,
-    targets: Targets,
+    buffers: RecordBuffers,
+    /// What each layer is rendered into, by its position in the frame's plan.
+    layers: Vec<Option<LayerTarget>>,
+    /// What each picture that is not a layer is composed into.
+    composed: Vec<ColorTarget>,
+    readback: Readback,
     shadow_maps: ShadowMaps,
     /// Group 0 for the eyes.
     eye_bindings: wgpu::BindGroup,
@@ -38,8 +47,7 @@ pub struct Lavapipe {
 }
 
 impl Lavapipe {
-    /// Opens the driver and uploads the scene. Regions may produce `record_budget_bytes` of raw
-    /// records before they are split, capped by the driver's limit of 128 MiB.
+    /// Opens lavapipe and uploads the scene, see [`Self::on`].
     ///
     /// # Errors
     /// No driver, unsupported features, sizes beyond its limits.
@@ -50,11 +58,35 @@ impl Lavapipe {
         view_size_px: [u32; 2],
         record_budget_bytes: u64,
     ) -> Result<Self, RasterError> {
-        let gpu = device::open()?;
+        let gpu = device::open(None)?;
+        Self::on(
+            gpu,
+            scene,
+            draws,
+            textures,
+            view_size_px,
+            record_budget_bytes,
+        )
+    }
+
+    /// Uploads the scene to an opened device. Regions may produce `record_budget_bytes` of raw
+    /// records before they are split, capped by the driver's limit of 128 MiB.
+    ///
+    /// # Errors
+    /// Driver errors, sizes beyond the device's limits.
+    pub fn on(
+        gpu: Gpu,
+        scene: &Scene,
+        draws: &DrawList,
+        textures: &TextureSet,
+        view_size_px: [u32; 2],
+        record_budget_bytes: u64,
+    ) -> Result<Self, RasterError> {
         let pipelines = Pipelines::new(&gpu)?;
         let buffers = SceneBuffers::new(&gpu, &pipelines.layouts, scene, draws, textures)?;
         let masked = draws.calls.iter().any(|c| c.mode == DrawMode::Masked);
-        let targets = Targets::new(&gpu, view_size_px, record_budget_bytes, masked)?;
+        targets::check_size(&gpu, view_size_px)?;
+        let record_buffers = RecordBuffers::new(&gpu, record_budget_bytes, masked)?;
         let shadow_maps = gpu.checked("making the shadow maps", || {
             ShadowMaps::new(&gpu, draws.cascades)
         })?;
@@ -62,8 +94,8 @@ impl Lavapipe {
             &gpu,
             &pipelines,
             &buffers,
-            &targets,
-            &targets.view_uniform,
+            &record_buffers,
+            &record_buffers.view_uniform,
             &shadow_maps.sampled,
         );
         let materials = (scene.materials.iter().zip(&draws.groups))
@@ -77,12 +109,35 @@ impl Lavapipe {
             gpu,
             pipelines,
             scene: buffers,
-            targets,
+            buffers: record_buffers,
+            layers: Vec::new(),
+            composed: Vec::new(),
+            readback: Readback::default(),
             shadow_maps,
             eye_bindings,
             materials,
             work,
         })
+    }
+
+    /// The target of a layer that has been prepared.
+    fn target(&self, number: usize) -> Result<&LayerTarget, RasterError> {
+        let target = self.layers.get(number).and_then(Option::as_ref);
+        target.ok_or_else(|| RasterError::Scene(format!("layer {number} has not been rendered")))
+    }
+
+    /// Makes the target of a layer unless the last frame's fits.
+    fn prepare_target(&mut self, view: &View<'_>) -> Result<(), RasterError> {
+        let size_px = view.layer.size_px;
+        let gpu = &self.gpu;
+        if self.layers.len() <= view.target {
+            self.layers.resize_with(view.target + 1, || None);
+        }
+        let target = &mut self.layers[view.target];
+        if (target.as_ref()).is_none_or(|target| target.color.size_px != size_px) {
+            *target = Some(LayerTarget::new(gpu, size_px)?);
+        }
+        Ok(())
     }
 
     /// Batches a list of draws and makes the pipelines that they need and that are not there yet.
@@ -100,7 +155,12 @@ impl Lavapipe {
             for &role in roles(call.mode, purpose) {
                 let key = PipelineKey::new(call, material, role, purpose, draws.cascades);
                 self.pipelines.prepare(&self.gpu, key)?;
-                self.work.draws += u64::from(batch.range.end - batch.range.start);
+                let instances = u64::from(batch.range.end - batch.range.start);
+                if let Some(mesh) = &self.scene.meshes[call.mesh] {
+                    self.work.vertices += instances * u64::from(mesh.vertex_count);
+                    self.work.triangles += instances * u64::from(mesh.index_count / 3);
+                }
+                self.work.draws += instances;
                 self.work.calls += 1;
                 plan.push((batch.clone(), key));
             }
@@ -108,16 +168,18 @@ impl Lavapipe {
         self.gpu
             .queue
             .write_buffer(&self.scene.instance_draws, 0, bytemuck::cast_slice(visible));
+        self.work.bytes_uploaded += size_of_val(visible) as u64;
         Ok(plan)
     }
 
-    /// Issues a plan, setting only the state that changes.
+    /// Issues a plan, setting only the state that changes. Tells how many changes there were.
     fn issue(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         draws: &DrawList,
         plan: &[(Batch, PipelineKey)],
-    ) {
+    ) -> u64 {
+        let mut changes = 0;
         let (mut last_key, mut last_material, mut last_mesh) = (None, None, None);
         pass.set_vertex_buffer(1, self.scene.instance_draws.slice(..));
         for (batch, key) in plan {
@@ -130,9 +192,11 @@ impl Lavapipe {
             };
             if last_key.replace(*key) != Some(*key) {
                 pass.set_pipeline(pipeline);
+                changes += 1;
             }
             if last_material.replace(call.material) != Some(call.material) {
                 pass.set_bind_group(1, &self.scene.materials[call.material], &[]);
+                changes += 1;
             }
             if last_mesh.replace(call.mesh) != Some(call.mesh) {
                 pass.set_vertex_buffer(0, mesh.vertices.slice(..));
@@ -140,9 +204,11 @@ impl Lavapipe {
                     pass.set_vertex_buffer(2, colors.slice(..));
                 }
                 pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+                changes += 1;
             }
             pass.draw_indexed(0..mesh.index_count, 0, batch.range.clone());
         }
+        changes
     }
 }
 
@@ -156,7 +222,7 @@ impl CaptureBackend for Lavapipe {
     }
 
     fn record_capacity(&self) -> u64 {
-        self.targets.capacity.into()
+        self.buffers.capacity.into()
     }
 
     fn work(&self) -> Work {
@@ -189,7 +255,7 @@ impl CaptureBackend for Lavapipe {
                 &self.gpu,
                 &self.pipelines,
                 &self.scene,
-                &self.targets,
+                &self.buffers,
                 &uniform,
                 &stand_in.sampled,
             );
@@ -227,21 +293,30 @@ impl CaptureBackend for Lavapipe {
         } else {
             Purpose::Plain
         };
+        if let (Purpose::Capture, Some(what)) = (purpose, &self.gpu.no_capture) {
+            return Err(RasterError::Unsupported {
+                driver: self.gpu.driver.clone(),
+                what: what.clone(),
+            });
+        }
+        let start = Instant::now();
         let plan = self.plan(draws, view.visible, purpose)?;
+        self.prepare_target(view)?;
         self.work.regions += 1;
+        self.work.bytes_uploaded += size_of::<ViewData>() as u64 + 4;
         let gpu = &self.gpu;
-        let targets = &self.targets;
-        let data = ViewData::of_eye(view, targets.capacity);
+        let (buffers, target) = (&self.buffers, self.target(view.target)?);
+        let data = ViewData::of_eye(view, buffers.capacity);
         gpu.queue
-            .write_buffer(&targets.view_uniform, 0, bytemuck::bytes_of(&data));
-        gpu.queue.write_buffer(&targets.counter, 0, &[0; 4]);
-        gpu.checked("rendering a view", || {
+            .write_buffer(&buffers.view_uniform, 0, bytemuck::bytes_of(&data));
+        gpu.queue.write_buffer(&buffers.counter, 0, &[0; 4]);
+        let changes = gpu.checked("rendering a layer", || {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 // Regions add up to a picture: everything is loaded, and the background clears
                 // what the scissor leaves open.
                 color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &targets.color_view,
+                    view: &target.color.view,
                     depth_slice: None,
                     resolve_target: None,
                     ops: wgpu::Operations {
@@ -250,7 +325,7 @@ impl CaptureBackend for Lavapipe {
                     },
                 })],
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &targets.depth_view,
+                    view: &target.depth_view,
                     depth_ops: Some(wgpu::Operations {
                         load: wgpu::LoadOp::Load,
                         store: wgpu::StoreOp::Store,
@@ -271,32 +346,37 @@ impl CaptureBackend for Lavapipe {
             }
             pass.set_pipeline(&self.pipelines.background);
             pass.draw(0..3, 0..1);
-            self.issue(&mut pass, draws, &plan);
+            let changes = self.issue(&mut pass, draws, &plan);
             drop(pass);
             gpu.queue.submit([encoder.finish()]);
+            changes
         })?;
+        self.work.state_changes += changes;
         let Some(sink) = sink else {
-            gpu.wait("rendering a view")?;
+            let submitted = Instant::now();
+            gpu.wait("rendering a layer")?;
+            self.work.submitting += submitted - start;
+            self.work.waiting += submitted.elapsed();
             return Ok(Captured::Complete);
         };
-        let needed = u64::from(gpu.read(&targets.counter, 0..4, |bytes| {
+        let needed = u64::from(gpu.read(&buffers.counter, 0..4, |bytes| {
             Ok(bytemuck::pod_read_unaligned::<u32>(bytes))
         })?);
-        if needed > u64::from(targets.capacity) {
+        if needed > u64::from(buffers.capacity) {
             return Ok(Captured::Overflow { needed });
         }
         if needed > 0 {
-            let depths = if targets.has_depths {
+            let depths = if buffers.has_depths {
                 needed * DEPTH_BYTES
             } else {
                 0
             };
-            gpu.read(&targets.records, 0..needed * RECORD_BYTES, |quads| {
+            gpu.read(&buffers.records, 0..needed * RECORD_BYTES, |quads| {
                 let quads = records_of(quads)?;
                 if depths == 0 {
                     return Ok(sink(RawRecords { quads, depths: &[] })?);
                 }
-                gpu.read(&targets.depths, 0..depths, |depths| {
+                gpu.read(&buffers.depths, 0..depths, |depths| {
                     let depths = records_of(depths)?;
                     Ok(sink(RawRecords { quads, depths })?)
                 })
@@ -305,8 +385,17 @@ impl CaptureBackend for Lavapipe {
         Ok(Captured::Complete)
     }
 
-    fn picture(&mut self) -> Result<Vec<u8>, RasterError> {
-        self.targets.read_picture(&self.gpu)
+    fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
+        let _ = frame;
+        Ok(())
+    }
+
+    fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {
+        let picture = match frame.plan.pictures[number] {
+            Picture::Layer(layer) => &self.target(layer)?.color,
+            Picture::Composed(_) => &self.composed[number],
+        };
+        picture.read(&self.gpu, &self.readback)
     }
 }
 
@@ -321,7 +410,7 @@ fn bind_view(
     gpu: &Gpu,
     pipelines: &Pipelines,
     scene: &SceneBuffers,
-    targets: &Targets,
+    buffers: &RecordBuffers,
     uniform: &wgpu::Buffer,
     shadow_map: &wgpu::TextureView,
 ) -> wgpu::BindGroup {
@@ -334,11 +423,11 @@ fn bind_view(
     let resources: [_; VIEW_BINDINGS.len()] = [
         uniform.as_entire_binding(),
         scene.instances.as_entire_binding(),
-        targets.counter.as_entire_binding(),
-        targets.records.as_entire_binding(),
+        buffers.counter.as_entire_binding(),
+        buffers.records.as_entire_binding(),
         wgpu::BindingResource::TextureView(shadow_map),
         wgpu::BindingResource::Sampler(&sampler),
-        targets.depths.as_entire_binding(),
+        buffers.depths.as_entire_binding(),
     ];
     let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
         .zip(resources)

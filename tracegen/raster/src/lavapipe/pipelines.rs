@@ -54,7 +54,9 @@ impl Pipelines {
                 .device
                 .create_shader_module(wgpu::ShaderModuleDescriptor {
                     label: Some("capture"),
-                    source: wgpu::ShaderSource::Wgsl(shader::source().into()),
+                    source: wgpu::ShaderSource::Wgsl(
+                        shader::source(gpu.no_capture.is_none()).into(),
+                    ),
                 });
             let layouts = Layouts {
                 view: gpu

@@ -1,100 +1,80 @@
-//! Buffers and attachments that a view is rendered into.
+//! Attachments that layers, pictures and shadow maps are rendered into.
 
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
 use crate::draws::SHADOW_SIZE;
 use crate::error::RasterError;
-use crate::uniforms::ViewData;
-use record::{DEPTH_BYTES, RECORD_BYTES};
+use std::cell::RefCell;
 
-/// Attachments, record buffer and read-back buffer of a view.
-pub struct Targets {
+/// Colour that is rendered into, sampled and read back.
+pub struct ColorTarget {
     /// Width and height in pixels.
     pub size_px: [u32; 2],
     /// The picture.
-    pub color: wgpu::Texture,
+    texture: wgpu::Texture,
     /// View of the picture.
-    pub color_view: wgpu::TextureView,
-    /// View of the depth buffer.
-    pub depth_view: wgpu::TextureView,
-    /// Raw records.
-    pub records: wgpu::Buffer,
-    /// Raw depths, one a record.
-    pub depths: wgpu::Buffer,
-    /// `depths` is as long as `records`; without masked draws it is a stand-in.
-    pub has_depths: bool,
-    /// Records appended, those beyond the capacity counted too.
-    pub counter: wgpu::Buffer,
-    /// Records that fit.
-    pub capacity: u32,
-    /// The eye's `View`.
-    pub view_uniform: wgpu::Buffer,
-    /// The picture on its way back.
-    readback: wgpu::Buffer,
-    row_bytes: u32,
+    pub view: wgpu::TextureView,
 }
 
-impl Targets {
-    /// Makes the attachments for views of `size_px` and a record buffer of at most
-    /// `budget_bytes`, within the device's limit for one binding,
-    /// with depths beside them if `has_depths`.
+/// What a layer is rendered into.
+pub struct LayerTarget {
+    /// Its picture.
+    pub color: ColorTarget,
+    /// View of its depth buffer.
+    pub depth_view: wgpu::TextureView,
+}
+
+impl LayerTarget {
+    /// Attachments of `size_px`.
     ///
     /// # Errors
-    /// A size of 0 or beyond the device's limit, and driver errors.
-    pub fn new(
-        gpu: &Gpu,
-        size_px: [u32; 2],
-        budget_bytes: u64,
-        has_depths: bool,
-    ) -> Result<Self, RasterError> {
-        let limits = gpu.device.limits();
-        // Records hold 12 bits of quad column and row.
-        let limit = limits.max_texture_dimension_2d.min(8192);
-        for extent in size_px {
-            if extent == 0 || extent > limit {
-                return Err(RasterError::TooLarge {
-                    what: "pixels along a view's edge (at least 1)".into(),
-                    found: extent.into(),
-                    limit: limit.into(),
-                });
-            }
-        }
-        let binding = u64::from(limits.max_storage_buffer_binding_size as u32);
-        let capacity =
-            (budget_bytes.min(binding).min(limits.max_buffer_size) / RECORD_BYTES).max(1);
-        let depths = if has_depths { capacity } else { 1 };
-        let row_bytes = (size_px[0] * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        gpu.checked("making the render targets", || {
-            let color = attachment(gpu, size_px, 1, COLOR_FORMAT, wgpu::TextureUsages::COPY_SRC);
+    /// A size that [`check_size`] refuses, and driver errors.
+    pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self, RasterError> {
+        check_size(gpu, size_px)?;
+        let color = ColorTarget::new(gpu, size_px)?;
+        gpu.checked("making a depth buffer", || {
             let depth = attachment(gpu, size_px, 1, DEPTH_FORMAT, wgpu::TextureUsages::empty());
-            let buffer = |size, usage| {
-                gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: None,
-                    size,
-                    usage,
-                    mapped_at_creation: false,
-                })
-            };
-            use wgpu::BufferUsages as Usage;
+            Self {
+                color,
+                depth_view: depth.create_view(&Default::default()),
+            }
+        })
+    }
+}
+
+/// Checks the size of a layer.
+///
+/// # Errors
+/// A size of 0 or beyond the device's limit.
+pub fn check_size(gpu: &Gpu, size_px: [u32; 2]) -> Result<(), RasterError> {
+    // Records hold 12 bits of quad column and row.
+    let limit = gpu.device.limits().max_texture_dimension_2d.min(8192);
+    match size_px
+        .iter()
+        .find(|&&extent| extent == 0 || extent > limit)
+    {
+        None => Ok(()),
+        Some(&extent) => Err(RasterError::TooLarge {
+            what: "pixels along a view's edge (at least 1)".into(),
+            found: extent.into(),
+            limit: limit.into(),
+        }),
+    }
+}
+
+impl ColorTarget {
+    /// A picture of `size_px`, which [`check_size`] has passed.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self, RasterError> {
+        gpu.checked("making a render target", || {
+            let usage = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::TEXTURE_BINDING;
+            let texture = attachment(gpu, size_px, 1, COLOR_FORMAT, usage);
             Self {
                 size_px,
-                color_view: color.create_view(&Default::default()),
-                depth_view: depth.create_view(&Default::default()),
-                color,
-                records: buffer(capacity * RECORD_BYTES, Usage::STORAGE | Usage::MAP_READ),
-                depths: buffer(depths * DEPTH_BYTES, Usage::STORAGE | Usage::MAP_READ),
-                has_depths,
-                counter: buffer(4, Usage::STORAGE | Usage::MAP_READ | Usage::COPY_DST),
-                capacity: capacity as u32,
-                view_uniform: buffer(
-                    size_of::<ViewData>() as u64,
-                    Usage::UNIFORM | Usage::COPY_DST,
-                ),
-                readback: buffer(
-                    u64::from(row_bytes) * u64::from(size_px[1]),
-                    Usage::MAP_READ | Usage::COPY_DST,
-                ),
-                row_bytes,
+                view: texture.create_view(&Default::default()),
+                texture,
             }
         })
     }
@@ -103,16 +83,19 @@ impl Targets {
     ///
     /// # Errors
     /// Driver errors.
-    pub fn read_picture(&self, gpu: &Gpu) -> Result<Vec<u8>, RasterError> {
+    pub fn read(&self, gpu: &Gpu, readback: &Readback) -> Result<Vec<u8>, RasterError> {
         let [width, height] = self.size_px;
+        let row_bytes = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(row_bytes) * u64::from(height);
+        let buffer = readback.of_size(gpu, bytes);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         encoder.copy_texture_to_buffer(
-            self.color.as_image_copy(),
+            self.texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
-                buffer: &self.readback,
+                buffer: &buffer,
                 layout: wgpu::TexelCopyBufferLayout {
                     offset: 0,
-                    bytes_per_row: Some(self.row_bytes),
+                    bytes_per_row: Some(row_bytes),
                     rows_per_image: None,
                 },
             },
@@ -123,13 +106,34 @@ impl Targets {
             },
         );
         gpu.queue.submit([encoder.finish()]);
-        gpu.read(&self.readback, 0..self.readback.size(), |bytes| {
+        gpu.read(&buffer, 0..bytes, |bytes| {
             Ok(bytes
-                .chunks_exact(self.row_bytes as usize)
+                .chunks_exact(row_bytes as usize)
                 .flat_map(|row| row.iter().take(width as usize * 4))
                 .copied()
                 .collect())
         })
+    }
+}
+
+/// A buffer for pictures on their way back, kept between them.
+#[derive(Default)]
+pub struct Readback(RefCell<Option<wgpu::Buffer>>);
+
+impl Readback {
+    /// A buffer of at least `bytes` bytes.
+    fn of_size(&self, gpu: &Gpu, bytes: u64) -> wgpu::Buffer {
+        let mut kept = self.0.borrow_mut();
+        kept.take_if(|buffer| buffer.size() < bytes);
+        let buffer = kept.get_or_insert_with(|| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("picture on its way back"),
+                size: bytes,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        });
+        buffer.clone()
     }
 }
 

@@ -22,6 +22,8 @@ pub struct MeshBuffers {
     pub indices: wgpu::Buffer,
     /// Number of indices.
     pub index_count: u32,
+    /// Number of vertices.
+    pub vertex_count: u32,
 }
 
 /// The uploaded scene.
@@ -128,6 +130,7 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
             wgpu::BufferUsages::INDEX,
         ),
         index_count: mesh.triangles() as u32 * 3,
+        vertex_count: mesh.positions.len() as u32,
     })
 }
 

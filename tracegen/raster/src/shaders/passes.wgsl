@@ -1,27 +1,5 @@
 // Fragment entry points, the background and shadow maps.
 
-// Everything that a fragment of an opaque or blended draw does.
-fn capture_and_shade(in: Fragment, front: bool, primitive: u32, invocation: u32) -> vec4<f32> {
-    let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
-    let found = find_cascade(in.world, geometric);
-    if CAPTURE {
-        let lane = lane_of(in, primitive, invocation);
-        _ = record_material(lane, in);
-        if CASCADES > 0u { record_shadow(lane, found, in.world, geometric); }
-    }
-    return shade(in, front, base_color(in), found);
-}
-
-@fragment @early_depth_test(force)
-fn fragment_early(
-    in: Fragment,
-    @builtin(front_facing) front: bool,
-    @builtin(primitive_index) primitive: u32,
-    @builtin(subgroup_invocation_id) invocation: u32,
-) -> @location(0) vec4<f32> {
-    return capture_and_shade(in, front, primitive, invocation);
-}
-
 // Colour of an alpha-masked draw: depth is tested and written after the discard.
 @fragment
 fn fragment_masked(in: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
@@ -31,25 +9,6 @@ fn fragment_masked(in: Fragment, @builtin(front_facing) front: bool) -> @locatio
     let color = shade(in, front, base, found);
     if base.a < material.specular.w { discard; }
     return color;
-}
-
-// Records of an alpha-masked draw. Forced early depth with a discard would write the depth of
-// discarded fragments, so a draw of its own records them and writes neither colour nor depth.
-@fragment @early_depth_test(force)
-fn fragment_masked_record(
-    in: Fragment,
-    @builtin(front_facing) front: bool,
-    @builtin(primitive_index) primitive: u32,
-    @builtin(subgroup_invocation_id) invocation: u32,
-) -> @location(0) vec4<f32> {
-    let lane = lane_of(in, primitive, invocation);
-    let index = record_material(lane, in);
-    if CASCADES > 0u {
-        let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
-        record_shadow(lane, find_cascade(in.world, geometric), in.world, geometric);
-    }
-    record_depth(lane, index, base_color(in).a >= material.specular.w, in.position.z);
-    return vec4(0.0);
 }
 
 struct Background {
@@ -72,12 +31,6 @@ fn vertex_background(@builtin(vertex_index) index: u32) -> Background {
 fn fragment_background(in: Background) -> @location(0) vec4<f32> {
     let direction = safe_normalize(in.direction);
     return vec4(tone_map(background(direction)), 1.0);
-}
-
-// Fragments per pixel by additive blending (a check of the records).
-@fragment @early_depth_test(force)
-fn fragment_count() -> @location(0) vec4<f32> {
-    return vec4(1.0);
 }
 
 // Alpha-masked casters.

@@ -1,5 +1,4 @@
-//! Head poses: a scene's cameras, the pose given by flags, the path of a moving head, and the
-//! matrices of both eyes.
+//! Head poses: a scene's cameras, the pose given by flags, and the matrices of both eyes.
 //!
 //! Conventions: right-handed, y up, each eye looks down its own -z; clip space has y up and depth
 //! 0 at the near plane to 1 at the far plane (not reversed: compare with `Less`).
@@ -7,15 +6,6 @@
 use super::{Camera, Scene};
 use formats::view::{EyeView, FovTangents, FrameViews, Hmd};
 use glam::{Affine3A, Mat3, Mat4, Vec3, Vec4};
-
-/// Frames per second of the camera path.
-pub const PATH_FPS: f32 = 72.0;
-/// Forward speed of the head along the camera path, metres per second.
-const PATH_FORWARD_M_PER_S: f32 = 0.4;
-/// Amplitude of the head's sideways sway, metres.
-const PATH_SWAY_M: f32 = 0.05;
-/// Sways per second.
-const PATH_SWAY_HZ: f32 = 0.5;
 
 /// A view of the whole scene from outside, for files without a camera.
 #[must_use]
@@ -126,23 +116,6 @@ pub fn head_pose(camera: &Camera) -> Affine3A {
     Affine3A::from_mat3_translation(Mat3::from_cols(right, up, back), camera.eye)
 }
 
-/// The camera at frame `frame` of the camera path.
-///
-/// A person walking slowly: at time t = frame / 72 s the head is 0.4 t metres ahead of the camera
-/// and 0.05 sin(pi t) metres to its right, looking the same way. Frame 0 is the camera itself.
-#[must_use]
-pub fn path_camera(camera: &Camera, frame: u32) -> Camera {
-    let t = frame as f32 / PATH_FPS;
-    let head = head_pose(camera).matrix3;
-    let sway = PATH_SWAY_M * (std::f32::consts::TAU * PATH_SWAY_HZ * t).sin();
-    let offset = Vec3::from(head.x_axis * sway - head.z_axis * (PATH_FORWARD_M_PER_S * t));
-    Camera {
-        eye: camera.eye + offset,
-        target: camera.target + offset,
-        ..camera.clone()
-    }
-}
-
 /// Off-axis perspective from tangents, depth 0 (near) to 1 (far).
 #[must_use]
 pub fn projection(fov: &FovTangents, near: f32, far: f32) -> Mat4 {
@@ -161,10 +134,14 @@ pub fn projection(fov: &FovTangents, near: f32, far: f32) -> Mat4 {
     )
 }
 
-/// Both eyes' matrices for one head pose.
+/// Both eyes' matrices for the head at a camera.
 #[must_use]
 pub fn eye_views(camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
-    let head = head_pose(camera);
+    views_of_head(head_pose(camera), camera, hmd)
+}
+
+/// Both eyes' matrices for a head pose; near and far planes are the camera's.
+fn views_of_head(head: Affine3A, camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
     [-1.0f32, 1.0].map(|side| {
         // Outwards is left for the left eye: a positive turn about +y.
         let turn = Mat3::from_rotation_y(-side * hmd.cant_deg.to_radians());
@@ -180,22 +157,31 @@ pub fn eye_views(camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
     })
 }
 
-/// The views of `frames` frames along the camera path.
-///
-/// # Errors
-/// [`CameraError::Invalid`] for a camera that cannot be used.
+/// The views of frames with these head poses, numbered from `first_frame`; near and far planes
+/// are the camera's.
+#[must_use]
 pub fn frame_views(
     camera: &Camera,
     hmd: &Hmd,
-    frames: u32,
-) -> Result<Vec<FrameViews>, CameraError> {
-    validate(camera)?;
-    Ok((0..frames)
-        .map(|frame| FrameViews {
+    first_frame: u32,
+    heads: &[Affine3A],
+) -> Vec<FrameViews> {
+    (first_frame..)
+        .zip(heads)
+        .map(|(frame, head)| FrameViews {
             frame,
-            eyes: eye_views(&path_camera(camera, frame), hmd),
+            eyes: views_of_head(*head, camera, hmd),
         })
-        .collect())
+        .collect()
+}
+
+/// The frame of a head that stands still at a camera.
+///
+/// # Errors
+/// [`CameraError::Invalid`] for a camera that cannot be used.
+pub fn still_frame(camera: &Camera, hmd: &Hmd) -> Result<Vec<FrameViews>, CameraError> {
+    validate(camera)?;
+    Ok(frame_views(camera, hmd, 0, &[head_pose(camera)]))
 }
 
 #[cfg(test)]

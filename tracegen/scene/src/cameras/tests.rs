@@ -118,20 +118,6 @@ fn canted_eyes_turn_outwards() {
 }
 
 #[test]
-fn the_path_starts_at_the_camera_and_walks_ahead() {
-    let start = camera();
-    assert_eq!(path_camera(&start, 0), start);
-    let later = path_camera(&start, 36);
-    // Half a second: a quarter of the sway's two-second period, 20 cm ahead.
-    let moved = later.eye - start.eye;
-    assert!(
-        (moved - Vec3::new(0.05, 0.0, -0.2)).length() < 1e-5,
-        "{moved}"
-    );
-    assert_eq!(later.target - later.eye, start.target - start.eye);
-}
-
-#[test]
 fn cameras_that_look_nowhere_are_refused() {
     let looks_at_itself = Camera {
         target: camera().eye,

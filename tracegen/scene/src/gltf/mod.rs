@@ -8,6 +8,9 @@
 //! cost a primitive number and cover nothing.
 
 mod accessors;
+mod animation;
+#[cfg(test)]
+mod animation_tests;
 mod features;
 mod materials;
 mod meshes;
@@ -20,6 +23,7 @@ use super::uri::{self, Uri};
 use super::warnings::Warnings;
 use super::{Instance, LoadOptions, Loaded, Scene, SceneError};
 use accessors::Buffers;
+pub(crate) use animation::camera_track;
 use gltf::binary::Glb;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{Path as JsonPath, Root};

@@ -87,10 +87,16 @@ fn parentless(root: &Root) -> Vec<usize> {
     (0..root.nodes.len()).filter(|&n| !is_child[n]).collect()
 }
 
-fn local_transform(node: &Node) -> Affine3A {
+pub(super) fn local_transform(node: &Node) -> Affine3A {
     if let Some(matrix) = &node.matrix {
         return Affine3A::from_mat4(Mat4::from_cols_array(matrix));
     }
+    let (translation, rotation, scale) = parts(node);
+    Affine3A::from_scale_rotation_translation(scale, rotation, translation)
+}
+
+/// Translation, rotation and scale of a node without a matrix.
+pub(super) fn parts(node: &Node) -> (Vec3, Quat, Vec3) {
     let rotation = node.rotation.map_or(Quat::IDENTITY, |q| {
         let q = Quat::from_array(q.0);
         if q.length_squared() > 0.0 {
@@ -99,11 +105,21 @@ fn local_transform(node: &Node) -> Affine3A {
             Quat::IDENTITY
         }
     });
-    Affine3A::from_scale_rotation_translation(
-        node.scale.map_or(Vec3::ONE, Vec3::from),
-        rotation,
+    (
         node.translation.map_or(Vec3::ZERO, Vec3::from),
+        rotation,
+        node.scale.map_or(Vec3::ONE, Vec3::from),
     )
+}
+
+/// The name of a camera's node, or else the camera's own.
+pub(super) fn camera_name(node: &Node, camera: &gltf::json::Camera, index: usize) -> String {
+    [&node.name, &camera.name]
+        .into_iter()
+        .flatten()
+        .find(|name| !name.is_empty())
+        .cloned()
+        .unwrap_or_else(|| format!("camera-{index}"))
 }
 
 /// A camera node looks along its -z; the target is one metre ahead.
@@ -115,12 +131,7 @@ fn camera(
     warnings: &mut Warnings,
 ) -> Option<Camera> {
     let camera = root.cameras.get(node.camera?.value())?;
-    let name = [&node.name, &camera.name]
-        .into_iter()
-        .flatten()
-        .find(|name| !name.is_empty())
-        .cloned()
-        .unwrap_or_else(|| format!("camera-{index}"));
+    let name = camera_name(node, camera, index);
     let Some(perspective) = &camera.perspective else {
         warnings.count("orthographic", || {
             format!("camera '{name}' is orthographic; skipped")

@@ -1,9 +1,10 @@
-//! Thousands of damaged scene files: each is read or refused, quickly and within bounds.
+//! Thousands of damaged files of scenes and paths: each is read or refused, quickly and within bounds.
 //!
 //! The cases are the same every time. `MUTATIONS=n` tries n a seed instead.
 
 mod memory;
 mod mutate;
+mod paths;
 mod seeds;
 
 use mutate::{Random, mutate};
@@ -17,6 +18,7 @@ const MAX_BYTES: usize = 1 << 30;
 
 #[test]
 fn no_damaged_file_panics_takes_long_or_takes_a_gigabyte() {
+    let _alone = memory::alone();
     let cases = std::env::var("MUTATIONS").map_or(CASES_PER_SEED, |n| n.parse().unwrap());
     let (mut read, mut refused, mut longest, mut largest) = (0, 0, Duration::ZERO, 0);
     for seed in seeds::all() {

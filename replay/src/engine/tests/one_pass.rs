@@ -1,0 +1,165 @@
+//! Many LRU configurations in one pass against each of them alone, and against plain lists.
+
+use super::*;
+use crate::config::Replacement;
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ z >> 31) % end
+    }
+
+    fn of<T: Copy>(&mut self, values: &[T]) -> T {
+        values[self.below(values.len() as u64) as usize]
+    }
+
+    /// An LRU cache of up to `most_sets` sets and any small number of ways.
+    fn cache(&mut self, most_sets: u64) -> CacheConfig {
+        let ways = self.of(&[1, 2, 3, 4, 4, 4, 5, 8, 12, 16]);
+        let sets = 1 << self.below(u64::from(most_sets.ilog2()) + 1);
+        CacheConfig {
+            ways,
+            ..CacheConfig::lru(sets * u64::from(ways) * 16)
+        }
+    }
+}
+
+/// LRU sets as plain lists, most recent last.
+struct Twin {
+    sets: Vec<Vec<u32>>,
+    ways: usize,
+}
+
+impl Twin {
+    fn new(config: &CacheConfig) -> Self {
+        Self {
+            sets: vec![Vec::new(); config.sets("", 16).unwrap() as usize],
+            ways: config.ways as usize,
+        }
+    }
+
+    fn access(&mut self, line: u32) -> bool {
+        let index = line as usize % self.sets.len();
+        let set = &mut self.sets[index];
+        let hit = set.contains(&line);
+        set.retain(|&l| l != line);
+        set.push(line);
+        if set.len() > self.ways {
+            set.remove(0);
+        }
+        hit
+    }
+}
+
+/// Counters of both levels on the recorded stream, nothing left out.
+fn twin(sent: &[Sent], config: &RunConfig) -> (LevelCounters, LevelCounters) {
+    let mut l1: Vec<Twin> = (0..config.cores).map(|_| Twin::new(&config.l1)).collect();
+    let mut l2 = Twin::new(&config.l2);
+    let (mut first, mut second) = (LevelCounters::default(), LevelCounters::default());
+    for (core, _, lines) in sent {
+        let missing: Vec<u32> = lines
+            .iter()
+            .copied()
+            .filter(|&l| !l1[*core].access(l))
+            .collect();
+        let misses = missing.iter().filter(|&&l| !l2.access(l)).count() as u64;
+        first.footprints += 1;
+        first.line_lookups += lines.len() as u64;
+        first.line_misses += missing.len() as u64;
+        first.footprint_misses += u64::from(!missing.is_empty());
+        second.line_misses += misses;
+        second.footprint_misses += u64::from(misses > 0);
+    }
+    second.footprints = first.footprint_misses;
+    second.line_lookups = first.line_misses;
+    (first, second)
+}
+
+#[test]
+fn a_thousand_sets_of_configurations_count_as_each_alone() {
+    let traces = [1, 2, 3].map(|seed| {
+        Synthetic {
+            size_px: [36, 28],
+            patch_px: 14,
+            layers: 2,
+            textures: 2,
+            materials: 2,
+            seed,
+        }
+        .generate()
+    });
+    let mut random = Random(1);
+    let (mut together, mut missed) = (0, 0);
+    for set in 0..1000 {
+        let trace = &traces[random.below(3) as usize];
+        let orders: Vec<Order> = Order::all().collect();
+        let base = RunConfig {
+            order: random.of(&orders),
+            cores: random.of(&[1, 2, 2, 3]),
+            assign: random.of(&[Assign::FirstIdle, Assign::Static]),
+            ..functional(Order::MORTON)
+        };
+        let configs: Vec<RunConfig> = (0..=random.below(6))
+            .map(|_| RunConfig {
+                l1: random.cache(32),
+                l2: random.cache(256),
+                tile_maps: random.below(3) == 0,
+                ..base
+            })
+            .collect();
+        let results = all(trace, &configs, 1 << 30);
+        for (config, result) in configs.iter().zip(&results) {
+            assert_eq!(*result, single(trace, config), "set {set}: {config:?}");
+            missed += result.l2.misses;
+        }
+        let of = random.below(configs.len() as u64) as usize;
+        let expected = twin(&sent(trace, &base), &configs[of]);
+        let found = (results[of].l1.counters, results[of].l2.counters);
+        assert_eq!(found, expected, "set {set}: {:?}", configs[of]);
+        together += configs.len();
+    }
+    assert!(together > 3000 && missed > 100_000, "{together} {missed}");
+}
+
+#[test]
+fn what_cannot_share_a_pass_has_its_own() {
+    let trace = small();
+    let base = functional(Order::MORTON);
+    let larger = |config: RunConfig| RunConfig {
+        l1: CacheConfig::lru(2 << 10),
+        ..config
+    };
+    let with = |change: fn(&mut RunConfig)| {
+        let mut config = base;
+        change(&mut config);
+        config
+    };
+    let configs = [
+        base,
+        larger(base),
+        with(|c| c.order = Order::Z2_STA),
+        with(|c| c.l2.replacement = Replacement::FIFO),
+        with(|c| c.mode = Mode::Timed),
+        larger(with(|c| c.mode = Mode::Timed)),
+        with(|c| c.line_bytes = 32),
+        with(|c| c.sampling.lod_bias = 1.0),
+    ];
+    let memory = LineMemory::new(1 << 30);
+    let work = replay_all(&trace, &configs, &memory, &|_, _| ()).unwrap();
+    let expected = Work {
+        replays: 8,
+        passes: 7,
+        expansions: 3,
+    };
+    assert_eq!(work, expected);
+    let results = all(&trace, &configs, 1 << 30);
+    for (config, result) in configs.iter().zip(results) {
+        assert_eq!(result, replay(&trace, config).unwrap());
+    }
+}

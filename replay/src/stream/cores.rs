@@ -1,0 +1,121 @@
+//! What each core works on: the quads of its work item, one after another.
+
+use super::expand::Work;
+use super::lines::interleaved;
+use super::{Frame, QuadLines, StreamError, TileLines};
+use crate::order::{TileRef, WorkItem};
+use std::ops::Range;
+
+/// The cores' work items and their positions in them.
+pub struct Cores<'f> {
+    frame: &'f Frame<'f>,
+    cores: Vec<Core<'f>>,
+}
+
+/// A core's item. Runs are left to do in order: which tile, which run.
+#[derive(Debug, Default)]
+struct Core<'f> {
+    tiles: [Slot<'f>; 2],
+    runs: Vec<(u8, u32)>,
+    next_run: usize,
+    /// Quads of the current run that are left, and the tile that they are of.
+    slot: usize,
+    quads: Range<usize>,
+}
+
+/// A tile of an item.
+#[derive(Debug, Default)]
+enum Slot<'f> {
+    #[default]
+    None,
+    /// From the frame.
+    Kept(&'f TileLines),
+    /// Expanded for this core.
+    Own(Box<Work>),
+}
+
+impl Slot<'_> {
+    #[inline(always)]
+    fn lines(&self) -> Option<&TileLines> {
+        match self {
+            Self::None => None,
+            Self::Kept(lines) => Some(lines),
+            Self::Own(work) => Some(&work.lines),
+        }
+    }
+}
+
+impl<'f> Cores<'f> {
+    /// Idle cores.
+    #[must_use]
+    pub fn new(frame: &'f Frame<'f>, cores: usize) -> Self {
+        Self {
+            frame,
+            cores: (0..cores).map(|_| Core::default()).collect(),
+        }
+    }
+
+    /// Number of cores.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.cores.len()
+    }
+
+    /// Gives a core its next work item. Whatever was left of the last one is dropped.
+    ///
+    /// # Errors
+    /// A tile that cannot be read.
+    pub fn load(&mut self, core: usize, item: &WorkItem) -> Result<(), StreamError> {
+        let frame = self.frame;
+        let core = &mut self.cores[core];
+        for (slot, at) in core.tiles.iter_mut().zip(item.tiles()) {
+            fill(slot, frame, at)?;
+        }
+        core.runs.clear();
+        core.next_run = 0;
+        core.slot = 0;
+        core.quads = 0..0;
+        let [left, right] = core.tiles.each_ref().map(Slot::lines);
+        match (*item, left, right) {
+            (WorkItem::Pair(_, _, interleave), Some(left), Some(right)) => {
+                let primitives = |tile: &'_ TileLines| -> Vec<u32> {
+                    tile.runs.iter().map(|run| run.primitive).collect()
+                };
+                let [mut left, mut right] = [left, right].map(|t| primitives(t).into_iter());
+                interleaved(interleave, [&mut left, &mut right], &mut core.runs);
+            }
+            (_, left, _) => core.quads = 0..left.map_or(0, TileLines::quad_count),
+        }
+        Ok(())
+    }
+
+    /// The core's next quad, until the item is done.
+    #[inline(always)]
+    pub fn next_quad(&mut self, core: usize) -> Option<QuadLines<'_>> {
+        let core = &mut self.cores[core];
+        loop {
+            if let Some(quad) = core.quads.next() {
+                return core.tiles[core.slot].lines().map(|tile| tile.quad(quad));
+            }
+            let &(slot, run) = core.runs.get(core.next_run)?;
+            core.next_run += 1;
+            core.slot = usize::from(slot);
+            core.quads = core.tiles[core.slot].lines()?.run(run as usize);
+        }
+    }
+}
+
+fn fill<'f>(slot: &mut Slot<'f>, frame: &'f Frame<'f>, at: TileRef) -> Result<(), StreamError> {
+    if let Some(kept) = frame.kept(at) {
+        *slot = Slot::Kept(kept);
+        return Ok(());
+    }
+    let expander = frame.expander();
+    if !matches!(slot, Slot::Own(_)) {
+        *slot = Slot::Own(Box::new(expander.work()));
+    }
+    if let Slot::Own(work) = slot {
+        expander.expand(at, work)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,264 @@
+//! Quads to lines, once: a frame's tiles are read, expanded and counted in parallel, and every
+//! order, cache and clock then reads the lines.
+//!
+//! A frame is expanded when its turn comes and dropped after it, so memory does not grow with the
+//! frames. Tiles for which the [`LineMemory`] has no room are counted and expanded again whenever
+//! a core comes to them.
+
+use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
+use super::lines::{QuadEnd, QuadRun, Tag, TileLines};
+use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, feed};
+use crate::config::RunConfig;
+use crate::order::TileRef;
+use formats::textrace::Tile;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Memory for the lines of all frames that are replayed at the same time.
+#[derive(Debug)]
+pub struct LineMemory {
+    left_bytes: AtomicU64,
+}
+
+impl LineMemory {
+    /// What is kept unless said otherwise: four stereo frames of the size of the Z2 paper's.
+    pub const USUAL_BYTES: u64 = 384 << 20;
+
+    /// So much memory.
+    #[must_use]
+    pub fn new(bytes: u64) -> Self {
+        Self {
+            left_bytes: AtomicU64::new(bytes),
+        }
+    }
+
+    fn take(&self, bytes: u64) -> bool {
+        let less = |left: u64| left.checked_sub(bytes);
+        let (set, get) = (Ordering::Relaxed, Ordering::Relaxed);
+        self.left_bytes.fetch_update(set, get, less).is_ok()
+    }
+
+    fn give_back(&self, bytes: u64) {
+        self.left_bytes.fetch_add(bytes, Ordering::Relaxed);
+    }
+}
+
+/// Expands the tiles of a trace under one sampling and layout.
+pub struct Expander<'a> {
+    source: &'a dyn TileSource,
+    footprints: Footprints,
+    bins: Bins,
+    touched: LineSet,
+}
+
+/// Memory for the expansion of a tile, kept from tile to tile, and what was counted.
+#[derive(Debug)]
+pub(super) struct Work {
+    tile: Tile,
+    scratch: Scratch,
+    counts: TraceCounts,
+    /// The last tile's lines.
+    pub(super) lines: TileLines,
+}
+
+impl<'a> Expander<'a> {
+    /// An expander for a trace. Of the configuration it needs sampling, layout and line size.
+    ///
+    /// # Errors
+    /// Tables that refer to what is not there, or too large an address space.
+    pub fn new(source: &'a dyn TileSource, config: &RunConfig) -> Result<Self, StreamError> {
+        let tables = source.tables();
+        let footprints = Footprints::new(tables, config)?;
+        Ok(Self {
+            touched: LineSet::new(footprints.lines()),
+            footprints,
+            bins: Bins::new(tables)?,
+            source,
+        })
+    }
+
+    /// Where accesses count.
+    #[must_use]
+    pub fn bins(&self) -> &Bins {
+        &self.bins
+    }
+
+    /// Lines of the whole address space.
+    #[must_use]
+    pub fn lines(&self) -> u64 {
+        self.footprints.lines()
+    }
+
+    /// Expands all tiles of a frame and adds their accesses to `counts`.
+    ///
+    /// # Errors
+    /// A tile that cannot be read.
+    pub fn frame<'e>(
+        &'e self,
+        number: u32,
+        memory: &'e LineMemory,
+        counts: &mut TraceCounts,
+    ) -> Result<Frame<'e>, StreamError> {
+        /// Tiles that a thread expands at a time.
+        const CHUNK: usize = 64;
+        let passes = &self.source.tables().passes;
+        let of_frame = (0..).zip(passes).filter(|(_, pass)| pass.frame == number);
+        let tiles: Vec<TileRef> = of_frame
+            .flat_map(|(pass, p)| (0..p.tile_count()).map(move |tile| TileRef { pass, tile }))
+            .collect();
+        let chunk = |tiles: &[TileRef]| {
+            let mut work = self.work();
+            let mut expanded = Vec::with_capacity(tiles.len());
+            for &at in tiles {
+                let accesses = self.expand(at, &mut work)?;
+                let kept = memory.take(work.lines.bytes()).then(|| work.lines.clone());
+                expanded.push((at, accesses, kept));
+            }
+            Ok((work.counts, expanded))
+        };
+        let chunks: Result<Vec<_>, StreamError> = tiles.par_chunks(CHUNK).map(chunk).collect();
+        let mut frame = Frame {
+            expander: self,
+            memory,
+            kept: vec![Vec::new(); passes.len()],
+        };
+        for (chunk_counts, expanded) in chunks? {
+            counts.add(&chunk_counts);
+            for (at, accesses, lines) in expanded {
+                counts.tiles[self.bins.tile(at)] = accesses;
+                frame.kept[at.pass as usize].push(lines);
+            }
+        }
+        counts.unique_lines = self.touched.count();
+        Ok(frame)
+    }
+
+    pub(super) fn work(&self) -> Work {
+        Work {
+            tile: Tile::default(),
+            scratch: self.footprints.scratch(),
+            counts: TraceCounts::without_tiles(&self.bins),
+            lines: TileLines::default(),
+        }
+    }
+
+    /// Expands a tile into `work.lines`.
+    pub(super) fn expand(&self, at: TileRef, work: &mut Work) -> Result<TileAccesses, StreamError> {
+        feed::read(self.source, at, &mut work.tile)?;
+        let Work {
+            tile,
+            scratch,
+            counts,
+            lines,
+        } = work;
+        lines.begin(self.bins.place(at));
+        let first_cell = self.bins.first_cell(at);
+        let mut accesses = TileAccesses::default();
+        for run in &tile.runs {
+            for records in feed::quads(tile, run) {
+                let lanes = feed::lanes(records);
+                counts.quads += 1;
+                counts.lanes += u64::from(lanes);
+                accesses.lanes = accesses.lanes.wrapping_add(lanes);
+                let mut footprints = 0;
+                self.footprints
+                    .for_quad(run.draw, records, scratch, |sample, bundle| {
+                        let cell = self.bins.cell(sample.texture, bundle.level);
+                        let before = lines.lines.len();
+                        let (hash, lookups) = self.append(cell, sample, bundle, lines);
+                        debug_assert!(lines.lines.len() > before || bundle.count == 0);
+                        counts.hash = counts.hash.wrapping_add(hash);
+                        let cell = &mut counts.cells[first_cell + cell as usize];
+                        cell.footprints += u64::from(bundle.count);
+                        cell.line_lookups += u64::from(lookups);
+                        footprints += u32::from(bundle.count);
+                    });
+                accesses.footprints = accesses.footprints.wrapping_add(footprints);
+                lines.quads.push(QuadEnd {
+                    end: lines.lines.len() as u32,
+                    footprints,
+                });
+            }
+            lines.runs.push(QuadRun {
+                primitive: run.primitive,
+                end: lines.quads.len() as u32,
+            });
+        }
+        Ok(accesses)
+    }
+
+    /// Appends the footprints of a bundle; the sum of their [`access_hash`] and of their lines.
+    #[inline(always)]
+    fn append(
+        &self,
+        cell: u32,
+        sample: SampleRef,
+        bundle: &Bundle,
+        out: &mut TileLines,
+    ) -> (u64, u32) {
+        let (mut hash, mut lookups) = (0_u64, 0);
+        let count = usize::from(bundle.count);
+        let mut index = 0;
+        while index < count {
+            let mut next = index + 1;
+            while next < count && bundle.repeats(next) {
+                next += 1;
+            }
+            let times = (next - index) as u32;
+            let [first, other] = Tag::of_footprint(cell, times - 1);
+            let mut tag = first;
+            let mut once = 0_u64;
+            let relative = bundle.lines_of(index);
+            for relative in relative {
+                let line = sample.base_line + relative;
+                out.lines.push(line);
+                out.tags.push(tag);
+                tag = other;
+                self.touched.insert(line);
+                once = once.wrapping_add(access_hash(line));
+            }
+            hash = hash.wrapping_add(once.wrapping_mul(times.into()));
+            lookups += relative.len() as u32 * times;
+            index = next;
+        }
+        (hash, lookups)
+    }
+}
+
+/// Hash of one line access; accesses are summed, so their order does not matter.
+#[inline(always)]
+fn access_hash(line: u32) -> u64 {
+    let mixed = (u64::from(line) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    (mixed ^ mixed >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93)
+}
+
+/// The tiles of a frame.
+pub struct Frame<'e> {
+    expander: &'e Expander<'e>,
+    memory: &'e LineMemory,
+    /// By pass and tile; empty for passes of other frames, none where memory had no room.
+    kept: Vec<Vec<Option<TileLines>>>,
+}
+
+impl<'e> Frame<'e> {
+    pub(super) fn expander(&self) -> &'e Expander<'e> {
+        self.expander
+    }
+
+    pub(super) fn kept(&self, at: TileRef) -> Option<&TileLines> {
+        self.kept[at.pass as usize].get(at.tile as usize)?.as_ref()
+    }
+
+    /// Tiles that are expanded again whenever a core comes to them.
+    #[must_use]
+    pub fn not_kept(&self) -> usize {
+        self.kept.iter().flatten().filter(|t| t.is_none()).count()
+    }
+}
+
+impl Drop for Frame<'_> {
+    fn drop(&mut self) {
+        let bytes = self.kept.iter().flatten().flatten().map(TileLines::bytes);
+        self.memory.give_back(bytes.sum());
+    }
+}

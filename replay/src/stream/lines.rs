@@ -1,0 +1,222 @@
+//! A tile's quads as lines: what every order, cache and clock reads in place of the trace.
+
+use super::counts::Place;
+use crate::order::Interleave;
+
+/// What a line belongs to: its footprint's cell within the view and, on a footprint's first line,
+/// how often the same footprint follows right after. One word, so that lines and tags lie side by
+/// side in two plain lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tag(u32);
+
+impl Tag {
+    /// Cells of a view that a tag can name.
+    pub const CELLS: usize = 1 << 29;
+    const FIRST: u32 = 1 << 31;
+    const REPEATS_SHIFT: u32 = 29;
+
+    /// Tags of a footprint's first line, and of its others.
+    #[inline(always)]
+    pub(super) fn of_footprint(cell: u32, repeats: u32) -> [Self; 2] {
+        let other = cell & (Self::CELLS as u32 - 1);
+        [
+            Self(other | repeats << Self::REPEATS_SHIFT | Self::FIRST),
+            Self(other),
+        ]
+    }
+
+    /// True for a footprint's first line.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_first(self) -> bool {
+        self.0 & Self::FIRST != 0
+    }
+
+    /// On a footprint's first line: how often the same lines are asked for once more (0 to 3).
+    #[inline(always)]
+    #[must_use]
+    pub fn repeats(self) -> u32 {
+        (self.0 & !Self::FIRST) >> Self::REPEATS_SHIFT
+    }
+
+    #[inline(always)]
+    fn cell(self) -> u32 {
+        self.0 & (Self::CELLS as u32 - 1)
+    }
+}
+
+/// A primitive's quads in a tile: those up to `end`, from the end of the primitive before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct QuadRun {
+    pub(super) primitive: u32,
+    pub(super) end: u32,
+}
+
+/// A quad: its lines go up to `end`, from the end of the quad before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct QuadEnd {
+    pub(super) end: u32,
+    /// With repeats.
+    pub(super) footprints: u32,
+}
+
+/// A tile's quads in submission order as the lines of their footprints. Footprints that repeat the
+/// one before, on the same level of the same texture for another lane, are counted, not listed.
+#[derive(Clone, Debug, Default)]
+pub struct TileLines {
+    pub(super) place: Place,
+    pub(super) runs: Vec<QuadRun>,
+    pub(super) quads: Vec<QuadEnd>,
+    pub(super) lines: Vec<u32>,
+    pub(super) tags: Vec<Tag>,
+}
+
+impl TileLines {
+    /// Empties the lists, keeping their memory.
+    pub(super) fn begin(&mut self, place: Place) {
+        self.place = place;
+        self.runs.clear();
+        self.quads.clear();
+        self.lines.clear();
+        self.tags.clear();
+    }
+
+    /// Memory that the lists take.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let lists = size_of_val(&*self.runs) + size_of_val(&*self.quads);
+        (lists + size_of_val(&*self.lines) + size_of_val(&*self.tags) + size_of::<Self>()) as u64
+    }
+
+    /// Number of quads.
+    #[must_use]
+    pub fn quad_count(&self) -> usize {
+        self.quads.len()
+    }
+
+    /// Quads of a run.
+    pub(super) fn run(&self, run: usize) -> std::ops::Range<usize> {
+        let end = |run: &QuadRun| run.end as usize;
+        let before = run.checked_sub(1).and_then(|before| self.runs.get(before));
+        before.map_or(0, end)..self.runs.get(run).map_or(0, end)
+    }
+
+    /// A quad.
+    #[inline(always)]
+    #[must_use]
+    pub fn quad(&self, index: usize) -> QuadLines<'_> {
+        let start = match index {
+            0 => 0,
+            _ => self.quads[index - 1].end as usize,
+        };
+        let quad = self.quads[index];
+        QuadLines {
+            place: self.place,
+            footprints: quad.footprints,
+            lines: &self.lines[start..quad.end as usize],
+            tags: &self.tags[start..quad.end as usize],
+        }
+    }
+}
+
+/// The order in which two tiles' primitives are rendered together: which tile, which run. The
+/// lists are the runs' primitives.
+pub(super) fn interleaved(
+    interleave: Interleave,
+    lists: [&mut dyn Iterator<Item = u32>; 2],
+    out: &mut Vec<(u8, u32)>,
+) {
+    out.clear();
+    match interleave {
+        Interleave::Alternate => {
+            let [left, right] = lists;
+            for run in 0.. {
+                let (l, r) = (left.next(), right.next());
+                out.extend(l.map(|_| (0, run)));
+                out.extend(r.map(|_| (1, run)));
+                if l.or(r).is_none() {
+                    break;
+                }
+            }
+        }
+        Interleave::Merge => {
+            let mut primitives: Vec<(u32, u8, u32)> = Vec::new();
+            for (tile, list) in (0..).zip(lists) {
+                primitives.extend(
+                    (0..)
+                        .zip(list)
+                        .map(|(run, primitive)| (primitive, tile, run)),
+                );
+            }
+            // A primitive's left run comes before its right one.
+            primitives.sort_unstable();
+            out.extend(primitives.iter().map(|&(_, tile, run)| (tile, run)));
+        }
+    }
+}
+
+/// A quad's lines.
+#[derive(Clone, Copy, Debug)]
+pub struct QuadLines<'a> {
+    pub(super) place: Place,
+    /// Its footprints, repeats counted.
+    pub footprints: u32,
+    /// Distinct lines of footprint after footprint: addresses over the line size.
+    pub lines: &'a [u32],
+    /// A tag for each line.
+    pub tags: &'a [Tag],
+}
+
+impl<'a> QuadLines<'a> {
+    /// Number of its tile, see [`super::Bins`].
+    #[inline(always)]
+    #[must_use]
+    pub fn tile(&self) -> usize {
+        self.place.tile as usize
+    }
+
+    /// The cell in which the footprint of line `index` counts, see [`super::Bins`].
+    #[inline(always)]
+    #[must_use]
+    pub fn cell(&self, index: usize) -> usize {
+        self.place.first_cell as usize + self.tags[index].cell() as usize
+    }
+
+    /// Where the footprint that holds line `index` ends.
+    #[inline(always)]
+    #[must_use]
+    pub fn end_of_footprint(&self, index: usize) -> usize {
+        let mut end = index + 1;
+        while end < self.tags.len() && !self.tags[end].is_first() {
+            end += 1;
+        }
+        end
+    }
+
+    /// The footprints that are listed, in order.
+    pub fn footprints(self) -> impl Iterator<Item = Footprint<'a>> {
+        let mut start = 0;
+        std::iter::from_fn(move || {
+            let repeats = self.tags.get(start)?.repeats();
+            let end = self.end_of_footprint(start);
+            let footprint = Footprint {
+                cell: self.cell(start),
+                lines: &self.lines[start..end],
+                repeats,
+            };
+            start = end;
+            Some(footprint)
+        })
+    }
+}
+
+/// One bilinear fetch of one lane at one mip level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Footprint<'a> {
+    /// Where it counts, see [`super::Bins`].
+    pub cell: usize,
+    /// Its one to four distinct lines, in the order in which its texels ask for them.
+    pub lines: &'a [u32],
+    /// How often the same footprint follows for further lanes.
+    pub repeats: u32,
+}

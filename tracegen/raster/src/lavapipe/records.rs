@@ -1,0 +1,67 @@
+//! Buffers that every layer's render shares: records on their way to the host, and the view's data.
+
+use super::device::Gpu;
+use crate::error::RasterError;
+use crate::uniforms::ViewData;
+use record::{DEPTH_BYTES, RECORD_BYTES};
+
+/// Record buffers, and the uniform of the layer that is rendered.
+pub struct RecordBuffers {
+    /// Raw records.
+    pub records: wgpu::Buffer,
+    /// Raw depths, one a record.
+    pub depths: wgpu::Buffer,
+    /// `depths` is as long as `records`; without masked draws it is a stand-in.
+    pub has_depths: bool,
+    /// Records appended, those beyond the capacity counted too.
+    pub counter: wgpu::Buffer,
+    /// Records that fit.
+    pub capacity: u32,
+    /// The layer's `View`.
+    pub view_uniform: wgpu::Buffer,
+}
+
+impl RecordBuffers {
+    /// Makes a record buffer of at most `budget_bytes`, within the device's limit for one binding,
+    /// with depths beside them if `has_depths`.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn new(gpu: &Gpu, budget_bytes: u64, has_depths: bool) -> Result<Self, RasterError> {
+        let limits = gpu.device.limits();
+        let binding = u64::from(limits.max_storage_buffer_binding_size as u32);
+        // A device that cannot capture gets stand-ins.
+        let captures = gpu.no_capture.is_none();
+        let budget_bytes = if captures { budget_bytes } else { 0 };
+        let capacity =
+            (budget_bytes.min(binding).min(limits.max_buffer_size) / RECORD_BYTES).max(1);
+        let depths = if has_depths { capacity } else { 1 };
+        gpu.checked("making the record buffers", || {
+            let buffer = |size, usage| {
+                gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: None,
+                    size,
+                    usage,
+                    mapped_at_creation: false,
+                })
+            };
+            use wgpu::BufferUsages as Usage;
+            let recorded = if captures {
+                Usage::STORAGE | Usage::MAP_READ
+            } else {
+                Usage::STORAGE
+            };
+            Self {
+                records: buffer(capacity * RECORD_BYTES, recorded),
+                depths: buffer(depths * DEPTH_BYTES, recorded),
+                has_depths,
+                counter: buffer(4, recorded | Usage::COPY_DST),
+                capacity: capacity as u32,
+                view_uniform: buffer(
+                    size_of::<ViewData>() as u64,
+                    Usage::UNIFORM | Usage::COPY_DST,
+                ),
+            }
+        })
+    }
+}

@@ -1,0 +1,274 @@
+//! Where the head goes: named models of a moving head, and paths and gazes from files.
+//!
+//! A path gives the head's pose as a function of time; frame k is seen at k / fps seconds from the
+//! path's start. Head space is right-handed: x right, y up, looking down -z.
+
+mod gaze;
+mod gltf;
+mod head;
+mod keys;
+mod poses;
+mod table;
+mod walk;
+
+#[cfg(test)]
+mod tests;
+
+pub use gaze::{GazeRow, read_gazes};
+pub use gltf::{CameraTrack, Joint};
+pub(crate) use gltf::{Channel, Curve, Interpolation};
+pub use poses::PoseTrack;
+
+use crate::cameras::head_pose;
+use crate::files::Origin;
+use crate::{Camera, SceneError};
+use glam::{Affine3A, DVec3, Mat3, Quat, Vec3};
+use std::fmt;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Frames a second where nothing else is asked for.
+pub const DEFAULT_FPS: f32 = 72.0;
+
+/// Most frames of a path.
+pub const MAX_FRAMES: u32 = 10_000;
+
+/// A path as it is asked for.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum PathSpec {
+    /// `walk`, see [`HeadPath::Walk`].
+    #[default]
+    Walk,
+    /// `head`, see [`HeadPath::Head`].
+    Head,
+    /// A CSV file of poses.
+    Poses(PathBuf),
+    /// A glTF file with an animated camera, and which of its cameras.
+    Gltf(PathBuf, Option<String>),
+}
+
+impl FromStr for PathSpec {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let ends = |text: &str, extensions: &[&str]| {
+            let extension = Path::new(text).extension().unwrap_or_default();
+            extensions.iter().any(|e| extension.eq_ignore_ascii_case(e))
+        };
+        const GLTF: [&str; 2] = ["gltf", "glb"];
+        match text {
+            "walk" => Ok(Self::Walk),
+            "head" => Ok(Self::Head),
+            _ if ends(text, &["csv"]) => Ok(Self::Poses(text.into())),
+            _ if ends(text, &GLTF) => Ok(Self::Gltf(text.into(), None)),
+            _ => match text.rsplit_once('#') {
+                Some((file, camera)) if ends(file, &GLTF) && !camera.is_empty() => {
+                    Ok(Self::Gltf(file.into(), Some(camera.to_owned())))
+                }
+                _ => Err(format!(
+                    "expected walk, head, FILE.csv or FILE.gltf[#CAMERA], found '{text}'"
+                )),
+            },
+        }
+    }
+}
+
+impl fmt::Display for PathSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Walk => write!(f, "walk"),
+            Self::Head => write!(f, "head"),
+            Self::Poses(file) | Self::Gltf(file, None) => write!(f, "{}", file.display()),
+            Self::Gltf(file, Some(camera)) => write!(f, "{}#{camera}", file.display()),
+        }
+    }
+}
+
+/// What the poses of a file are relative to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PathOrigin {
+    /// The camera: the path is moved and turned about the vertical so that its first pose has the
+    /// camera's place and heading. Pitch and roll stay as recorded.
+    Camera,
+    /// The world: poses stand as they are.
+    World,
+}
+
+/// A path ready to be followed.
+#[derive(Clone, Debug)]
+pub enum HeadPath {
+    /// A slow straight walk from the camera, see [`walk`](self::walk).
+    Walk,
+    /// A standing person who looks around from the camera, see [`head`](self::head).
+    Head,
+    /// Recorded poses.
+    Poses(PoseTrack, PathOrigin),
+    /// An animated camera.
+    Gltf(CameraTrack, PathOrigin),
+}
+
+/// Which moments of a path are seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moments {
+    /// Frame numbers.
+    pub frames: Range<u32>,
+    /// Frames a second.
+    pub fps: f32,
+}
+
+impl Moments {
+    /// The first `frames` frames at the usual rate.
+    #[must_use]
+    pub fn first(frames: u32) -> Self {
+        Self {
+            frames: 0..frames,
+            fps: DEFAULT_FPS,
+        }
+    }
+
+    /// Time of a frame, seconds from the start of the path.
+    #[must_use]
+    pub fn time_s(&self, frame: u32) -> f32 {
+        frame as f32 / self.fps
+    }
+}
+
+impl HeadPath {
+    /// Reads what `spec` names. Poses of a CSV start at the camera and an animated camera stands
+    /// in the world where `origin` says nothing else. Also tells what is odd about the file.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no path.
+    pub fn open(
+        spec: &PathSpec,
+        origin: Option<PathOrigin>,
+    ) -> Result<(Self, Vec<String>), SceneError> {
+        match spec {
+            PathSpec::Walk => Ok((Self::Walk, Vec::new())),
+            PathSpec::Head => Ok((Self::Head, Vec::new())),
+            PathSpec::Poses(file) => {
+                let track = PoseTrack::read(file)?;
+                let origin = origin.unwrap_or(PathOrigin::Camera);
+                Ok((Self::Poses(track, origin), Vec::new()))
+            }
+            PathSpec::Gltf(file, camera) => {
+                let (track, warnings) = crate::gltf::camera_track(file, camera.as_deref())?;
+                let origin = origin.unwrap_or(PathOrigin::World);
+                Ok((Self::Gltf(track, origin), warnings))
+            }
+        }
+    }
+
+    /// The head's poses (head to world, rigid) in the frames of `moments`, for a head that starts
+    /// at `camera`.
+    ///
+    /// # Errors
+    /// A frame after the end of a file's path, or a camera that is scaled to nothing.
+    pub fn poses(&self, camera: &Camera, moments: &Moments) -> Result<Vec<Affine3A>, SceneError> {
+        self.check(moments)?;
+        let frames = moments.frames.clone();
+        match self {
+            Self::Walk => Ok(frames
+                .map(|frame| head_pose(&walk::camera_at(camera, moments.time_s(frame))))
+                .collect()),
+            Self::Head => Ok(frames
+                .map(|frame| head::pose_at(camera, moments.time_s(frame)))
+                .collect()),
+            Self::Poses(track, origin) => {
+                let start = align(track.pose(0.0), *origin, camera);
+                Ok(frames
+                    .map(|frame| start * track.pose(seconds(moments, frame)))
+                    .collect())
+            }
+            Self::Gltf(track, origin) => {
+                let start = align(track.pose(0.0)?, *origin, camera);
+                frames
+                    .map(|frame| Ok(start * track.pose(seconds(moments, frame))?))
+                    .collect()
+            }
+        }
+    }
+
+    /// The camera that the path leaves from: `camera`, or where a path in the world starts.
+    ///
+    /// # Errors
+    /// A camera that is scaled to nothing.
+    pub fn start(&self, camera: &Camera) -> Result<Camera, SceneError> {
+        let first = match self {
+            Self::Poses(track, PathOrigin::World) => track.pose(0.0),
+            Self::Gltf(track, PathOrigin::World) => track.pose(0.0)?,
+            _ => return Ok(camera.clone()),
+        };
+        let axis = |v: glam::Vec3A| Vec3::from(v);
+        let eye = axis(first.translation);
+        Ok(Camera {
+            name: "path".into(),
+            eye,
+            target: eye - axis(first.matrix3.z_axis),
+            up: axis(first.matrix3.y_axis),
+            ..camera.clone()
+        })
+    }
+
+    /// Checks that a file's path lasts for all frames.
+    ///
+    /// # Errors
+    /// It does not.
+    pub fn check(&self, moments: &Moments) -> Result<(), SceneError> {
+        let (file, duration_s) = match self {
+            Self::Walk | Self::Head => return Ok(()),
+            Self::Poses(track, _) => (track.file(), track.duration_s()),
+            Self::Gltf(track, _) => (track.file(), track.duration_s()),
+        };
+        // A path of whole frames must not lose its last one to rounding.
+        let frames = (duration_s * f64::from(moments.fps) + 1e-3).floor() + 1.0;
+        if f64::from(moments.frames.end) <= frames {
+            return Ok(());
+        }
+        Err(Origin::new(file).invalid(
+            "path",
+            format!(
+                "at most {frames} frames: it lasts {duration_s:.3} s, at {} frames a second",
+                moments.fps
+            ),
+            format!("{} frames asked for", moments.frames.end),
+        ))
+    }
+}
+
+/// Exact where the rate is: times of recorded poses may be large.
+fn seconds(moments: &Moments, frame: u32) -> f64 {
+    f64::from(frame) / f64::from(moments.fps)
+}
+
+/// What moves a path that starts at `first` to where it belongs.
+fn align(first: Affine3A, origin: PathOrigin, camera: &Camera) -> Affine3A {
+    if origin == PathOrigin::World {
+        return Affine3A::IDENTITY;
+    }
+    let wanted = head_pose(camera);
+    let turn = heading(&wanted) - heading(&first);
+    let turn = Mat3::from_rotation_y(turn);
+    let moved = turn * Vec3::from(first.translation);
+    Affine3A::from_mat3_translation(turn, Vec3::from(wanted.translation) - moved)
+}
+
+/// Angle about +y from -z to where a pose looks, radians; a pose that looks straight up or down
+/// heads where the chin or the top of
+/// the head points.
+fn heading(pose: &Affine3A) -> f32 {
+    let back = pose.matrix3.z_axis;
+    let level = |v: glam::Vec3A| v.x.hypot(v.z);
+    let back = if level(back) > 1e-3 {
+        back
+    } else {
+        pose.matrix3.y_axis * -back.y.signum()
+    };
+    back.x.atan2(back.z)
+}
+
+/// A rigid pose.
+fn rigid(rotation: Quat, position: DVec3) -> Affine3A {
+    Affine3A::from_rotation_translation(rotation, position.as_vec3())
+}

@@ -1,0 +1,71 @@
+//! Flags that say where the head goes.
+
+use clap::{Args, ValueEnum};
+use scene::paths::{DEFAULT_FPS, HeadPath, MAX_FRAMES, Moments, PathOrigin, PathSpec};
+use std::ops::Range;
+
+/// The head's path.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Camera")]
+pub struct PathArgs {
+    /// Where the head goes: `walk` (slowly ahead), `head` (a model of a person who looks around),
+    /// a CSV file of poses, or a glTF file's animated camera.
+    #[arg(
+        long,
+        value_name = "walk|head|FILE.csv|FILE.gltf[#CAMERA]",
+        default_value = "walk"
+    )]
+    pub path: PathSpec,
+    /// What a file's poses are relative to [default: camera for CSV, world for glTF].
+    #[arg(long, value_enum, value_name = "ORIGIN")]
+    pub path_origin: Option<Origin>,
+    /// Frames a second along the path.
+    #[arg(long, value_name = "HZ", default_value_t = DEFAULT_FPS, value_parser = parse_fps)]
+    pub fps: f32,
+}
+
+/// `--path-origin`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Origin {
+    /// The path starts at the camera's place and heading.
+    Camera,
+    /// Poses stand as the file has them.
+    World,
+}
+
+impl PathArgs {
+    /// The path and its moments; what is odd about its file goes to stderr.
+    ///
+    /// # Errors
+    /// An unreadable file, or one that ends before the last frame.
+    pub fn open(&self, frames: Range<u32>) -> anyhow::Result<(HeadPath, Moments)> {
+        let origin = self.path_origin.map(|origin| match origin {
+            Origin::Camera => PathOrigin::Camera,
+            Origin::World => PathOrigin::World,
+        });
+        let (path, warnings) = HeadPath::open(&self.path, origin)?;
+        for warning in warnings {
+            shell::warn(&format!("{}: {warning}", self.path));
+        }
+        let moments = Moments {
+            frames,
+            fps: self.fps,
+        };
+        path.check(&moments)?;
+        Ok((path, moments))
+    }
+}
+
+/// A number of frames, for clap.
+pub fn frame_count() -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES))
+}
+
+fn parse_fps(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(fps) if (0.01..=10_000.0).contains(&fps) => Ok(fps),
+        _ => Err(format!(
+            "expected 0.01 to 10000 frames a second, found '{text}'"
+        )),
+    }
+}

@@ -1,0 +1,366 @@
+//! The monoscopic far field: one picture of what is far for both eyes.
+//!
+//! A camera between the eyes (or, alternating, in one of them) sees what lies beyond the split. An eye's
+//! picture takes from it what lies in the same direction, or (shifted) what would lie in the same place of a
+//! plane at the split. A point at depth z of an eye is then off by
+//!
+//! ```text
+//! same direction:  K / (z - c_z)                          at most K / (D - c_z), at the split D
+//! depth shift:     K / (D - c_z) * (z - D) / z            at most K / (D - c_z), at infinity
+//! ```
+//!
+//! where c is the camera in the eye's coordinates (x right, y up, z ahead) and K, in pixels times metres, is
+//! the largest |c_xy - t c_z| over the tangents t of the eye's view. K is convex in t, so the corners tell.
+//! Parallel eyes of W pixels and h degrees, camera in the middle: K = W IPD / (4 tan(h/2)), c_z = 0.
+
+use crate::least_work::{Costs, Object, Pixels, least_work};
+use crate::settings::{FarField, Split, Variant};
+use formats::view::EyeView;
+use glam::dcamera::rh::proj::directx::frustum;
+use glam::{DMat3, DMat4, DVec2, DVec3, Mat3, Mat4};
+
+/// Part of the split by which the far field begins before it: a surface seen at a slant crosses the split
+/// nearer for one camera than for the other, and one of both layers must hold it.
+pub const OVERLAP: f64 = 1.0 / 16.0;
+
+/// Pixels around what the eyes see of the far field, for filtering.
+const BORDER_PX: f64 = 2.0;
+/// What 32-bit matrices may be off by; the border has room for it.
+const ROUNDING_PX: f64 = 0.01;
+
+/// Eyes that no single far field serves.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "far field: expected eyes whose views one picture can hold (less than 180 degrees, at most {limit} pixels an edge), found {found}"
+)]
+pub struct FarFieldError {
+    /// What the picture would have to be.
+    found: String,
+    /// Largest edge.
+    limit: u32,
+}
+
+/// Both eyes of a frame and the camera of their far field.
+#[derive(Clone, Debug)]
+pub struct Stereo {
+    eyes: [Eye; 2],
+    size_px: [f64; 2],
+    world_from_camera: DMat4,
+    shifted: bool,
+}
+
+/// An eye: its pose and its projection's terms.
+#[derive(Clone, Copy, Debug)]
+struct Eye {
+    clip_from_eye: DMat4,
+    world_from_eye: DMat4,
+    near_m: f64,
+    far_m: f64,
+}
+
+impl Eye {
+    fn new(view: &EyeView) -> Self {
+        let matrix = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
+        let clip_from_eye = matrix(&view.eye_to_clip);
+        let (scale, offset) = (clip_from_eye.z_axis.z, clip_from_eye.w_axis.z);
+        Self {
+            clip_from_eye,
+            world_from_eye: matrix(&view.world_to_eye).inverse(),
+            near_m: offset / scale,
+            // A far plane at infinity has a scale of -1.
+            far_m: if scale < -1.0 - 1e-9 {
+                offset / (scale + 1.0)
+            } else {
+                1e6
+            },
+        }
+    }
+
+    /// Tangents to the right and up at a place of clip space.
+    fn tangents(&self, ndc: DVec2) -> DVec2 {
+        let p = &self.clip_from_eye;
+        (ndc + DVec2::new(p.z_axis.x, p.z_axis.y)) / DVec2::new(p.x_axis.x, p.y_axis.y)
+    }
+
+    /// Directions of the picture's corners.
+    fn corners(&self) -> [DVec3; 4] {
+        [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
+            .map(|ndc| self.tangents(DVec2::from_array(ndc)).extend(-1.0))
+    }
+
+    /// Pixels a tangent.
+    fn px_per_tangent(&self, size_px: [f64; 2]) -> DVec2 {
+        let p = &self.clip_from_eye;
+        DVec2::new(p.x_axis.x * size_px[0], p.y_axis.y * size_px[1]) / 2.0
+    }
+
+    /// Pixels (y down) to directions.
+    fn direction_from_px(&self, size_px: [f64; 2]) -> DMat3 {
+        let scale = 1.0 / self.px_per_tangent(size_px);
+        let corner = self.tangents(DVec2::new(-1.0, 1.0));
+        DMat3::from_cols(
+            DVec3::new(scale.x, 0.0, 0.0),
+            DVec3::new(0.0, -scale.y, 0.0),
+            corner.extend(-1.0),
+        )
+    }
+}
+
+/// The far field of a frame, ready to be rendered and to be taken from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FarView {
+    /// Distance ahead of the eyes from which on it shows what there is.
+    pub split_m: f32,
+    /// Largest distance between a point's place in an eye's picture and its true place.
+    pub worst_shift_px: f32,
+    /// Its camera; the near plane lies a little before the split.
+    pub camera: EyeView,
+    /// Its size; as many pixels an angle as the eyes have.
+    pub size_px: [u32; 2],
+    /// Pixels of the eyes' pictures to pixels of this one, homogeneous.
+    pub far_from_eye_px: [Mat3; 2],
+    /// The inverse.
+    pub eye_from_far_px: [Mat3; 2],
+    /// Clip space of this picture to clip space of the eyes.
+    pub eye_from_far_clip: [Mat4; 2],
+    /// Depth of the split in the eyes' clip space.
+    pub split_depth: [f32; 2],
+}
+
+impl FarField {
+    /// The far field of a frame: `None` where everything is nearer than its split, or where a frame costs
+    /// least without one. `objects` are the frame's visible draws.
+    ///
+    /// # Errors
+    /// As [`Stereo::view`].
+    pub fn view(
+        &self,
+        stereo: &Stereo,
+        limit_px: u32,
+        objects: impl FnOnce() -> Vec<Object>,
+    ) -> Result<Option<FarView>, FarFieldError> {
+        let [near_m, far_m] = stereo.range_m();
+        let beyond = |split_m: f32| (split_m < far_m).then(|| split_m.max(near_m));
+        let split_m = match self.split {
+            Split::Metres(split_m) => beyond(split_m),
+            Split::Pixels(shift_px) => beyond(stereo.split_m(shift_px)),
+            Split::LeastWork { within_px } => match beyond(stereo.split_m(within_px)) {
+                None => None,
+                Some(nearest_m) => {
+                    let far = stereo.view(nearest_m, limit_px)?.size_px;
+                    let pixels = Pixels {
+                        eye: stereo.size_px[0] * stereo.size_px[1],
+                        far: f64::from(far[0]) * f64::from(far[1]),
+                    };
+                    least_work(&objects(), pixels, &Costs::LAVAPIPE, nearest_m).and_then(beyond)
+                }
+            },
+        };
+        split_m
+            .map(|split_m| stereo.view(split_m, limit_px))
+            .transpose()
+    }
+}
+
+impl Stereo {
+    /// The camera of the far field for two eyes with pictures of `size_px` in a frame.
+    #[must_use]
+    pub fn new(eyes: &[EyeView; 2], size_px: [u32; 2], variant: Variant, frame: u32) -> Self {
+        let eyes = [Eye::new(&eyes[0]), Eye::new(&eyes[1])];
+        let world_from_camera = match variant {
+            Variant::AlternateEye => eyes[(frame % 2) as usize].world_from_eye,
+            Variant::Plain | Variant::DepthShift => between(&eyes),
+        };
+        Self {
+            eyes,
+            size_px: size_px.map(f64::from),
+            world_from_camera,
+            shifted: variant == Variant::DepthShift,
+        }
+    }
+
+    /// The largest shift, in pixels, of anything beyond a split at `split_m`.
+    #[must_use]
+    pub fn worst_shift_px(&self, split_m: f32) -> f32 {
+        let shift = |eye: &Eye| {
+            let room = f64::from(split_m) - self.camera_in(eye).z;
+            if room > 0.0 {
+                self.shift_px_m(eye) / room
+            } else {
+                f64::INFINITY
+            }
+        };
+        shift(&self.eyes[0]).max(shift(&self.eyes[1])) as f32
+    }
+
+    /// The nearest split beyond which nothing is off by more than `shift_px`.
+    #[must_use]
+    pub fn split_m(&self, shift_px: f32) -> f32 {
+        let split = |eye: &Eye| self.camera_in(eye).z + self.shift_px_m(eye) / f64::from(shift_px);
+        let exact = split(&self.eyes[0]).max(split(&self.eyes[1]));
+        // Rounded up, so that the promise holds.
+        (exact as f32).next_up()
+    }
+
+    /// Nearest and farthest distance ahead that the eyes see.
+    #[must_use]
+    pub fn range_m(&self) -> [f32; 2] {
+        let [a, b] = &self.eyes;
+        [a.near_m.min(b.near_m) as f32, a.far_m.max(b.far_m) as f32]
+    }
+
+    /// The far field beyond a split.
+    ///
+    /// # Errors
+    /// No picture of at most `limit_px` an edge holds what both eyes see beyond it.
+    pub fn view(&self, split_m: f32, limit_px: u32) -> Result<FarView, FarFieldError> {
+        let split = f64::from(split_m);
+        let mut near = f64::INFINITY;
+        let mut far = 0.0_f64;
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for eye in &self.eyes {
+            let camera_from_eye = self.world_from_camera.inverse() * eye.world_from_eye;
+            for corner in eye.corners() {
+                // What the eye sees beyond the split lies between these, and what they show moves
+                // along a line.
+                let begin = camera_from_eye.transform_point3(split * corner);
+                let end = camera_from_eye.transform_point3(eye.far_m.max(split) * corner);
+                let infinite = camera_from_eye.transform_vector3(corner);
+                near = near.min(-begin.z);
+                far = far.max(-end.z).max(-begin.z);
+                for p in [begin, infinite] {
+                    // Beside the camera or behind it: in no picture.
+                    let ahead = if p.z < -1e-3 { -p.z } else { 1e-9 };
+                    let tangents = p.truncate() / ahead;
+                    (low, high) = (low.min(tangents), high.max(tangents));
+                }
+            }
+        }
+        let scale = self.px_per_tangent();
+        // On the left eye's grid of pixels, which parallel eyes share with the camera.
+        let edge = self.eyes[0].tangents(DVec2::new(-1.0, 1.0));
+        let origin = DVec2::new(low.x - edge.x, edge.y - high.y) * scale;
+        let origin = (origin + ROUNDING_PX).floor() - BORDER_PX;
+        let end = DVec2::new(high.x - edge.x, edge.y - low.y) * scale;
+        let size = (end - ROUNDING_PX).ceil() + BORDER_PX - origin;
+        if !(near > 0.0 && size.max_element() <= f64::from(limit_px)) {
+            return Err(FarFieldError {
+                found: format!("{:.0}x{:.0} pixels", size.x, size.y),
+                limit: limit_px,
+            });
+        }
+        let near = near * (1.0 - OVERLAP);
+        let far = far.max(near * 2.0) * 1.001;
+        let [left, top] = [edge.x + origin.x / scale.x, edge.y - origin.y / scale.y];
+        let [right, bottom] = [left + size.x / scale.x, top - size.y / scale.y];
+        let planes = |tangent: f64| tangent * near;
+        let clip_from_camera = frustum(
+            planes(left),
+            planes(right),
+            planes(bottom),
+            planes(top),
+            near,
+            far,
+        );
+        let camera_from_world = self.world_from_camera.inverse();
+        let far_px_from_direction = DMat3::from_cols(
+            DVec3::new(scale.x, 0.0, 0.0),
+            DVec3::new(0.0, -scale.y, 0.0),
+            DVec3::new(left * scale.x, -top * scale.y, -1.0),
+        );
+        let far_from_eye_px = [0, 1].map(|number| {
+            let eye = &self.eyes[number];
+            let camera_from_eye = camera_from_world * eye.world_from_eye;
+            let mut plane = DMat3::from_mat4(camera_from_eye);
+            if self.shifted {
+                // A point of the plane at the split is `split * direction`, and a direction's z is -1.
+                plane.z_axis -= camera_from_eye.w_axis.truncate() / split;
+            }
+            far_px_from_direction * plane * eye.direction_from_px(self.size_px)
+        });
+        let eye_from_far_clip = [0, 1].map(|number| {
+            let eye = &self.eyes[number];
+            let eye_from_camera = eye.world_from_eye.inverse() * self.world_from_camera;
+            (eye.clip_from_eye * eye_from_camera * clip_from_camera.inverse()).as_mat4()
+        });
+        let split_depth = [0, 1].map(|number| {
+            let ahead = DVec3::new(0.0, 0.0, -split);
+            let depth = self.eyes[number].clip_from_eye.project_point3(ahead).z;
+            depth.clamp(0.0, 1.0) as f32
+        });
+        Ok(FarView {
+            split_m,
+            worst_shift_px: self.worst_shift_px(split_m),
+            camera: EyeView {
+                world_to_eye: camera_from_world.as_mat4().to_cols_array_2d(),
+                eye_to_clip: clip_from_camera.as_mat4().to_cols_array_2d(),
+                position: self
+                    .world_from_camera
+                    .w_axis
+                    .truncate()
+                    .as_vec3()
+                    .to_array(),
+            },
+            size_px: [size.x as u32, size.y as u32],
+            far_from_eye_px: far_from_eye_px.map(|m| normalised(m).as_mat3()),
+            eye_from_far_px: far_from_eye_px.map(|m| normalised(m.inverse()).as_mat3()),
+            eye_from_far_clip,
+            split_depth,
+        })
+    }
+
+    /// The camera in an eye's coordinates, z ahead.
+    fn camera_in(&self, eye: &Eye) -> DVec3 {
+        let position = self.world_from_camera.w_axis.truncate();
+        let inside = eye.world_from_eye.inverse().transform_point3(position);
+        inside * DVec3::new(1.0, 1.0, -1.0)
+    }
+
+    /// K: pixels of shift times metres of depth.
+    fn shift_px_m(&self, eye: &Eye) -> f64 {
+        let camera = self.camera_in(eye);
+        let scale = eye.px_per_tangent(self.size_px);
+        let at =
+            |corner: DVec3| ((camera.truncate() - corner.truncate() * camera.z) * scale).length();
+        eye.corners().map(at).into_iter().fold(0.0, f64::max)
+    }
+
+    /// Pixels a tangent of the camera, so that ahead of each eye there are at least as many an angle
+    /// as the eye has.
+    fn px_per_tangent(&self) -> DVec2 {
+        let scale = |eye: &Eye| {
+            let r = DMat3::from_mat4(self.world_from_camera.inverse() * eye.world_from_eye);
+            let (ahead, x, y) = (r.z_axis, r.x_axis, r.y_axis);
+            // Derivatives of the camera's tangents by the eye's, ahead of the eye.
+            let slope = DVec2::new(x.x * ahead.z - ahead.x * x.z, y.y * ahead.z - ahead.y * y.z)
+                / (ahead.z * ahead.z);
+            eye.px_per_tangent(self.size_px) / slope.abs()
+        };
+        scale(&self.eyes[0]).max(scale(&self.eyes[1]))
+    }
+}
+
+/// The pose between both eyes': in the middle, with the mean of their axes.
+fn between(eyes: &[Eye; 2]) -> DMat4 {
+    let [a, b] = eyes.map(|eye| eye.world_from_eye);
+    let back = (a.z_axis + b.z_axis)
+        .truncate()
+        .normalize_or(a.z_axis.truncate());
+    let up = (a.y_axis + b.y_axis).truncate();
+    let right = up.cross(back).normalize_or(a.x_axis.truncate());
+    let middle = (a.w_axis + b.w_axis).truncate() / 2.0;
+    DMat4::from_cols(
+        right.extend(0.0),
+        back.cross(right).extend(0.0),
+        back.extend(0.0),
+        middle.extend(1.0),
+    )
+}
+
+/// A homogeneous map, scaled so that it survives rounding to 32 bits best.
+fn normalised(m: DMat3) -> DMat3 {
+    m * (1.0 / m.z_axis.z)
+}
+
+#[cfg(test)]
+mod tests;

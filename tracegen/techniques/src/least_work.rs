@@ -1,0 +1,312 @@
+//! The split of the far field at which a frame costs least.
+//!
+//! A stated model, not a measurement of the frame: draws and triangles cost alike wherever they lie, those
+//! nearer than the split twice (an eye each), those beyond it once, those on both sides three times. A
+//! pixel is shaded about once (depth is tested early), and belongs to the far field in proportion to the
+//! areas of the objects' boxes beyond the split; a box counts as spread evenly over its range of depth.
+//! The far field's own pictures cost a little for each of their pixels, whatever they show. Between the
+//! depths at which a box begins or ends the cost is linear in the split, so the best split is one of
+//! those, or the nearest one allowed.
+
+/// What the model knows of a draw that is visible in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Object {
+    /// Nearest distance ahead of the eyes.
+    pub near_m: f32,
+    /// Farthest distance ahead of the eyes.
+    pub far_m: f32,
+    /// Triangles.
+    pub triangles: u32,
+    /// Area that its bounds take up in a view.
+    pub area_px: f32,
+}
+
+/// What things cost, in any one unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Costs {
+    /// A draw.
+    pub draw: f64,
+    /// A triangle.
+    pub triangle: f64,
+    /// A shaded pixel.
+    pub shaded_px: f64,
+    /// A pixel that is masked in the far field or composed into an eye's picture.
+    pub composed_px: f64,
+}
+
+impl Costs {
+    /// Nanoseconds of lavapipe (Mesa 22.3.6, two cores), rounded: how the terms relate, not how long a
+    /// frame takes.
+    pub const LAVAPIPE: Self = Self {
+        draw: 6000.0,
+        triangle: 90.0,
+        shaded_px: 100.0,
+        composed_px: 12.0,
+    };
+}
+
+/// Pixels of an eye's picture and of the far field's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pixels {
+    /// One eye's.
+    pub eye: f64,
+    /// The far field's.
+    pub far: f64,
+}
+
+/// The split, at least `nearest_m`, at which a frame of `objects` costs least; `None` where it costs
+/// least without a far field.
+#[must_use]
+pub fn least_work(
+    objects: &[Object],
+    pixels: Pixels,
+    costs: &Costs,
+    nearest_m: f32,
+) -> Option<f32> {
+    let mut frame = Frame::new(objects);
+    // A depth at which a box begins or ends, and the box.
+    let mut events: Vec<(f32, bool, &Object)> = objects
+        .iter()
+        .flat_map(|object| {
+            [
+                (object.near_m, true, object),
+                (end_m(object), false, object),
+            ]
+        })
+        .collect();
+    // At one depth what ends goes before what begins.
+    events.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut least: Option<(f64, f32)> = None;
+    let mut consider = |frame: &Frame, split_m: f32| {
+        let cost = frame.cost(split_m, pixels, costs);
+        if least.is_none_or(|(known, _)| cost < known) {
+            least = Some((cost, split_m));
+        }
+    };
+    let mut begun = false;
+    for (depth_m, begins, object) in events {
+        if depth_m > nearest_m && !begun {
+            begun = true;
+            consider(&frame, nearest_m);
+        }
+        if begins {
+            // An object that begins at the split is beyond it.
+            if begun {
+                consider(&frame, depth_m);
+            }
+            frame.begin(object);
+        } else {
+            frame.end(object);
+            if begun {
+                consider(&frame, depth_m);
+            }
+        }
+    }
+    least
+        .filter(|(cost, _)| *cost < frame.without(pixels, costs))
+        .map(|(_, split_m)| split_m)
+}
+
+/// The sums of the model while the split moves away from the eyes.
+struct Frame {
+    /// Draws and triangles, all of them.
+    all: [f64; 2],
+    /// Those that begin before the split.
+    near: [f64; 2],
+    /// Those that end beyond it.
+    far: [f64; 2],
+    /// Area of all boxes.
+    area: f64,
+    /// Area beyond the split: `beyond[0] + split * beyond[1]`.
+    beyond: [f64; 2],
+}
+
+impl Frame {
+    fn new(objects: &[Object]) -> Self {
+        let triangles = objects.iter().map(|o| f64::from(o.triangles)).sum();
+        let all = [objects.len() as f64, triangles];
+        let area = objects.iter().map(|o| f64::from(o.area_px)).sum();
+        Self {
+            all,
+            near: [0.0; 2],
+            far: all,
+            area,
+            beyond: [area, 0.0],
+        }
+    }
+
+    /// The split passes the beginning of a box.
+    fn begin(&mut self, object: &Object) {
+        self.near[0] += 1.0;
+        self.near[1] += f64::from(object.triangles);
+        let (whole, part) = areas(object);
+        self.beyond[0] += part[0] - whole;
+        self.beyond[1] += part[1];
+    }
+
+    /// The split passes the end of a box.
+    fn end(&mut self, object: &Object) {
+        self.far[0] -= 1.0;
+        self.far[1] -= f64::from(object.triangles);
+        let (_, part) = areas(object);
+        self.beyond[0] -= part[0];
+        self.beyond[1] -= part[1];
+    }
+
+    fn cost(&self, split_m: f32, pixels: Pixels, costs: &Costs) -> f64 {
+        let beyond = self.beyond[0] + f64::from(split_m) * self.beyond[1];
+        let far_share = if self.area > 0.0 {
+            (beyond / self.area).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let submitted =
+            |[draws, triangles]: [f64; 2]| draws * costs.draw + triangles * costs.triangle;
+        2.0 * submitted(self.near)
+            + submitted(self.far)
+            + (2.0 - far_share) * pixels.eye * costs.shaded_px
+            + (pixels.far + 2.0 * pixels.eye) * costs.composed_px
+    }
+
+    fn without(&self, pixels: Pixels, costs: &Costs) -> f64 {
+        2.0 * (self.all[0] * costs.draw
+            + self.all[1] * costs.triangle
+            + pixels.eye * costs.shaded_px)
+    }
+}
+
+/// Where a box ends: a flat one a little behind its beginning.
+fn end_m(object: &Object) -> f32 {
+    object.far_m.max(object.near_m.next_up())
+}
+
+/// The area of a box, and the terms of its area beyond a split inside it.
+fn areas(object: &Object) -> (f64, [f64; 2]) {
+    let area = f64::from(object.area_px);
+    let [near_m, far_m] = [object.near_m, end_m(object)].map(f64::from);
+    let depth = far_m - near_m;
+    (area, [area * far_m / depth, -area / depth])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PIXELS: Pixels = Pixels {
+        eye: 10_000.0,
+        far: 11_000.0,
+    };
+
+    fn object(near_m: f32, far_m: f32) -> Object {
+        Object {
+            near_m,
+            far_m,
+            triangles: 500,
+            area_px: 900.0,
+        }
+    }
+
+    /// The model's cost, straight from its words.
+    fn cost(objects: &[Object], split_m: f32, costs: &Costs) -> f64 {
+        let submitted = |o: &Object| costs.draw + f64::from(o.triangles) * costs.triangle;
+        let near: f64 = objects
+            .iter()
+            .filter(|o| o.near_m < split_m)
+            .map(submitted)
+            .sum();
+        let far: f64 = objects
+            .iter()
+            .filter(|o| o.far_m > split_m || o.near_m >= split_m)
+            .map(submitted)
+            .sum();
+        let area: f64 = objects.iter().map(|o| f64::from(o.area_px)).sum();
+        let beyond = |o: &Object| {
+            let share = if o.near_m >= split_m {
+                1.0
+            } else if o.far_m <= split_m {
+                0.0
+            } else {
+                f64::from(o.far_m - split_m) / f64::from(o.far_m - o.near_m)
+            };
+            share * f64::from(o.area_px)
+        };
+        let share = objects.iter().map(beyond).sum::<f64>() / area;
+        let shaded = 2.0 * PIXELS.eye * (1.0 - share) + PIXELS.eye * share;
+        2.0 * near
+            + far
+            + shaded * costs.shaded_px
+            + (PIXELS.far + 2.0 * PIXELS.eye) * costs.composed_px
+    }
+
+    #[test]
+    fn no_split_on_a_fine_grid_costs_less_and_none_is_nearer_than_allowed() {
+        let mut state = 7_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0
+        };
+        let (mut with, mut without) = (0, 0);
+        for _ in 0..300 {
+            let count = 1 + (random() * 30.0) as usize;
+            let objects: Vec<Object> = (0..count)
+                .map(|_| {
+                    let near_m = 0.5 + 20.0 * random();
+                    Object {
+                        near_m,
+                        far_m: near_m + if random() < 0.2 { 0.0 } else { 15.0 * random() },
+                        triangles: (random() * 3000.0) as u32,
+                        area_px: 1.0 + random() * 5000.0,
+                    }
+                })
+                .collect();
+            let costs = Costs {
+                composed_px: f64::from(random()) * 60.0,
+                ..Costs::LAVAPIPE
+            };
+            let nearest_m = 1.0 + 4.0 * random();
+            let plain: f64 = objects
+                .iter()
+                .map(|o| costs.draw + f64::from(o.triangles) * costs.triangle)
+                .sum();
+            let plain = 2.0 * (plain + PIXELS.eye * costs.shaded_px);
+            let grid = (0..2000).map(|i| nearest_m + 0.02 * i as f32);
+            let best = grid
+                .map(|split| cost(&objects, split, &costs))
+                .fold(plain, f64::min);
+            match least_work(&objects, PIXELS, &costs, nearest_m) {
+                Some(split_m) => {
+                    with += 1;
+                    assert!(split_m >= nearest_m);
+                    let found = cost(&objects, split_m, &costs);
+                    assert!(
+                        found < plain && found <= best * (1.0 + 1e-6),
+                        "{found} {best} {plain}"
+                    );
+                }
+                None => {
+                    without += 1;
+                    assert!(best >= plain * (1.0 - 1e-6), "{best} {plain}");
+                }
+            }
+        }
+        assert!(
+            with > 10 && without > 10,
+            "{with} with and {without} without a far field"
+        );
+    }
+
+    #[test]
+    fn near_content_gets_no_far_field_and_far_content_begins_at_the_nearest_split() {
+        let of = |objects: &[Object]| least_work(objects, PIXELS, &Costs::LAVAPIPE, 3.0);
+        assert_eq!(of(&[object(1.0, 2.5)]), None);
+        assert_eq!(of(&[]), None);
+        assert_eq!(of(&vec![object(5.0, 9.0); 100]), Some(3.0));
+        // Behind an object that lies across the nearest split, when that is the greater part.
+        let mut mixed = vec![object(10.0, 20.0); 40];
+        mixed.push(Object {
+            triangles: 100_000,
+            ..object(2.0, 4.0)
+        });
+        assert_eq!(of(&mixed), Some(4.0));
+    }
+}
