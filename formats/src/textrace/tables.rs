@@ -90,6 +90,9 @@ pub(super) fn read(container: &Container) -> Result<Tables> {
 fn check(tables: &Tables) -> std::result::Result<(), (ChunkTag, Broken)> {
     let located = |chunk: ChunkTag| move |broken: Broken| (chunk, broken);
     tables.meta.check().map_err(located(META))?;
+    if let Some(surfaces) = &tables.meta.surfaces {
+        surfaces.check(tables.draws.len()).map_err(located(META))?;
+    }
     for (index, texture) in tables.textures.iter().enumerate() {
         check_texture(index, texture).map_err(located(TEXTURES))?;
     }

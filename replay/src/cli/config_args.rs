@@ -1,7 +1,7 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
 use crate::config::{
-    Assign, BlockOrder, FilterOverride, LodFormula, Mode, Order, Replacement, RunConfig,
+    Assign, BlockOrder, FilterOverride, Hsr, LodFormula, Mode, Order, Replacement, RunConfig,
     TextureOrder,
 };
 use crate::size::{format_bytes, parse_bytes};
@@ -84,6 +84,10 @@ pub struct ConfigArgs {
     /// Seed of the random order and of random replacement
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+
+    /// Hidden-surface removal
+    #[arg(long)]
+    hsr: Option<Hsr>,
 
     /// Filter in place of the recorded one: trilinear, bilinear, nearest
     #[arg(long, value_parser = named::<FilterOverride>, help_heading = "Sampling")]
@@ -195,6 +199,7 @@ impl ConfigArgs {
         set(&mut config.cores, self.cores);
         set(&mut config.assign, self.assign);
         set(&mut config.seed, self.seed);
+        set(&mut config.hsr, self.hsr);
         set(&mut config.sampling.filter, self.filter);
         set(&mut config.sampling.lod, self.lod);
         set(&mut config.sampling.lod_bias, self.lod_bias);

@@ -32,7 +32,11 @@ pub fn shaded<'a>(source: &'a dyn TileSource, hsr: Hsr) -> Result<Shaded<'a>, St
         (Hsr::None, false) | (Hsr::EarlyZ, true) => Ok(None),
         (Hsr::EarlyZ | Hsr::Deferred, false) => Err(refused(
             "none, since the trace was captured without the depth test",
-            if hsr == Hsr::EarlyZ { "early-z" } else { "deferred" },
+            if hsr == Hsr::EarlyZ {
+                "early-z"
+            } else {
+                "deferred"
+            },
         )),
         (Hsr::Deferred, true) => match surfaces {
             Some(surfaces) => Ok(Some(opaque_draws(surfaces, source.tables().draws.len()))),
@@ -95,7 +99,11 @@ fn defer(tile: &mut Tile, opaque: &[bool]) {
     let records = |tile: &Tile, run: usize| {
         let run = tile.runs[run];
         let first = run.first as usize;
-        first..first.saturating_add(run.count as usize).min(tile.records.len()).max(first)
+        first
+            ..first
+                .saturating_add(run.count as usize)
+                .min(tile.records.len())
+                .max(first)
     };
     let fits = |tile: &Tile, run: usize| {
         let whole = tile.runs[run];
@@ -122,7 +130,11 @@ fn defer(tile: &mut Tile, opaque: &[bool]) {
             let mut record = tile.records[index];
             for lane in lanes(record.mask) {
                 let over = last[pixel(&record, lane)];
-                let seen = if is_opaque { over == run + 1 } else { over <= run };
+                let seen = if is_opaque {
+                    over == run + 1
+                } else {
+                    over <= run
+                };
                 if !seen {
                     record.mask &= !(1 << lane);
                 }
@@ -161,10 +173,11 @@ mod tests {
                 first: tile.records.len() as u32,
                 count: quads.len() as u32,
             });
-            tile.records.extend(quads.iter().map(|&(x, y, mask)| QuadRecord {
-                mask,
-                ..record(x, y)
-            }));
+            tile.records
+                .extend(quads.iter().map(|&(x, y, mask)| QuadRecord {
+                    mask,
+                    ..record(x, y)
+                }));
         }
         tile
     }
@@ -173,7 +186,9 @@ mod tests {
     fn fragments(tile: &Tile) -> Vec<(usize, u32)> {
         let of = |run: &PrimitiveRun| {
             let records = &tile.records[run.first as usize..][..run.count as usize];
-            let all = records.iter().flat_map(|r| lanes(r.mask).map(|lane| pixel(r, lane)));
+            let all = records
+                .iter()
+                .flat_map(|r| lanes(r.mask).map(|lane| pixel(r, lane)));
             all.map(|pixel| (pixel, run.primitive)).collect::<Vec<_>>()
         };
         let mut all: Vec<_> = tile.runs.iter().flat_map(of).collect();
@@ -188,7 +203,10 @@ mod tests {
             for (x, y, mask) in quads {
                 for lane in 0..4 {
                     if mask & (1 << lane) != 0 {
-                        let at = (usize::from(*x) * 2 + lane % 2, usize::from(*y) * 2 + lane / 2);
+                        let at = (
+                            usize::from(*x) * 2 + lane % 2,
+                            usize::from(*y) * 2 + lane / 2,
+                        );
                         pixels.entry(at).or_default().push(number as u32);
                     }
                 }
@@ -231,7 +249,9 @@ mod tests {
 
     #[test]
     fn of_opaque_draws_one_fragment_a_pixel_is_left() {
-        let all = (0..8).flat_map(|y| (0..8).map(move |x| (x, y, 15))).collect::<Vec<_>>();
+        let all = (0..8)
+            .flat_map(|y| (0..8).map(move |x| (x, y, 15)))
+            .collect::<Vec<_>>();
         let mut found = tile(&[(0, all.clone()), (1, all.clone()), (0, all)]);
         defer(&mut found, &[true, true]);
         assert_eq!(fragments(&found).len(), 256);
@@ -257,9 +277,21 @@ mod tests {
             })
         };
         let cases = [
-            (None, Hsr::None, "hsr: expected early-z or deferred, since the trace was captured with the depth test, found none"),
-            (None, Hsr::Deferred, "hsr: expected early-z, since the trace does not tell which draws are opaque (capture it again), found deferred"),
-            (surfaces(false), Hsr::Deferred, "hsr: expected none, since the trace was captured without the depth test, found deferred"),
+            (
+                None,
+                Hsr::None,
+                "hsr: expected early-z or deferred, since the trace was captured with the depth test, found none",
+            ),
+            (
+                None,
+                Hsr::Deferred,
+                "hsr: expected early-z, since the trace does not tell which draws are opaque (capture it again), found deferred",
+            ),
+            (
+                surfaces(false),
+                Hsr::Deferred,
+                "hsr: expected none, since the trace was captured without the depth test, found deferred",
+            ),
         ];
         for (surfaces, hsr, expected) in cases {
             let trace = trace(surfaces);

@@ -91,10 +91,12 @@ pub struct Frame {
     pub cull_tests: u64,
     /// Time that culling took.
     pub cull_s: f64,
-    /// Draws that can be seen and were left out.
-    pub false_negatives: u64,
+    /// Draws that can be seen and were left out; none where the device cannot tell.
+    #[serde(default)]
+    pub false_negatives: Option<u64>,
     /// Draws that were kept and cannot be seen.
-    pub false_positives: u64,
+    #[serde(default)]
+    pub false_positives: Option<u64>,
     /// Draws of both eyes.
     pub draws: u64,
     /// Calls that submitted them.
@@ -105,10 +107,12 @@ pub struct Frame {
     pub vertices: u64,
     /// Triangles submitted.
     pub triangles: u64,
-    /// 2x2 quads shaded.
-    pub quads: u64,
+    /// 2x2 quads shaded; none where the device cannot capture.
+    #[serde(default)]
+    pub quads: Option<u64>,
     /// Fragments shaded.
-    pub fragments: u64,
+    #[serde(default)]
+    pub fragments: Option<u64>,
     /// Bytes sent to the device.
     pub bytes_uploaded: u64,
     /// Times of the frame, one a repeat.

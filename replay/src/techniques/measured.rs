@@ -31,6 +31,9 @@ impl CacheFigures {
     }
 }
 
+/// A count of a frame.
+pub type Count = fn(&Frame) -> Option<u64>;
+
 /// A technique or combination on a scene.
 pub struct Measured<'a> {
     /// Short name of the scene.
@@ -60,17 +63,17 @@ impl Measured<'_> {
         self.row.technique == self.baseline.technique
     }
 
-    /// A count summed over the frames.
+    /// A count summed over the frames; none where a frame has none.
     #[must_use]
-    pub fn total(&self, of: fn(&Frame) -> u64) -> u64 {
+    pub fn total(&self, of: Count) -> Option<u64> {
         self.row.frames.iter().map(of).sum()
     }
 
     /// A count over the baseline's; none where that has none.
     #[must_use]
-    pub fn over_baseline(&self, of: fn(&Frame) -> u64) -> Option<f64> {
-        let whole: u64 = self.baseline.frames.iter().map(of).sum();
-        (whole > 0).then(|| self.total(of) as f64 / whole as f64)
+    pub fn over_baseline(&self, of: Count) -> Option<f64> {
+        let whole: u64 = self.baseline.frames.iter().map(of).sum::<Option<u64>>()?;
+        (whole > 0).then_some(self.total(of)? as f64 / whole as f64)
     }
 
     /// Mean of a figure that the technique predicts of itself.

@@ -19,7 +19,7 @@ pub(crate) mod testing;
 mod tests;
 
 pub use folder::{Folder, FolderError};
-pub use measured::{CacheFigures, Gain, Measured, Measures, OrderGain};
+pub use measured::{CacheFigures, Count, Gain, Measured, Measures, OrderGain};
 pub use pareto::dominated;
 pub use pictures::{PictureFigures, picture_figures};
 pub use sharing::{Sharing, sharing};

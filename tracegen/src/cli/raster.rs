@@ -246,6 +246,7 @@ fn tables(
             seed: 0,
             hmd: setup.hmd.clone(),
             frames: setup.frames.clone(),
+            surfaces: Some(draws.surfaces()),
         },
         textures,
         samplers,

@@ -98,6 +98,7 @@ fn try_capture(
             seed: 0,
             hmd: hmd.clone(),
             frames: vec![views.clone()],
+            surfaces: None,
         },
         textures,
         samplers,

@@ -2,8 +2,7 @@
 
 use crate::config::Order;
 use crate::report::columns::{Column, Show};
-use crate::techniques::manifest::Frame;
-use crate::techniques::{CacheFigures, Measured, OrderGain};
+use crate::techniques::{CacheFigures, Count, Measured, OrderGain};
 
 /// A column of techniques.
 pub type Figure<'a> = Column<'a, &'a Measured<'a>>;
@@ -28,13 +27,10 @@ pub const SHORT: [&str; 16] = [
     "dominated",
 ];
 
-/// A count of a frame.
-type Count = fn(&Frame) -> u64;
-
 /// Mean of a count over the frames.
 fn mean<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
     Figure::real(key, name, "a frame", 0, move |m| {
-        m.total(of) as f64 / m.row.frames.len().max(1) as f64
+        Some(m.total(of)? as f64 / m.row.frames.len().max(1) as f64)
     })
 }
 
@@ -91,23 +87,23 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
         .about("median time of the stage")
     }));
     columns.extend([
-        Figure::new("cull_tests", "tests", "all frames", Show::Whole, |m| m.total(|f| f.cull_tests))
+        Figure::new("cull_tests", "tests", "all frames", Show::Whole, |m| m.total(|f| Some(f.cull_tests)))
             .about("bounds tested against a frustum"),
-        ratio("cull_tests_ratio", "tests", |f| f.cull_tests),
+        ratio("cull_tests_ratio", "tests", |f| Some(f.cull_tests)),
         Figure::new("false_negatives", "missed", "draws", Show::Whole, |m| m.total(|f| f.false_negatives))
             .about("draws left out of which a fragment can be seen, all frames"),
         Figure::new("false_positives", "needless", "draws", Show::Whole, |m| m.total(|f| f.false_positives))
             .about("draws kept of which nothing can be seen, all frames"),
-        mean("draws", "draws", |f| f.draws),
-        ratio("draws_ratio", "draws", |f| f.draws),
-        mean("draw_calls", "calls", |f| f.draw_calls),
-        mean("state_changes", "state changes", |f| f.state_changes),
-        mean("vertices", "vertices", |f| f.vertices),
-        mean("triangles", "triangles", |f| f.triangles),
+        mean("draws", "draws", |f| Some(f.draws)),
+        ratio("draws_ratio", "draws", |f| Some(f.draws)),
+        mean("draw_calls", "calls", |f| Some(f.draw_calls)),
+        mean("state_changes", "state changes", |f| Some(f.state_changes)),
+        mean("vertices", "vertices", |f| Some(f.vertices)),
+        mean("triangles", "triangles", |f| Some(f.triangles)),
         mean("quads", "quads", |f| f.quads),
         mean("fragments", "fragments", |f| f.fragments),
         ratio("fragments_ratio", "fragments", |f| f.fragments),
-        mean("bytes_uploaded", "uploaded", |f| f.bytes_uploaded),
+        mean("bytes_uploaded", "uploaded", |f| Some(f.bytes_uploaded)),
         Figure::new("peak_memory_bytes", "memory", "MB", Show::Millions(0), |m| m.row.peak_memory_bytes)
             .about("most memory that the capturer held"),
 

@@ -218,26 +218,27 @@ fn time_and_error(measures: &Measures, manifest: &Manifest) -> Result<Markup, Pl
     })
 }
 
-/// An object's settings as text.
-fn settings(value: &serde_json::Value) -> String {
-    match value.as_object() {
-        Some(map) => map
-            .iter()
-            .map(|(key, value)| match value.as_str() {
-                Some(text) => format!("{key} = {text}"),
-                None => format!("{key} = {value}"),
-            })
-            .collect::<Vec<_>>()
-            .join(", "),
-        None => value.to_string(),
+/// A value without quotes and braces: a technique by its name, other objects key by key.
+fn plain(value: &serde_json::Value) -> String {
+    let Some(map) = value.as_object() else {
+        return value
+            .as_str()
+            .map_or_else(|| value.to_string(), str::to_owned);
+    };
+    if let Some(name) = map.get("technique") {
+        return plain(name);
     }
+    let pairs = map
+        .iter()
+        .map(|(key, value)| format!("{key} = {}", plain(value)));
+    pairs.collect::<Vec<_>>().join(", ")
 }
 
 fn chosen(auto: &Auto) -> Markup {
     html! {
         dl {
-            dt { "budget" } dd { (settings(&auto.budget)) }
-            dt { "chosen" } dd { (settings(&auto.chosen)) }
+            dt { "budget" } dd { (plain(&auto.budget)) }
+            dt { "chosen" } dd { (plain(&auto.chosen)) }
             dt { "why" } dd { (auto.reason) }
             dt { "searched on" } dd { (auto.search_frames.len()) " frames" }
             dt { "checked on" } dd { (auto.held_frames.len()) " other frames" }

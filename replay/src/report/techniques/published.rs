@@ -24,8 +24,8 @@ impl ClaimRow<'_> {
     fn saved_pct(&self) -> Option<f64> {
         let m = self.measured;
         let ratio = match self.claim.quantity {
-            Quantity::CullTests => m.over_baseline(|f| f.cull_tests),
-            Quantity::Draws => m.over_baseline(|f| f.draws),
+            Quantity::CullTests => m.over_baseline(|f| Some(f.cull_tests)),
+            Quantity::Draws => m.over_baseline(|f| Some(f.draws)),
             Quantity::Fragments => m.over_baseline(|f| f.fragments),
             Quantity::FrameTime => Some(m.timing.ratio.median),
         };
