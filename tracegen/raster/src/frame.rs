@@ -1,8 +1,9 @@
 //! What one frame draws: its light, its layers, and which draws enter each of them.
 
-use super::backend::{View, clip_from_world};
+use super::backend::View;
 use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
+use super::skips::Skipped;
 use techniques::{FramePlan, Stage};
 
 /// One frame, ready to be drawn.
@@ -12,10 +13,14 @@ pub struct Frame {
     pub lighting: Lighting,
     /// Draws that each shadow cascade may see.
     pub casters: Vec<Vec<u32>>,
+    /// Which shadow cascades may be looked up; the others need not be rendered.
+    pub cascades_seen: Vec<bool>,
     /// The layers, and how the pictures come of them.
     pub plan: FramePlan,
     /// Draws that each layer may see.
-    visible: Vec<Vec<u32>>,
+    pub(crate) visible: Vec<Vec<u32>>,
+    /// What nobody sees of it and has been left out.
+    pub skipped: Skipped,
 }
 
 impl Frame {
@@ -27,16 +32,22 @@ impl Frame {
             .collect();
         let visible = (plan.layers.iter())
             .map(|layer| {
-                let mut visible = draws.visible(clip_from_world(&layer.view));
-                visible.retain(|&draw| enters(layer.draws, draws.calls[draw as usize].mode));
+                let mut visible = draws.visible(layer.clip_from_world());
+                visible.retain(|&draw| {
+                    let call = &draws.calls[draw as usize];
+                    enters(layer.draws, call.mode) && layer.may_draw(call.bounds)
+                });
                 visible
             })
             .collect();
+        let cascades_seen = vec![true; lighting.cascades.len()];
         Self {
             lighting,
             casters,
+            cascades_seen,
             plan,
             visible,
+            skipped: Skipped::default(),
         }
     }
 

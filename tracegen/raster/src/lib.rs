@@ -21,5 +21,6 @@ pub mod lighting;
 mod roles;
 mod seen;
 mod shader;
+pub mod skips;
 mod uniforms;
 mod vertices;

@@ -3,22 +3,27 @@
 use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
+use super::technique_args::TechniqueArgs;
 use crate::picture;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
-use formats::view::Eye;
+use formats::view::{Eye, FrameViews};
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
+use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
+use raster::skips::Skipped;
 use record::CaptureCounts;
 use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use techniques::Settings;
+use techniques::layer::Predicted;
+use techniques::skips::Skip;
+use techniques::{Planner, Skips};
 use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
@@ -54,6 +59,12 @@ pub struct RasterArgs {
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
     record_budget: u64,
+    /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, draws, regions or all of
+    /// them. Pictures and trace stay the same.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    no_skip: Vec<Skip>,
+    #[command(flatten)]
+    techniques: TechniqueArgs,
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
@@ -106,18 +117,25 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
-    let settings = Settings::default();
+    let planner = Planner::new(
+        &args.techniques.settings(&setup.hmd)?,
+        &setup.hmd,
+        args.techniques.lenses(&setup.hmd),
+        args.views.eyes(),
+        args.path.fps,
+    )?;
     let job = CaptureJob {
+        scene: &setup.scene,
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
         shadow_range_m: shadow_range_m(&setup, bounds),
-        hmd: &setup.hmd,
-        eyes: args.views.eyes(),
-        settings: &settings,
+        planner: &planner,
+        skips: Skips::without(&args.no_skip),
     };
-    let seen = job.seen_images(&setup.scene, &setup.frames);
-    let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache.as_ref())?;
+    let finest = job.finest_levels(&setup.frames);
+    let searched = started.elapsed();
+    let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
     let textured = started.elapsed();
     for note in &uploads.notes {
         shell::warn(note);
@@ -133,9 +151,16 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         passes,
     );
     let (total, cached, unseen) = (uploads.textures.len(), uploads.cached, uploads.unseen());
+    let texels = format!(
+        "{:.1} MiB of texels, {:.1} MiB left out ({unseen} images and the finest levels of {} that no view samples, found in {:.2} s)",
+        mib(uploads.bytes()),
+        mib(uploads.skipped_bytes()),
+        uploads.shortened(),
+        (searched - loaded).as_secs_f64()
+    );
     drop(uploads);
     let mut summary = Summary::default();
-    let first = job.frame(&setup.frames[0]);
+    let first = summary.look(&job, &setup.frames[0]);
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
@@ -161,7 +186,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let frame = match first.take() {
             Some(first) => first,
             None => {
-                let frame = job.frame(views);
+                let frame = summary.look(&job, views);
                 summary.shadows += job.light(&mut backend, &frame)?;
                 frame
             }
@@ -180,6 +205,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         summary.sorting += sorting;
         summary.captured += start.elapsed();
         summary.counts += counts;
+        summary.predicted.push(frame.plan.predicted);
         if let Some(plain) = plain {
             summary.identical = Some(summary.identical.unwrap_or(true) && plain == pictures);
         }
@@ -209,7 +235,8 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
-    let views = [setup.frames.len(), job.eyes.len()];
+    let views = [setup.frames.len(), planner.eyes().len()];
+    note(&texels);
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
 }
@@ -262,10 +289,22 @@ struct Summary {
     captured: Duration,
     sorting: Duration,
     counts: CaptureCounts,
+    predicted: Vec<Predicted>,
     identical: Option<bool>,
+    looking: Duration,
+    skipped: Skipped,
 }
 
 impl Summary {
+    /// Finds what a frame draws.
+    fn look(&mut self, job: &CaptureJob<'_>, views: &FrameViews) -> Frame {
+        let start = Instant::now();
+        let frame = job.frame(views);
+        self.looking += start.elapsed();
+        self.skipped += frame.skipped;
+        frame
+    }
+
     fn print(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64, work: &Work) {
         let CaptureCounts {
             quads,
@@ -274,6 +313,7 @@ impl Summary {
             masked_lanes_killed,
             not_finite,
             tile_bytes,
+            empty_tiles,
         } = self.counts;
         let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
         let pixels = (views * frames) as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
@@ -283,6 +323,17 @@ impl Summary {
             size_px[1],
             fragments as f64 / pixels
         ));
+        let mean = |share: fn(&Predicted) -> Option<f32>| {
+            let shares: Option<Vec<f32>> = self.predicted.iter().map(share).collect();
+            shares.map(|shares| shares.iter().sum::<f32>() / shares.len().max(1) as f32)
+        };
+        if let (Some(rate), Some(shaded)) = (mean(|p| p.rate_share), mean(|p| p.shaded_share)) {
+            note(&format!(
+                "{:.2} % of the pixels are open to be shaded: {:.2} % by their rates, the rest for reconstruction",
+                shaded * 100.0,
+                rate * 100.0
+            ));
+        }
         if masked_lanes_killed > 0 {
             note(&format!(
                 "{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw"
@@ -307,6 +358,12 @@ impl Summary {
             self.shadows.as_secs_f64(),
             work.pipelines,
             work.samplers
+        ));
+        note(&format!(
+            "never drawn    {empty_tiles} empty tiles, {} draws without a triangle in view, {} shadow cascades that nobody sees (draws found in {:.3} s)",
+            self.skipped.draws,
+            self.skipped.cascades,
+            self.looking.as_secs_f64()
         ));
         let captured = self.captured.as_secs_f64();
         let includes = "all views, reading the pictures back";
@@ -334,6 +391,11 @@ impl Summary {
             ));
         }
     }
+}
+
+/// Bytes in MiB.
+fn mib(bytes: usize) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
 }
 
 /// Largest resident set so far, where the system tells (Linux).

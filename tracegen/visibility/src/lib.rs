@@ -2,6 +2,8 @@
 
 pub mod culling;
 pub mod frustum;
+pub mod magnification;
+pub mod receivers;
 pub mod triangles;
 
 pub use culling::Culling;

@@ -145,6 +145,7 @@ fn white() -> CompressedTexture {
             format: TexelFormat::Rgba8,
             color_space: ColorSpace::Linear,
         },
+        first_level: 0,
         blocks: vec![255; 4],
     }
 }
@@ -177,6 +178,9 @@ fn upload_texture(
             limit: limit.into(),
         });
     }
+    // Without the levels that are never sampled, the coarser ones are sampled alike: see the crate
+    // textures.
+    let [width, height] = texture.level_size(compressed.first_level);
     gpu.checked("uploading a texture", || {
         gpu.device
             .create_texture_with_data(
@@ -184,11 +188,11 @@ fn upload_texture(
                 &wgpu::TextureDescriptor {
                     label: None,
                     size: wgpu::Extent3d {
-                        width: texture.size[0],
-                        height: texture.size[1],
+                        width,
+                        height,
                         depth_or_array_layers: 1,
                     },
-                    mip_level_count: texture.levels,
+                    mip_level_count: texture.levels - compressed.first_level,
                     sample_count: 1,
                     dimension: wgpu::TextureDimension::D2,
                     format,
