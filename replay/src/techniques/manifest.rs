@@ -63,7 +63,7 @@ pub struct ManifestRow {
     pub title: String,
     /// How the capturer was set.
     #[serde(default)]
-    pub settings: Map<String, Value>,
+    pub settings: Value,
     /// Techniques that it combines.
     #[serde(default)]
     pub parts: Vec<String>,

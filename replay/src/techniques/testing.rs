@@ -4,7 +4,7 @@ use super::manifest::{Frame, ManifestRow};
 use crate::cli::testing::file_of;
 use crate::stream::synthetic::Synthetic;
 use image_error::{Picture, png};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub(crate) fn row(technique: &str, frames: u32) -> ManifestRow {
     ManifestRow {
         technique: technique.into(),
         title: technique.into(),
-        settings: Map::new(),
+        settings: Value::Null,
         parts: vec![technique.into()],
         lossless: true,
         frames: (0..frames).map(|number| frame(technique, number)).collect(),
@@ -62,7 +62,7 @@ pub(crate) fn manifest() -> Value {
                 frame
             });
             json!({
-                "technique": technique, "title": technique, "settings": {}, "parts": [technique],
+                "technique": technique, "title": technique, "settings": { "culling": technique }, "parts": [technique],
                 "lossless": lossless, "frames": frames.collect::<Vec<_>>(),
                 "peak_memory_bytes": 1_000_000, "trace": format!("traces/{technique}.textrace"), "trace_frames": [0],
             })

@@ -14,7 +14,7 @@ pub struct ClaimRow<'a> {
 pub fn claims<'a>(scenes: &'a [Measures<'a>]) -> Vec<ClaimRow<'a>> {
     let of = |claim: &'static Claim| {
         let rows = scenes.iter().flat_map(|scene| &scene.rows);
-        rows.filter(|m| m.row.technique == claim.technique)
+        rows.filter(|m| m.row.parts.len() == 1 && claim.is_about(&m.row.settings))
             .map(move |measured| ClaimRow { claim, measured })
     };
     CLAIMS.iter().flat_map(of).collect()
@@ -37,7 +37,9 @@ impl ClaimRow<'_> {
 #[rustfmt::skip]
 pub fn claim_columns<'a>() -> Vec<Column<'static, ClaimRow<'a>>> {
     vec![
-        Column::text("technique", "technique", |r: &ClaimRow| r.claim.technique),
+        Column::text("technique", "technique", |r: &ClaimRow| {
+            r.measured.row.technique.as_str()
+        }),
         Column::text("quantity", "saves", |r: &ClaimRow| r.claim.quantity.title()),
         Column::real("published_pct", "published", "%", 0, |r: &ClaimRow| r.claim.text()).published(),
         Column::text("scene", "on", |r: &ClaimRow| r.measured.scene),
