@@ -18,6 +18,7 @@ use techniques::layer::Predicted;
 use techniques::{Layer, Planner, Settings, Skips};
 use textures::TextureSet;
 
+mod culling;
 mod layers;
 
 const SIZE_PX: [u32; 2] = [200, 136];
@@ -126,7 +127,7 @@ fn capture_as(
         draws: draw_table,
         passes: job.passes(std::slice::from_ref(&views)),
     };
-    let frame = job.frame(&views);
+    let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
@@ -502,10 +503,10 @@ fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
     let mut backend =
         Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap_or_else(|e| panic!("{e}"));
     let lighting = Lighting::new(&scene);
-    for pass in 0..2 {
+    for (pass, eye) in BOTH.iter().enumerate() {
         let view = View {
             target: pass,
-            layer: &Layer::whole(BOTH[pass], views(&scene, SIZE_PX).eyes[pass], SIZE_PX),
+            layer: &Layer::whole(*eye, views(&scene, SIZE_PX).eyes[pass], SIZE_PX),
             lighting: &lighting,
             visible: &[],
         };
@@ -650,7 +651,7 @@ fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture
     let mut backend = Lavapipe::on(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
     let planner = baseline(SIZE_PX, BOTH);
     let job = job(&scene, &draws, &planner);
-    let frame = job.frame(&views(&scene, SIZE_PX));
+    let frame = job.frame(&views(&scene, SIZE_PX)).unwrap();
     job.light(&mut backend, &frame).unwrap();
     let (pictures, _) = job.plain_frame(&mut backend, &frame).unwrap();
     assert!(pictures == captured.pictures);
