@@ -268,7 +268,7 @@ fn canted() -> Hmd {
 /// Holds every technique against the truth over a few frames.
 fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
     let Some(scene) = load(spec) else { return };
-    let draws = DrawList::new(&scene, 0).unwrap();
+    let mut draws = DrawList::new(&scene, 0).unwrap();
     let set = TextureSet::compress(&scene).unwrap();
     let hmd = canted();
     let lenses = hmd.fov.map(|fov| Lens::of(&fov));
@@ -283,6 +283,9 @@ fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
     // Draws that round robin lost, by technique and eye: in the frame before, and in all.
     let mut lost = [(); 4].map(|()| (BTreeSet::new(), 0_usize));
     for views in frames(camera, &hmd, count) {
+        // Seconds apart, so that what moves goes far between frames.
+        draws.pose(&scene, 3.0 * views.frame as f32);
+        backend.pose(&draws);
         let none = plans(Culling::NONE, false);
         let everything = job(&scene, &draws, &none);
         let truth = {
@@ -353,6 +356,11 @@ fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
 #[test]
 fn nothing_visible_of_crytek_sponza_is_lost() {
     judge_scene("crytek-sponza/sponza.gltf", Some("gallery"), 4);
+}
+
+#[test]
+fn nothing_visible_of_the_plant_is_lost_while_its_cranes_move() {
+    judge_scene("plant", None, 4);
 }
 
 #[test]
