@@ -10,6 +10,9 @@ use crate::{Settings, hidden_area};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use std::sync::{Arc, Mutex};
 
+/// What each eye's picture is made of.
+type Patches = Arc<Vec<EyePatches>>;
+
 /// Plans frames of one display under the same settings.
 #[derive(Debug)]
 pub struct Planner {
@@ -19,7 +22,7 @@ pub struct Planner {
     eyes: Vec<Eye>,
     fps: f32,
     /// What the last gaze needed: it stays where the gaze does.
-    last: Mutex<Option<([f32; 2], Arc<Vec<EyePatches>>)>>,
+    last: Mutex<Option<([f32; 2], Patches)>>,
 }
 
 impl Planner {
@@ -118,7 +121,7 @@ impl Planner {
     }
 
     /// The layers of each eye for a gaze.
-    fn patches(&self, gaze_deg: [f32; 2]) -> Arc<Vec<EyePatches>> {
+    fn patches(&self, gaze_deg: [f32; 2]) -> Patches {
         // A plan cannot fail half-way: what a panic left behind is whole.
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
         if let Some((_, patches)) = last.as_ref().filter(|(gaze, _)| *gaze == gaze_deg) {
