@@ -307,6 +307,7 @@ pub(super) fn tables(
             seed: 0,
             hmd: setup.hmd.clone(),
             frames: setup.frames.clone(),
+            surfaces: Some(draws.surfaces()),
         },
         textures,
         samplers,
