@@ -246,15 +246,6 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Shadow cascades of a scene, or those that `--shadows` adds.
-pub(super) fn cascades(scene: &Scene, shadows: bool) -> u32 {
-    if shadows {
-        CASCADES
-    } else {
-        scene.shadow_cascades.min(CASCADES)
-    }
-}
-
 /// What to capture of the draws where they stand.
 fn job<'a>(
     args: &RasterArgs,
@@ -271,6 +262,15 @@ fn job<'a>(
         shadow_range_m: shadow_range_m(setup, bounds),
         planner,
         skips: Skips::without(&args.no_skip),
+    }
+}
+
+/// Shadow cascades of a scene, or those that `--shadows` adds.
+pub(super) fn cascades(scene: &Scene, shadows: bool) -> u32 {
+    if shadows {
+        CASCADES
+    } else {
+        scene.shadow_cascades.min(CASCADES)
     }
 }
 
@@ -307,6 +307,7 @@ pub(super) fn tables(
             seed: 0,
             hmd: setup.hmd.clone(),
             frames: setup.frames.clone(),
+            surfaces: Some(draws.surfaces()),
         },
         textures,
         samplers,

@@ -20,6 +20,7 @@ use textures::TextureSet;
 
 mod culling;
 mod layers;
+mod motion;
 
 const SIZE_PX: [u32; 2] = [200, 136];
 const BUDGET: u64 = 128 << 20;
@@ -120,6 +121,7 @@ fn capture_as(
             seed: 0,
             hmd: display(size_px),
             frames: vec![views.clone()],
+            surfaces: None,
         },
         textures,
         samplers,

@@ -81,7 +81,7 @@ impl Bench<'_> {
         let size_px = world.hmd.eye_size_px;
         (pictures.iter().zip(world.hmd.fov).zip(world.lens))
             .map(|((picture, fov), lens)| {
-                let mask = Mask::circle(size_px, &fov, lens.center, lens.radius);
+                let mask = Mask::of_lens(size_px, &fov, &lens);
                 let ppd = image_error::pixels_per_degree(size_px[0], &fov);
                 Reference::new(of_rgba(size_px, picture), mask, ppd).context("comparing pictures")
             })
