@@ -1,0 +1,240 @@
+//! Both eyes in one submission, and whether the driver can be trusted with it.
+//!
+//! lavapipe of Mesa 22.3 drops triangles across an edge of clip space in view 1. So a small scene of such
+//! triangles is drawn both ways first.
+
+use super::device::Gpu;
+use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, Pipelines, VIEWS};
+use crate::error::RasterError;
+use crate::uniforms::ViewData;
+
+/// Pixels along an edge of the known scene.
+const EDGE_PX: u32 = 64;
+/// Its triangles.
+const TRIANGLES: u32 = 96;
+
+/// What drawing for both eyes at once needs.
+pub struct Multiview {
+    /// Pipelines for two views.
+    pub pipelines: Pipelines,
+    /// Both `View`s.
+    pub uniform: wgpu::Buffer,
+    /// Attachments of two layers.
+    pub targets: Targets,
+}
+
+/// Colour and depth of both views.
+pub struct Targets {
+    /// Pixels of a view.
+    pub size_px: [u32; 2],
+    /// Colour, a layer a view.
+    pub color: wgpu::Texture,
+    color_view: wgpu::TextureView,
+    depth_view: wgpu::TextureView,
+}
+
+impl Multiview {
+    /// Compiles the shader for two views; pictures have `size_px`.
+    ///
+    /// # Errors
+    /// Driver and validation errors.
+    pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self, RasterError> {
+        let pipelines = Pipelines::for_both_views(gpu)?;
+        let targets = gpu.checked("making targets for both views", || Targets::new(gpu, size_px))?;
+        Ok(Self {
+            pipelines,
+            uniform: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("both views"),
+                size: u64::from(VIEWS.count_ones()) * size_of::<ViewData>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            targets,
+        })
+    }
+}
+
+impl Targets {
+    fn new(gpu: &Gpu, size_px: [u32; 2]) -> Self {
+        let texture = |format, usage| {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("both views"),
+                size: wgpu::Extent3d {
+                    width: size_px[0],
+                    height: size_px[1],
+                    depth_or_array_layers: VIEWS.count_ones(),
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
+                view_formats: &[],
+            })
+        };
+        let view = |texture: &wgpu::Texture| {
+            texture.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2Array),
+                ..Default::default()
+            })
+        };
+        let color = texture(COLOR_FORMAT, wgpu::TextureUsages::COPY_SRC);
+        let depth = texture(DEPTH_FORMAT, wgpu::TextureUsages::empty());
+        Self {
+            size_px,
+            color_view: view(&color),
+            depth_view: view(&depth),
+            color,
+        }
+    }
+
+    /// A pass over both views.
+    pub fn pass<'e>(&self, encoder: &'e mut wgpu::CommandEncoder) -> wgpu::RenderPass<'e> {
+        pass(encoder, &self.color_view, &self.depth_view, Some(VIEWS))
+    }
+}
+
+fn pass<'e>(
+    encoder: &'e mut wgpu::CommandEncoder,
+    color: &wgpu::TextureView,
+    depth: &wgpu::TextureView,
+    multiview_mask: Option<std::num::NonZeroU32>,
+) -> wgpu::RenderPass<'e> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: color,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: depth,
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(1.0),
+                store: wgpu::StoreOp::Discard,
+            }),
+            stencil_ops: None,
+        }),
+        multiview_mask,
+        ..Default::default()
+    })
+}
+
+/// Pixels of the known scene that the driver draws otherwise for both views at once than view by view.
+///
+/// # Errors
+/// Driver errors.
+pub fn differing_px(gpu: &Gpu) -> Result<u32, RasterError> {
+    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("clip edges"),
+        source: wgpu::ShaderSource::Wgsl(include_str!("../shaders/clip_edges.wgsl").into()),
+    });
+    let both = gpu.checked("drawing both views at once", || {
+        let targets = Targets::new(gpu, [EDGE_PX; 2]);
+        let pipeline = pipeline(gpu, &module, "vertex_both", 0, Some(VIEWS));
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut pass = targets.pass(&mut encoder);
+        pass.set_pipeline(&pipeline);
+        pass.draw(0..3 * TRIANGLES, 0..1);
+        drop(pass);
+        gpu.queue.submit([encoder.finish()]);
+        targets
+    })?;
+    let alone = gpu.checked("drawing view by view", || {
+        let targets = Targets::new(gpu, [EDGE_PX; 2]);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        for view in 0..VIEWS.count_ones() {
+            let pipeline = pipeline(gpu, &module, "vertex_one", view, None);
+            let layer = |texture: &wgpu::TextureView| {
+                texture.texture().create_view(&wgpu::TextureViewDescriptor {
+                    dimension: Some(wgpu::TextureViewDimension::D2),
+                    base_array_layer: view,
+                    array_layer_count: Some(1),
+                    ..Default::default()
+                })
+            };
+            let (color, depth) = (layer(&targets.color_view), layer(&targets.depth_view));
+            let mut pass = pass(&mut encoder, &color, &depth, None);
+            pass.set_pipeline(&pipeline);
+            pass.draw(0..3 * TRIANGLES, 0..1);
+        }
+        gpu.queue.submit([encoder.finish()]);
+        targets
+    })?;
+    let [both, alone] = [both, alone].map(|targets| read(gpu, &targets.color));
+    let (both, alone) = (both?, alone?);
+    let pairs = both.chunks_exact(4).zip(alone.chunks_exact(4));
+    Ok(pairs.filter(|(a, b)| a != b).count() as u32)
+}
+
+fn pipeline(
+    gpu: &Gpu,
+    module: &wgpu::ShaderModule,
+    entry_point: &'static str,
+    view: u32,
+    multiview_mask: Option<std::num::NonZeroU32>,
+) -> wgpu::RenderPipeline {
+    let constants = [("VIEW", f64::from(view))];
+    let constants: &[(&str, f64)] = if multiview_mask.is_some() { &[] } else { &constants };
+    gpu.device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(entry_point),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants,
+                    ..Default::default()
+                },
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Less),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some("fragment_color"),
+                compilation_options: Default::default(),
+                targets: &[Some(COLOR_FORMAT.into())],
+            }),
+            multiview_mask,
+            cache: None,
+        })
+}
+
+/// Both layers of the known scene's picture.
+fn read(gpu: &Gpu, color: &wgpu::Texture) -> Result<Vec<u8>, RasterError> {
+    // A row of 64 pixels is as long as copies want it.
+    let row_bytes = 4 * EDGE_PX;
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(row_bytes * EDGE_PX * VIEWS.count_ones()),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    encoder.copy_texture_to_buffer(
+        color.as_image_copy(),
+        wgpu::TexelCopyBufferInfo {
+            buffer: &buffer,
+            layout: wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(row_bytes),
+                rows_per_image: Some(EDGE_PX),
+            },
+        },
+        color.size(),
+    );
+    gpu.queue.submit([encoder.finish()]);
+    gpu.read(&buffer, 0..buffer.size(), |bytes| Ok(bytes.to_vec()))
+}
