@@ -2,6 +2,7 @@
 
 mod counter;
 pub mod device;
+mod multiview;
 mod pipelines;
 mod records;
 mod targets;
@@ -16,6 +17,7 @@ use super::roles::{MaterialState, PipelineKey, Purpose, roles};
 use super::shader::VIEW_BINDINGS;
 use super::uniforms::ViewData;
 use device::Gpu;
+use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
 use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
 use records::RecordBuffers;
@@ -43,6 +45,9 @@ pub struct Lavapipe {
     eye_bindings: wgpu::BindGroup,
     /// How each material is drawn.
     materials: Vec<MaterialState>,
+    /// Both views at once; made when it is first asked for.
+    multiview: Option<Multiview>,
+    multiview_trust: Trust,
     work: Work,
 }
 
@@ -116,6 +121,8 @@ impl Lavapipe {
             shadow_maps,
             eye_bindings,
             materials,
+            multiview: None,
+            multiview_trust: Trust::Unknown,
             work,
         })
     }
@@ -172,44 +179,81 @@ impl Lavapipe {
         Ok(plan)
     }
 
-    /// Issues a plan, setting only the state that changes. Tells how many changes there were.
+    /// Issues a plan, setting only the state that changes.
     fn issue(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         draws: &DrawList,
         plan: &[(Batch, PipelineKey)],
-    ) -> u64 {
-        let mut changes = 0;
-        let (mut last_key, mut last_material, mut last_mesh) = (None, None, None);
+    ) {
+        let mut last = None;
         pass.set_vertex_buffer(1, self.scene.instance_draws.slice(..));
         for (batch, key) in plan {
-            let call = &draws.calls[batch.draw as usize];
+            let state = State::new(draws, batch, *key);
             let (Some(mesh), Some(pipeline)) =
-                (&self.scene.meshes[call.mesh], self.pipelines.get(key))
+                (&self.scene.meshes[state.mesh], self.pipelines.get(key))
             else {
                 // Every draw's mesh is uploaded, and a plan prepares its pipelines.
                 continue;
             };
-            if last_key.replace(*key) != Some(*key) {
+            let [new_pipeline, new_material, new_mesh] = state.changes(last.replace(state));
+            if new_pipeline {
                 pass.set_pipeline(pipeline);
-                changes += 1;
             }
-            if last_material.replace(call.material) != Some(call.material) {
-                pass.set_bind_group(1, &self.scene.materials[call.material], &[]);
-                changes += 1;
+            if new_material {
+                pass.set_bind_group(1, &self.scene.materials[state.material], &[]);
             }
-            if last_mesh.replace(call.mesh) != Some(call.mesh) {
+            if new_mesh {
                 pass.set_vertex_buffer(0, mesh.vertices.slice(..));
                 if let Some(colors) = &mesh.colors {
                     pass.set_vertex_buffer(2, colors.slice(..));
                 }
                 pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-                changes += 1;
             }
             pass.draw_indexed(0..mesh.index_count, 0, batch.range.clone());
         }
-        changes
     }
+}
+
+/// What is set before a draw call.
+#[derive(Clone, Copy)]
+struct State {
+    key: PipelineKey,
+    material: usize,
+    mesh: usize,
+}
+
+impl State {
+    fn new(draws: &DrawList, batch: &Batch, key: PipelineKey) -> Self {
+        let call = &draws.calls[batch.draw as usize];
+        Self {
+            key,
+            material: call.material,
+            mesh: call.mesh,
+        }
+    }
+
+    /// Whether pipeline, material and mesh differ from those of the call before.
+    fn changes(&self, last: Option<Self>) -> [bool; 3] {
+        last.map_or([true; 3], |last| {
+            [
+                last.key != self.key,
+                last.material != self.material,
+                last.mesh != self.mesh,
+            ]
+        })
+    }
+}
+
+/// State changes of a plan.
+fn state_changes(draws: &DrawList, plan: &[(Batch, PipelineKey)]) -> u64 {
+    let mut last = None;
+    let changes = plan.iter().map(|(batch, key)| {
+        let state = State::new(draws, batch, *key);
+        let changes = state.changes(last.replace(state));
+        changes.iter().filter(|changed| **changed).count() as u64
+    });
+    changes.sum()
 }
 
 impl CaptureBackend for Lavapipe {
@@ -313,7 +357,7 @@ impl CaptureBackend for Lavapipe {
         gpu.queue
             .write_buffer(&buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         gpu.queue.write_buffer(&buffers.counter, 0, &[0; 4]);
-        let changes = gpu.checked("rendering a layer", || {
+        gpu.checked("rendering a layer", || {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 // Regions add up to a picture: everything is loaded, and the background clears
@@ -349,12 +393,11 @@ impl CaptureBackend for Lavapipe {
             }
             pass.set_pipeline(&self.pipelines.background);
             pass.draw(0..3, 0..1);
-            let changes = self.issue(&mut pass, draws, &plan);
+            self.issue(&mut pass, draws, &plan);
             drop(pass);
             gpu.queue.submit([encoder.finish()]);
-            changes
         })?;
-        self.work.state_changes += changes;
+        self.work.state_changes += state_changes(draws, &plan);
         let Some(sink) = sink else {
             let submitted = Instant::now();
             gpu.wait("rendering a layer")?;
@@ -386,6 +429,14 @@ impl CaptureBackend for Lavapipe {
             })?;
         }
         Ok(Captured::Complete)
+    }
+
+    fn multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
+        self.find_multiview_defect()
+    }
+
+    fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError> {
+        self.draw_both(draws, views)
     }
 
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {

@@ -5,8 +5,14 @@
 
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, Pipelines, VIEWS};
+use super::{Lavapipe, bind_view, state_changes};
+use crate::backend::{CaptureBackend, View};
+use crate::draws::DrawList;
 use crate::error::RasterError;
+use crate::roles::Purpose;
 use crate::uniforms::ViewData;
+use record::Region;
+use std::time::Instant;
 
 /// Pixels along an edge of the known scene.
 const EDGE_PX: u32 = 64;
@@ -21,6 +27,156 @@ pub struct Multiview {
     pub uniform: wgpu::Buffer,
     /// Attachments of two layers.
     pub targets: Targets,
+}
+
+/// What is known of the driver's multiview.
+#[derive(Clone, Debug, Default)]
+pub enum Trust {
+    /// Not tried yet.
+    #[default]
+    Unknown,
+    /// Both ways give the same picture.
+    Sound,
+    /// They do not, or there is none.
+    Defect(String),
+}
+
+impl Lavapipe {
+    /// Draws the known scene both ways when first asked.
+    pub(super) fn find_multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
+        if let Trust::Unknown = self.multiview_trust {
+            self.multiview_trust = if self.gpu.has_multiview {
+                match differing_px(&self.gpu)? {
+                    0 => Trust::Sound,
+                    differing => Trust::Defect(format!(
+                        "{}: {differing} of {} pixels of a known scene differ from drawing view by view",
+                        self.gpu.driver,
+                        2 * EDGE_PX * EDGE_PX
+                    )),
+                }
+            } else {
+                Trust::Defect(format!("{} has none", self.gpu.driver))
+            };
+        }
+        Ok(match &self.multiview_trust {
+            Trust::Defect(defect) => Some(defect.clone()),
+            Trust::Unknown | Trust::Sound => None,
+        })
+    }
+
+    /// See [`CaptureBackend::render_both`].
+    pub(super) fn draw_both(
+        &mut self,
+        draws: &DrawList,
+        views: [&View<'_>; 2],
+    ) -> Result<(), RasterError> {
+        let list = union(views[0].visible, views[1].visible);
+        let both = views.map(|view| View {
+            visible: &list,
+            ..*view
+        });
+        if self.find_multiview_defect()?.is_none() {
+            return self.draw_at_once(draws, &both);
+        }
+        let before = self.work;
+        for view in &both {
+            let whole = Region {
+                origin_px: [0, 0],
+                size_px: view.layer.size_px,
+            };
+            self.render(draws, view, whole, None)?;
+        }
+        // Counted as the one submission that it would be.
+        self.work.draws = before.draws;
+        self.work.calls = before.calls;
+        self.work.vertices = before.vertices;
+        self.work.triangles = before.triangles;
+        let plan = self.plan(draws, &list, Purpose::Plain)?;
+        self.work.state_changes = before.state_changes + state_changes(draws, &plan);
+        Ok(())
+    }
+
+    fn draw_at_once(&mut self, draws: &DrawList, views: &[View<'_>; 2]) -> Result<(), RasterError> {
+        let start = Instant::now();
+        let size_px = views[0].layer.size_px;
+        for view in views {
+            self.prepare_target(view)?;
+        }
+        let mut multiview = match self.multiview.take() {
+            Some(made) if made.targets.size_px == size_px => made,
+            _ => Multiview::new(&self.gpu, size_px)?,
+        };
+        // The pipelines for two views stand in for those for one.
+        std::mem::swap(&mut self.pipelines, &mut multiview.pipelines);
+        let drawn = self.submit_both(draws, views, &multiview, start);
+        std::mem::swap(&mut self.pipelines, &mut multiview.pipelines);
+        self.multiview = Some(multiview);
+        drawn
+    }
+
+    fn submit_both(
+        &mut self,
+        draws: &DrawList,
+        views: &[View<'_>; 2],
+        multiview: &Multiview,
+        start: Instant,
+    ) -> Result<(), RasterError> {
+        let plan = self.plan(draws, views[0].visible, Purpose::Plain)?;
+        self.work.regions += 1;
+        self.work.state_changes += state_changes(draws, &plan);
+        let data = views.each_ref().map(|view| ViewData::of_eye(view, 0));
+        self.work.bytes_uploaded += size_of_val(&data) as u64;
+        let gpu = &self.gpu;
+        gpu.queue
+            .write_buffer(&multiview.uniform, 0, bytemuck::cast_slice(&data));
+        let bindings = bind_view(
+            gpu,
+            &self.pipelines,
+            &self.scene,
+            &self.buffers,
+            &multiview.uniform,
+            &self.shadow_maps.sampled,
+        );
+        let targets = [self.target(views[0].target)?, self.target(views[1].target)?];
+        gpu.checked("rendering both views", || {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let mut pass = multiview.targets.pass(&mut encoder);
+            pass.set_bind_group(0, &bindings, &[]);
+            if let Some(any) = self.scene.materials.first() {
+                pass.set_bind_group(1, any, &[]);
+            }
+            pass.set_pipeline(&self.pipelines.background);
+            pass.draw(0..3, 0..1);
+            self.issue(&mut pass, draws, &plan);
+            drop(pass);
+            for (layer, target) in (0..).zip(targets) {
+                let mut from = multiview.targets.color.as_image_copy();
+                from.origin.z = layer;
+                let [width, height] = multiview.targets.size_px;
+                let size = wgpu::Extent3d {
+                    width,
+                    height,
+                    depth_or_array_layers: 1,
+                };
+                let to = target.color.view.texture().as_image_copy();
+                encoder.copy_texture_to_texture(from, to, size);
+            }
+            gpu.queue.submit([encoder.finish()]);
+        })?;
+        let submitted = Instant::now();
+        gpu.wait("rendering both views")?;
+        self.work.submitting += submitted - start;
+        self.work.waiting += submitted.elapsed();
+        Ok(())
+    }
+}
+
+/// Both ascending lists in one, ascending.
+fn union(a: &[u32], b: &[u32]) -> Vec<u32> {
+    let mut merged = [a, b].concat();
+    merged.sort_unstable();
+    merged.dedup();
+    merged
 }
 
 /// Colour and depth of both views.

@@ -69,7 +69,9 @@ impl ColorTarget {
     /// Driver errors.
     pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self, RasterError> {
         gpu.checked("making a render target", || {
-            let usage = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::TEXTURE_BINDING;
+            let usage = wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::COPY_DST
+                | wgpu::TextureUsages::TEXTURE_BINDING;
             let texture = attachment(gpu, size_px, 1, COLOR_FORMAT, usage);
             Self {
                 size_px,
