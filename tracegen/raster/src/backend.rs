@@ -4,7 +4,6 @@ use super::draws::DrawList;
 use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
-use formats::view::EyeView;
 use glam::Mat4;
 use record::{Captured, Region, Sink};
 use std::time::Duration;
@@ -27,14 +26,8 @@ impl View<'_> {
     /// World to clip space.
     #[must_use]
     pub fn clip_from_world(&self) -> Mat4 {
-        clip_from_world(&self.layer.view)
+        self.layer.clip_from_world()
     }
-}
-
-/// World to the clip space of an eye.
-#[must_use]
-pub(crate) fn clip_from_world(eye: &EyeView) -> Mat4 {
-    Mat4::from_cols_array_2d(&eye.eye_to_clip) * Mat4::from_cols_array_2d(&eye.world_to_eye)
 }
 
 /// What a backend has done so far.
@@ -58,6 +51,8 @@ pub struct Work {
     pub submitting: Duration,
     /// Time of waiting for their pictures.
     pub waiting: Duration,
+    /// Time of making the pictures from layers, where they are not layers.
+    pub composing: Duration,
     /// Shadow maps rendered, one a cascade.
     pub shadow_maps: u64,
     /// Pipelines made.

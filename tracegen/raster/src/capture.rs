@@ -7,12 +7,12 @@ use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
-use formats::view::{Eye, FrameViews, Hmd, TILE_SIZE_PX};
+use formats::view::{FrameViews, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::{FramePlan, Layer, Settings, Skips};
+use techniques::{FramePlan, Planner, Skips};
 
 /// What to capture, the same for plain rendering and capture.
 pub struct CaptureJob<'a> {
@@ -26,12 +26,8 @@ pub struct CaptureJob<'a> {
     pub bounds: (glam::Vec3, glam::Vec3),
     /// Distances from the head that the cascades span, metres.
     pub shadow_range_m: [f32; 2],
-    /// The display.
-    pub hmd: &'a Hmd,
-    /// The eyes whose pictures each frame has, in their order.
-    pub eyes: &'a [Eye],
-    /// What is left out or done more coarsely.
-    pub settings: &'a Settings,
+    /// Which layers the frames have.
+    pub planner: &'a Planner,
     /// What is left out because nobody sees it.
     pub skips: Skips,
 }
@@ -43,17 +39,16 @@ impl CaptureJob<'_> {
     /// How a frame is rendered.
     #[must_use]
     pub fn plan(&self, views: &FrameViews) -> FramePlan {
-        FramePlan::new(self.settings, self.hmd, self.eyes, views)
+        self.planner.plan(views)
     }
 
     /// Passes of the frames in the order in which [`Self::capture_frame`] writes them.
     #[must_use]
     pub fn passes(&self, frames: &[FrameViews]) -> Vec<Pass> {
         let of_frame = |views: &FrameViews| {
-            let (plan, frame) = (self.plan(views), views.frame);
-            plan.layers
-                .into_iter()
-                .map(move |layer| pass(frame, &layer))
+            let plan = self.plan(views);
+            let pass = |number| pass(views.frame, &plan, number);
+            (0..plan.layers.len()).map(pass).collect::<Vec<_>>()
         };
         frames.iter().flat_map(of_frame).collect()
     }
@@ -178,11 +173,18 @@ impl CaptureJob<'_> {
 }
 
 /// The pass that a layer of a frame is written as.
-fn pass(frame: u32, layer: &Layer) -> Pass {
+fn pass(frame: u32, plan: &FramePlan, number: usize) -> Pass {
+    let layer = &plan.layers[number];
+    let (kind, number) = if plan.is_picture(number) {
+        (PassKind::Main, 0)
+    } else {
+        (PassKind::Layer, layer.number)
+    };
     Pass {
         frame,
-        kind: PassKind::Main,
+        kind,
         eye: layer.eye,
+        layer: number,
         size_px: layer.size_px,
         tiles: layer.size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
     }

@@ -1,6 +1,6 @@
 //! What one frame draws: its light, its layers, and which draws enter each of them.
 
-use super::backend::{View, clip_from_world};
+use super::backend::View;
 use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
 use super::skips::Skipped;
@@ -32,8 +32,11 @@ impl Frame {
             .collect();
         let visible = (plan.layers.iter())
             .map(|layer| {
-                let mut visible = draws.visible(clip_from_world(&layer.view));
-                visible.retain(|&draw| enters(layer.draws, draws.calls[draw as usize].mode));
+                let mut visible = draws.visible(layer.clip_from_world());
+                visible.retain(|&draw| {
+                    let call = &draws.calls[draw as usize];
+                    enters(layer.draws, call.mode) && layer.may_draw(call.bounds)
+                });
                 visible
             })
             .collect();

@@ -46,7 +46,7 @@ impl CaptureJob<'_> {
     /// surface is looked into.
     fn skip_draws(&self, frame: &mut Frame, number: usize) {
         let layer = &frame.plan.layers[number];
-        let clip_from_world = super::backend::clip_from_world(&layer.view);
+        let clip_from_world = layer.clip_from_world();
         let before = frame.visible[number].len();
         frame.visible[number].retain(|&draw| {
             let call = &self.draws.calls[draw as usize];

@@ -3,6 +3,7 @@
 use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
+use super::technique_args::TechniqueArgs;
 use crate::picture;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
@@ -20,8 +21,9 @@ use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use techniques::layer::Predicted;
 use techniques::skips::Skip;
-use techniques::{Settings, Skips};
+use techniques::{Planner, Skips};
 use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
@@ -61,6 +63,8 @@ pub struct RasterArgs {
     /// them. Pictures and trace stay the same.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     no_skip: Vec<Skip>,
+    #[command(flatten)]
+    techniques: TechniqueArgs,
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
@@ -113,16 +117,20 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
-    let settings = Settings::default();
+    let planner = Planner::new(
+        &args.techniques.settings(&setup.hmd)?,
+        &setup.hmd,
+        args.techniques.lenses(&setup.hmd),
+        args.views.eyes(),
+        args.path.fps,
+    )?;
     let job = CaptureJob {
         scene: &setup.scene,
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
         shadow_range_m: shadow_range_m(&setup, bounds),
-        hmd: &setup.hmd,
-        eyes: args.views.eyes(),
-        settings: &settings,
+        planner: &planner,
         skips: Skips::without(&args.no_skip),
     };
     let finest = job.finest_levels(&setup.frames);
@@ -197,6 +205,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         summary.sorting += sorting;
         summary.captured += start.elapsed();
         summary.counts += counts;
+        summary.predicted.push(frame.plan.predicted);
         if let Some(plain) = plain {
             summary.identical = Some(summary.identical.unwrap_or(true) && plain == pictures);
         }
@@ -226,7 +235,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
-    let views = [setup.frames.len(), job.eyes.len()];
+    let views = [setup.frames.len(), planner.eyes().len()];
     note(&texels);
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
@@ -279,6 +288,7 @@ struct Summary {
     captured: Duration,
     sorting: Duration,
     counts: CaptureCounts,
+    predicted: Vec<Predicted>,
     identical: Option<bool>,
     looking: Duration,
     skipped: Skipped,
@@ -312,6 +322,17 @@ impl Summary {
             size_px[1],
             fragments as f64 / pixels
         ));
+        let mean = |share: fn(&Predicted) -> Option<f32>| {
+            let shares: Option<Vec<f32>> = self.predicted.iter().map(share).collect();
+            shares.map(|shares| shares.iter().sum::<f32>() / shares.len().max(1) as f32)
+        };
+        if let (Some(rate), Some(shaded)) = (mean(|p| p.rate_share), mean(|p| p.shaded_share)) {
+            note(&format!(
+                "{:.2} % of the pixels are open to be shaded: {:.2} % by their rates, the rest for reconstruction",
+                shaded * 100.0,
+                rate * 100.0
+            ));
+        }
         if masked_lanes_killed > 0 {
             note(&format!(
                 "{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw"

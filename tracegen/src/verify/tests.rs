@@ -4,7 +4,7 @@ use super::compare::{Agreement, compare, lanes};
 use super::reference;
 use formats::textrace::{SUBTEXELS, Tables, Textrace, TextraceWriter, Tile, TraceMeta};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
-use formats::view::{Eye, FrameViews, Hmd};
+use formats::view::{Eye, FrameViews, Hmd, Lens};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
 use raster::backend::{CaptureBackend, View, Work};
 use raster::capture::CaptureJob;
@@ -12,9 +12,13 @@ use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
 use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
+use record::CaptureCounts;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
-use techniques::{Layer, Settings, Skips};
+use techniques::layer::Predicted;
+use techniques::{Layer, Planner, Settings, Skips};
 use textures::TextureSet;
+
+mod layers;
 
 const SIZE_PX: [u32; 2] = [200, 136];
 const BUDGET: u64 = 128 << 20;
@@ -27,7 +31,8 @@ struct Captured {
     pictures_match: bool,
     /// RGBA8 by pass.
     pictures: Vec<Vec<u8>>,
-    killed: u64,
+    counts: CaptureCounts,
+    predicted: Predicted,
     work: Work,
 }
 
@@ -46,22 +51,25 @@ fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
         .remove(0)
 }
 
-fn job<'a>(
-    scene: &'a Scene,
-    draws: &'a DrawList,
-    hmd: &'a Hmd,
-    eyes: &'a [Eye],
-    settings: &'a Settings,
-) -> CaptureJob<'a> {
+/// The baseline of `eyes`.
+fn baseline(size_px: [u32; 2], eyes: &[Eye]) -> Planner {
+    planner(&Settings::default(), size_px, eyes)
+}
+
+fn planner(settings: &Settings, size_px: [u32; 2], eyes: &[Eye]) -> Planner {
+    let hmd = display(size_px);
+    let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+    Planner::new(settings, &hmd, lenses, eyes, 72.0).unwrap()
+}
+
+fn job<'a>(scene: &'a Scene, draws: &'a DrawList, planner: &'a Planner) -> CaptureJob<'a> {
     CaptureJob {
         scene,
         draws,
         lighting: Lighting::new(scene),
         bounds: scene.bounds().unwrap_or_default(),
         shadow_range_m: [0.1, 40.0],
-        hmd,
-        eyes,
-        settings,
+        planner,
         skips: Skips::default(),
     }
 }
@@ -80,12 +88,23 @@ fn try_capture(
     eyes: &[Eye],
     plain: bool,
 ) -> Result<Captured, RasterError> {
+    capture_as(&baseline(size_px, eyes), scene, cascades, budget, plain)
+}
+
+/// Captures one frame as planned, after a plain picture of it where one is wanted.
+fn capture_as(
+    planner: &Planner,
+    scene: &Scene,
+    cascades: u32,
+    budget: u64,
+    plain: bool,
+) -> Result<Captured, RasterError> {
+    let size_px = planner.hmd().eye_size_px;
     let draws = DrawList::new(scene, cascades).unwrap();
     let set = TextureSet::compress(scene).unwrap();
     let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
     let views = views(scene, size_px);
-    let (hmd, settings) = (display(size_px), Settings::default());
-    let job = job(scene, &draws, &hmd, eyes, &settings);
+    let job = job(scene, &draws, planner);
     let textures = draws.textures(&set);
     let (samplers, draw_table) = draws.tables(scene, &set, &textures);
     let tables = Tables {
@@ -98,7 +117,7 @@ fn try_capture(
             backend: "lavapipe".into(),
             driver: backend.driver().into(),
             seed: 0,
-            hmd: hmd.clone(),
+            hmd: display(size_px),
             frames: vec![views.clone()],
         },
         textures,
@@ -117,7 +136,7 @@ fn try_capture(
     let after = backend.work();
     let trace = writer.into_bytes().unwrap();
     let reader = Textrace::from_bytes(trace.clone()).unwrap();
-    let tiles = (0..eyes.len())
+    let tiles = (0..tables.passes.len())
         .map(|pass| {
             (0..tables.passes[pass].tile_count() as usize)
                 .map(|index| {
@@ -137,7 +156,8 @@ fn try_capture(
             None => true,
         },
         pictures,
-        killed: counts.masked_lanes_killed,
+        counts,
+        predicted: frame.plan.predicted,
         work: Work {
             draws: after.draws - before.draws,
             calls: after.calls - before.calls,
@@ -330,9 +350,9 @@ fn masked_draws_keep_exactly_the_lanes_that_an_in_order_gpu_keeps() {
     let scene = scene(meshes, materials, vec![checker()]);
     let captured = capture(&scene, SIZE_PX, 0, BUDGET);
     assert!(
-        captured.killed > 10_000,
+        captured.counts.masked_lanes_killed > 10_000,
         "the scene must exercise the replay, killed {}",
-        captured.killed
+        captured.counts.masked_lanes_killed
     );
     for pass in 0..2 {
         let a = agreement(&scene, &captured, pass, &checker_passes);
@@ -626,8 +646,8 @@ fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture
     let mut gpu = device::open(None).unwrap_or_else(|e| panic!("{e}"));
     gpu.no_capture = Some("what the test took away".into());
     let mut backend = Lavapipe::on(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
-    let (hmd, settings) = (display(SIZE_PX), Settings::default());
-    let job = job(&scene, &draws, &hmd, BOTH, &settings);
+    let planner = baseline(SIZE_PX, BOTH);
+    let job = job(&scene, &draws, &planner);
     let frame = job.frame(&views(&scene, SIZE_PX));
     job.light(&mut backend, &frame).unwrap();
     let (pictures, _) = job.plain_frame(&mut backend, &frame).unwrap();
