@@ -2,7 +2,7 @@
 
 use super::backend::{CaptureBackend, View};
 use super::cascades;
-use super::draws::{DrawList, DrawMode};
+use super::draws::{DrawCall, DrawList, DrawMode};
 use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
@@ -12,6 +12,7 @@ use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
+use techniques::least_work::Object;
 use techniques::{FramePlan, Planner, Skips};
 
 /// What to capture, the same for plain rendering and capture.
@@ -39,7 +40,15 @@ impl CaptureJob<'_> {
     /// How a frame is rendered.
     #[must_use]
     pub fn plan(&self, views: &FrameViews) -> FramePlan {
-        self.planner.plan(views)
+        let objects = || {
+            let size_px = self.planner.hmd().eye_size_px;
+            let object = |call: &DrawCall| {
+                let triangles = self.scene.meshes[call.mesh].triangles() as u32;
+                Object::of_bounds(call.bounds, triangles, &views.eyes, size_px)
+            };
+            self.draws.calls.iter().filter_map(object).collect()
+        };
+        self.planner.plan(views, objects)
     }
 
     /// Passes of the frames in the order in which [`Self::capture_frame`] writes them.
@@ -130,15 +139,32 @@ impl CaptureJob<'_> {
         frame: &Frame,
     ) -> Result<(Pictures, Duration), RasterError> {
         let start = Instant::now();
-        for view in frame.views() {
+        self.render_frame(backend, frame)?;
+        let pictures = pictures(backend, frame)?;
+        Ok((pictures, start.elapsed()))
+    }
+
+    /// Renders every layer of a frame; both eyes' in one submission where multiview asks for that and
+    /// they are nothing but their pictures.
+    fn render_frame(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<(), RasterError> {
+        let views: Vec<View<'_>> = frame.views().collect();
+        if let ([left, right], true) = (&views[..], self.planner.settings().multiview)
+            && [left, right].iter().all(|view| view.layer.is_plain())
+        {
+            return backend.render_both(self.draws, [left, right]);
+        }
+        for view in &views {
             let whole = Region {
                 origin_px: [0, 0],
                 size_px: view.layer.size_px,
             };
-            backend.render(self.draws, &view, whole, None)?;
+            backend.render(self.draws, view, whole, None)?;
         }
-        let pictures = pictures(backend, frame)?;
-        Ok((pictures, start.elapsed()))
+        Ok(())
     }
 
     /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the

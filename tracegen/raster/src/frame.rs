@@ -32,7 +32,7 @@ impl Frame {
             .collect();
         let visible = (plan.layers.iter())
             .map(|layer| {
-                let mut visible = draws.visible(layer.clip_from_world());
+                let mut visible = draws.visible(layer.drawn_from_world());
                 visible.retain(|&draw| {
                     let call = &draws.calls[draw as usize];
                     enters(layer.draws, call.mode) && layer.may_draw(call.bounds)

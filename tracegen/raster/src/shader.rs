@@ -80,14 +80,24 @@ pub(crate) fn of_two_views() -> String {
     let declaration = "var<uniform> view: View;";
     let two = "var<uniform> views: array<View, 2>;\nvar<private> view_number: u32;";
     assert!(one.contains(declaration), "the shader declares its view");
-    let text = one.replace(declaration, two).replace("view.", "views[view_number].");
+    let text = one
+        .replace(declaration, two)
+        .replace("view.", "views[view_number].");
     let mut told = String::with_capacity(text.len());
     let mut rest = text.as_str();
-    while let Some(stage) = ["@vertex", "@fragment"].iter().filter_map(|s| rest.find(s)).min() {
+    while let Some(stage) = ["@vertex", "@fragment"]
+        .iter()
+        .filter_map(|s| rest.find(s))
+        .min()
+    {
         // `fn name(parameters) -> result {`, perhaps over several lines.
-        let opening = rest[stage..].find("fn ").and_then(|f| Some(stage + f + rest[stage + f..].find('(')? + 1));
+        let opening = rest[stage..]
+            .find("fn ")
+            .and_then(|f| Some(stage + f + rest[stage + f..].find('(')? + 1));
         let body = opening.and_then(|o| Some(o + rest[o..].find("{\n")? + 2));
-        let (Some(opening), Some(body)) = (opening, body) else { break };
+        let (Some(opening), Some(body)) = (opening, body) else {
+            break;
+        };
         told += &rest[..opening];
         told += "@builtin(view_index) view_index: u32, ";
         told += &rest[opening..body];

@@ -124,6 +124,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         args.views.eyes(),
         args.path.fps,
     )?;
+    if let Some(first) = setup.frames.first() {
+        planner.check_views(first)?;
+    }
     let job = CaptureJob {
         scene: &setup.scene,
         draws: &draws,
@@ -141,6 +144,13 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         shell::warn(note);
     }
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
+    if planner.settings().multiview
+        && let Some(defect) = backend.multiview_defect()?
+    {
+        shell::warn(&format!(
+            "multiview cannot be trusted, so views are drawn one by one: {defect}"
+        ));
+    }
     let passes = job.passes(&setup.frames);
     let tables = tables(
         &setup,

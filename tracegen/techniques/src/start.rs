@@ -14,7 +14,7 @@ pub enum Start {
         end: f32,
     },
     /// The sky, where nearer layers leave it open; nothing is drawn elsewhere.
-    Behind(Vec<Opening>),
+    Behind([Opening; 2]),
     /// A nearer layer of the same view, and what is behind it from a layer of another one.
     Composed(Composition),
 }

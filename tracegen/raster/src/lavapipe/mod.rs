@@ -6,6 +6,7 @@ pub mod device;
 mod multiview;
 mod pipelines;
 mod records;
+mod starts;
 mod targets;
 mod upload;
 
@@ -24,10 +25,13 @@ use pipelines::Pipelines;
 use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
 use records::RecordBuffers;
 use scene::Scene;
+use starts::{Drawn, Starts};
 use std::sync::Arc;
 use std::time::Instant;
 use targets::{ColorTarget, LayerMask, LayerTarget, Readback, ShadowMaps};
+use techniques::Start;
 use techniques::plan::Picture;
+use techniques::start::Opening;
 use textures::TextureSet;
 use upload::SceneBuffers;
 use wgpu::util::DeviceExt;
@@ -53,6 +57,8 @@ pub struct Lavapipe {
     /// Both views at once; made when it is first asked for.
     multiview: Option<Multiview>,
     multiview_trust: Trust,
+    /// What layers start with that is not the sky; made when a layer does.
+    starts: Option<Starts>,
     work: Work,
 }
 
@@ -129,6 +135,7 @@ impl Lavapipe {
             materials,
             multiview: None,
             multiview_trust: Trust::Unknown,
+            starts: None,
             work,
         })
     }
@@ -206,6 +213,28 @@ impl Lavapipe {
             .write_buffer(&self.scene.instance_draws, 0, bytemuck::cast_slice(visible));
         self.work.bytes_uploaded += size_of_val(visible) as u64;
         Ok(plan)
+    }
+
+    /// What a layer starts with; nothing to draw where that is the sky alone.
+    fn start(&self, start: &Start) -> Result<Option<Drawn<'_>>, RasterError> {
+        let Some(starts) = &self.starts else {
+            return Ok(None);
+        };
+        let gpu = &self.gpu;
+        Ok(match start {
+            Start::Sky => None,
+            Start::Nearer { end } => Some(starts.nearer(gpu, *end)),
+            Start::Behind([left, right]) => {
+                let of = |opening: &Opening| self.target(opening.nearer);
+                let openings = [(left, of(left)?), (right, of(right)?)];
+                Some(starts.behind(gpu, openings))
+            }
+            Start::Composed(composition) => {
+                let nearer = self.target(composition.nearer)?;
+                let farther = self.target(composition.farther)?;
+                Some(starts.composed(gpu, composition, nearer, farther))
+            }
+        })
     }
 
     /// Issues a plan, setting only the state that changes.
@@ -384,6 +413,10 @@ impl CaptureBackend for Lavapipe {
         let plan = self.plan(draws, view.visible, purpose)?;
         self.work.regions += 1;
         self.work.bytes_uploaded += size_of::<ViewData>() as u64 + 4;
+        if view.layer.start != Start::Sky && self.starts.is_none() {
+            self.starts = Some(Starts::new(&self.gpu)?);
+        }
+        let start_drawn = self.start(&view.layer.start)?;
         let gpu = &self.gpu;
         let (buffers, target) = (&self.buffers, self.target(view.target)?);
         let data = ViewData::of_eye(view, buffers.capacity);
@@ -424,8 +457,16 @@ impl CaptureBackend for Lavapipe {
             if let Some(any) = self.scene.materials.first() {
                 pass.set_bind_group(1, any, &[]);
             }
-            pass.set_pipeline(&self.pipelines.background);
-            pass.draw(0..3, 0..1);
+            if start_drawn.as_ref().is_none_or(|start| start.over_sky) {
+                pass.set_pipeline(&self.pipelines.background);
+                pass.draw(0..3, 0..1);
+            }
+            if let Some(start) = &start_drawn {
+                pass.set_pipeline(start.pipeline);
+                pass.set_bind_group(0, &start.bindings, &[]);
+                pass.draw(0..3, 0..1);
+                pass.set_bind_group(0, &self.eye_bindings, &[]);
+            }
             if let (Some(mask), Some(composer)) = (&target.mask, &self.composer) {
                 pass.set_pipeline(&composer.mask);
                 pass.set_bind_group(0, &mask.bindings, &[]);

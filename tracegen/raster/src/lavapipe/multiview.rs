@@ -4,7 +4,7 @@
 //! triangles is drawn both ways first.
 
 use super::device::Gpu;
-use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, Pipelines, VIEWS};
+use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, Pipelines, VIEW_COUNT, VIEWS};
 use super::{Lavapipe, bind_view, state_changes};
 use crate::backend::{CaptureBackend, View};
 use crate::draws::DrawList;
@@ -196,12 +196,14 @@ impl Multiview {
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self, RasterError> {
         let pipelines = Pipelines::for_both_views(gpu)?;
-        let targets = gpu.checked("making targets for both views", || Targets::new(gpu, size_px))?;
+        let targets = gpu.checked("making targets for both views", || {
+            Targets::new(gpu, size_px)
+        })?;
         Ok(Self {
             pipelines,
             uniform: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("both views"),
-                size: u64::from(VIEWS.count_ones()) * size_of::<ViewData>() as u64,
+                size: u64::from(VIEW_COUNT) * size_of::<ViewData>() as u64,
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
@@ -218,7 +220,7 @@ impl Targets {
                 size: wgpu::Extent3d {
                     width: size_px[0],
                     height: size_px[1],
-                    depth_or_array_layers: VIEWS.count_ones(),
+                    depth_or_array_layers: VIEW_COUNT,
                 },
                 mip_level_count: 1,
                 sample_count: 1,
@@ -284,10 +286,12 @@ fn pass<'e>(
 /// # Errors
 /// Driver errors.
 pub fn differing_px(gpu: &Gpu) -> Result<u32, RasterError> {
-    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("clip edges"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("../shaders/clip_edges.wgsl").into()),
-    });
+    let module = gpu
+        .device
+        .create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("clip edges"),
+            source: wgpu::ShaderSource::Wgsl(include_str!("../shaders/clip_edges.wgsl").into()),
+        });
     let both = gpu.checked("drawing both views at once", || {
         let targets = Targets::new(gpu, [EDGE_PX; 2]);
         let pipeline = pipeline(gpu, &module, "vertex_both", 0, Some(VIEWS));
@@ -302,7 +306,7 @@ pub fn differing_px(gpu: &Gpu) -> Result<u32, RasterError> {
     let alone = gpu.checked("drawing view by view", || {
         let targets = Targets::new(gpu, [EDGE_PX; 2]);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        for view in 0..VIEWS.count_ones() {
+        for view in 0..VIEW_COUNT {
             let pipeline = pipeline(gpu, &module, "vertex_one", view, None);
             let layer = |texture: &wgpu::TextureView| {
                 texture.texture().create_view(&wgpu::TextureViewDescriptor {
@@ -334,7 +338,11 @@ fn pipeline(
     multiview_mask: Option<std::num::NonZeroU32>,
 ) -> wgpu::RenderPipeline {
     let constants = [("VIEW", f64::from(view))];
-    let constants: &[(&str, f64)] = if multiview_mask.is_some() { &[] } else { &constants };
+    let constants: &[(&str, f64)] = if multiview_mask.is_some() {
+        &[]
+    } else {
+        &constants
+    };
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(entry_point),
@@ -374,7 +382,7 @@ fn read(gpu: &Gpu, color: &wgpu::Texture) -> Result<Vec<u8>, RasterError> {
     let row_bytes = 4 * EDGE_PX;
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: None,
-        size: u64::from(row_bytes * EDGE_PX * VIEWS.count_ones()),
+        size: u64::from(row_bytes * EDGE_PX * VIEW_COUNT),
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });

@@ -15,6 +15,8 @@ pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// The views that [`Pipelines::for_both_views`] draws at once.
 pub const VIEWS: NonZeroU32 = NonZeroU32::new(0b11).unwrap();
+/// How many they are.
+pub const VIEW_COUNT: u32 = VIEWS.get().count_ones();
 
 const ADDITIVE: wgpu::BlendState = {
     let add = wgpu::BlendComponent {

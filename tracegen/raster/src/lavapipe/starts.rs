@@ -56,9 +56,7 @@ impl Starts {
                 .device
                 .create_shader_module(wgpu::ShaderModuleDescriptor {
                     label: Some("starts"),
-                    source: wgpu::ShaderSource::Wgsl(
-                        include_str!("../shaders/starts.wgsl").into(),
-                    ),
+                    source: wgpu::ShaderSource::Wgsl(include_str!("../shaders/starts.wgsl").into()),
                 });
             let make = |entry_point, textures: &[(u32, wgpu::TextureSampleType)]| {
                 Pipeline::new(gpu, &module, entry_point, textures)
@@ -89,7 +87,12 @@ impl Starts {
         let data = StartData {
             maps: [left, right].map(|opening| columns(opening.nearer_from_px)),
             from_farther_clip: Mat4::IDENTITY.to_cols_array_2d(),
-            ends: [left.end, right.end, left.reach_px.max(right.reach_px) as f32, 0.0],
+            ends: [
+                left.end,
+                right.end,
+                left.reach_px.max(right.reach_px) as f32,
+                0.0,
+            ],
         };
         let textures = [&left_target.depth_view, &right_target.depth_view];
         self.behind.drawn(gpu, &data, &textures, true)

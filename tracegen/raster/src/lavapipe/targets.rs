@@ -48,7 +48,13 @@ impl LayerTarget {
         check_size(gpu, size_px)?;
         let color = ColorTarget::new(gpu, size_px)?;
         gpu.checked("making a depth buffer", || {
-            let depth = attachment(gpu, size_px, 1, DEPTH_FORMAT, wgpu::TextureUsages::empty());
+            let depth = attachment(
+                gpu,
+                size_px,
+                1,
+                DEPTH_FORMAT,
+                wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            );
             Self {
                 color,
                 depth_view: depth.create_view(&Default::default()),

@@ -1,10 +1,10 @@
 //! The layers of a frame with a far field.
 
 use super::FarView;
+use crate::Mask;
 use crate::layer::{Layer, Predicted, Stage};
 use crate::plan::{FramePlan, Picture};
 use crate::start::{Composition, Opening, Start};
-use crate::Mask;
 use formats::view::{Eye, FrameViews};
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ pub(crate) fn plan(
         size_px: far.size_px,
         mask: None,
         draws: Stage::Opaque,
-        start: Start::Behind(vec![opening(0), opening(1)]),
+        start: Start::Behind([opening(0), opening(1)]),
     };
     let over = |eye: Eye| Layer {
         number: 1,
