@@ -13,7 +13,7 @@ use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
 use techniques::least_work::Object;
-use techniques::{FramePlan, Planner, Skips};
+use techniques::{FramePlan, Planner, Skips, Start};
 
 /// What to capture, the same for plain rendering and capture.
 pub struct CaptureJob<'a> {
@@ -125,6 +125,10 @@ impl CaptureJob<'_> {
             backend.render(self.draws, &view, corner, None)?;
             backend.render(self.draws, &view, corner, Some(&mut |_| Ok(())))?;
         }
+        if self.planner.settings().multiview {
+            // Finds out whether the driver can be trusted.
+            self.render_frame(backend, frame)?;
+        }
         backend.compose(frame)
     }
 
@@ -201,7 +205,8 @@ impl CaptureJob<'_> {
 /// The pass that a layer of a frame is written as.
 fn pass(frame: u32, plan: &FramePlan, number: usize) -> Pass {
     let layer = &plan.layers[number];
-    let (kind, number) = if plan.is_picture(number) {
+    let whole = plan.is_picture(number) && layer.start == Start::Sky;
+    let (kind, number) = if whole {
         (PassKind::Main, 0)
     } else {
         (PassKind::Layer, layer.number)

@@ -144,13 +144,6 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         shell::warn(note);
     }
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
-    if planner.settings().multiview
-        && let Some(defect) = backend.multiview_defect()?
-    {
-        shell::warn(&format!(
-            "multiview cannot be trusted, so views are drawn one by one: {defect}"
-        ));
-    }
     let passes = job.passes(&setup.frames);
     let tables = tables(
         &setup,
@@ -174,6 +167,13 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
+    }
+    if planner.settings().multiview
+        && let Some(defect) = backend.multiview_defect()?
+    {
+        shell::warn(&format!(
+            "multiview cannot be trusted, so views are drawn one by one: {defect}"
+        ));
     }
     let mut first = Some(first);
     let mut recorder = job.recorder(&tables);

@@ -18,6 +18,7 @@ use techniques::layer::Predicted;
 use techniques::{Layer, Planner, Settings, Skips};
 use textures::TextureSet;
 
+mod far_field;
 mod layers;
 
 const SIZE_PX: [u32; 2] = [200, 136];

@@ -1,5 +1,5 @@
-// Triangles across every edge of clip space, moved a little between the views: drivers that draw them
-// alike one view at a time and both at once can be trusted with both at once.
+// Triangles across every edge of clip space, and some that cross an edge in the second view alone: a
+// driver that draws them otherwise for both views at once than view by view cannot be trusted with both.
 
 struct Corner {
     @builtin(position) position: vec4<f32>,
@@ -14,9 +14,15 @@ fn hash(number: u32) -> f32 {
 
 fn corner(index: u32, view: u32) -> Corner {
     let w = 0.1 + 2.0 * hash(4u * index);
-    let x = (6.0 * hash(4u * index + 1u) - 3.0) + 0.2 * f32(view);
-    let y = 6.0 * hash(4u * index + 2u) - 3.0;
-    let z = w * (1.6 * hash(4u * index + 3u) - 0.3);
+    var x = (6.0 * hash(4u * index + 1u) - 3.0) + 0.2 * f32(view);
+    var y = 6.0 * hash(4u * index + 2u) - 3.0;
+    var z = w * (1.6 * hash(4u * index + 3u) - 0.3);
+    if (index / 3u) % 2u == 1u {
+        // Inside near the right edge; across it in the second view.
+        x = w * (0.6 + 0.38 * hash(4u * index + 1u) + 0.2 * f32(view));
+        y = w * (1.8 * hash(4u * index + 2u) - 0.9);
+        z = w * (0.1 + 0.8 * hash(4u * index + 3u));
+    }
     var out: Corner;
     out.position = vec4(x, y, z, w);
     let triangle = index / 3u;
