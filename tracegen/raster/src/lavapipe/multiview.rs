@@ -83,7 +83,7 @@ impl Lavapipe {
             if let Trust::Sound = self.multiview_trust {
                 return Ok(());
             }
-            at_once = Some(self.both_pictures(&both)?);
+            at_once = Some((self.both_pictures(&both)?, self.work));
         }
         let before = self.work;
         for view in &both {
@@ -93,7 +93,7 @@ impl Lavapipe {
             };
             self.render(draws, view, whole, None)?;
         }
-        if let Some(at_once) = at_once {
+        if let Some((at_once, counted)) = at_once {
             // The first frame is the other scene that both ways must agree on.
             let differing = differing(&at_once, &self.both_pictures(&both)?);
             self.multiview_trust = match differing {
@@ -103,7 +103,7 @@ impl Lavapipe {
                     self.gpu.driver
                 )),
             };
-            self.work = before;
+            self.work = counted;
             return Ok(());
         }
         // Counted as the one submission that it would be.
