@@ -11,7 +11,7 @@ use tempfile::TempDir;
 fn capture(folder: &Path, name: &str, options: &[&str]) -> (Command, PathBuf) {
     let path = folder.join(name);
     let mut command = program("tracegen");
-    command.args(["raster", "atrium", "--size", "96x80", "--no-plain", "-o"]);
+    command.args(["raster", "teapot", "--size", "96x80", "--no-plain", "-o"]);
     command.arg(&path).args(options);
     (command, path)
 }
