@@ -4,6 +4,7 @@ use super::draws::DrawList;
 use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
+use formats::view::Lens;
 use glam::Mat4;
 use record::{Captured, Region, Sink};
 use std::time::Duration;
@@ -28,6 +29,15 @@ impl View<'_> {
     pub fn clip_from_world(&self) -> Mat4 {
         self.layer.clip_from_world()
     }
+}
+
+/// Where a draw is visible.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Marks {
+    /// Anywhere in the picture.
+    pub picture: bool,
+    /// At a pixel whose centre the lens shows.
+    pub lens: bool,
 }
 
 /// What a backend has done so far.
@@ -98,6 +108,25 @@ pub trait CaptureBackend {
         region: Region,
         sink: Option<&mut Sink<'_>>,
     ) -> Result<Captured, RasterError>;
+
+    /// Renders the depth of a view's opaque and masked draws alone, and reads it: row by row, 1 where
+    /// there is nothing.
+    ///
+    /// # Errors
+    /// Driver errors.
+    fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError>;
+
+    /// Draws everything, culled or not, and tells for each draw whether it is visible in a view: a
+    /// fragment of it passes the depth test against the final depth (and its alpha test).
+    ///
+    /// # Errors
+    /// Driver errors, and a device that cannot capture.
+    fn marks(
+        &mut self,
+        draws: &DrawList,
+        view: &View<'_>,
+        lens: &Lens,
+    ) -> Result<Vec<Marks>, RasterError>;
 
     /// Why the driver's multiview cannot be trusted; `None` where it can.
     ///

@@ -65,6 +65,7 @@ mod tests {
             moving: Vec::new(),
             groups: Vec::new(),
             cascades: 0,
+            hierarchy: visibility::Hierarchy::default(),
         }
     }
 

@@ -7,13 +7,14 @@ use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
-use formats::view::{FrameViews, TILE_SIZE_PX};
+use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
 use techniques::least_work::Object;
 use techniques::{FramePlan, Planner, Skips, Start};
+use visibility::Rig;
 
 /// What to capture, the same for plain rendering and capture.
 pub struct CaptureJob<'a> {
@@ -71,15 +72,17 @@ impl CaptureJob<'_> {
 
     /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds what each
     /// layer may see.
-    #[must_use]
-    pub fn frame(&self, views: &FrameViews) -> Frame {
-        let mut frame = self.boxes_seen(views);
+    ///
+    /// # Errors
+    /// Eyes that the culling technique is not made for.
+    pub fn frame(&self, views: &FrameViews) -> Result<Frame, RasterError> {
+        let mut frame = self.boxes_seen(views)?;
         self.skip(&mut frame);
-        frame
+        Ok(frame)
     }
 
     /// The frame as the boxes of its draws tell it.
-    pub(crate) fn boxes_seen(&self, views: &FrameViews) -> Frame {
+    pub(crate) fn boxes_seen(&self, views: &FrameViews) -> Result<Frame, RasterError> {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
         lighting.cascades = cascades::fit(
@@ -90,7 +93,22 @@ impl CaptureJob<'_> {
             near,
             far,
         );
-        Frame::new(self.draws, lighting, self.plan(views))
+        let (culling, number) = (self.planner.settings().culling, views.frame);
+        let (plan, rig) = (self.plan(views), self.rig(views));
+        Ok(Frame::new(
+            self.draws, lighting, plan, rig, culling, number,
+        )?)
+    }
+
+    /// The eyes of a frame.
+    #[must_use]
+    pub fn rig(&self, views: &FrameViews) -> Rig {
+        let eye = |eye: &Eye| visibility::Eye {
+            view: views.eyes[*eye as usize],
+            lens: self.planner.lenses()[*eye as usize],
+            size_px: self.planner.hmd().eye_size_px,
+        };
+        Rig::new(self.planner.eyes().iter().map(eye).collect())
     }
 
     /// Renders the frame's shadow maps: once for all its pictures.

@@ -11,7 +11,7 @@ use scene::geometry::transformed_box;
 use scene::{AlphaMode, Instance, Material, Mesh, Scene};
 use std::collections::{HashMap, HashSet};
 use textures::TextureSet;
-use visibility::frustum;
+use visibility::{Hierarchy, frustum};
 
 /// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
 pub const SHADOW_SIZE: u32 = 2048;
@@ -77,7 +77,7 @@ impl ShownMesh {
 
     fn bounds(&self, scene: &Scene, instance: &Instance) -> [Vec3; 2] {
         let positions = &scene.meshes[instance.mesh].positions;
-        transformed_box(positions, self.object_box, &instance.transform)
+        world_box(positions, self.object_box, &instance.transform)
     }
 }
 
@@ -115,6 +115,8 @@ pub struct DrawList {
     pub groups: Vec<MaterialGroups>,
     /// Shadow cascades that lit draws sample, 0 to 4.
     pub cascades: u32,
+    /// The tree over the draws' bounds.
+    pub hierarchy: Hierarchy,
 }
 
 impl DrawList {
@@ -164,8 +166,10 @@ impl DrawList {
                     })?;
             }
         }
+        let bounds: Vec<[Vec3; 2]> = calls.iter().map(|call| call.bounds).collect();
         let moving = moving(scene, &calls);
         Ok(Self {
+            hierarchy: Hierarchy::new(&bounds),
             calls,
             moving,
             groups: scene.materials.iter().map(MaterialGroups::new).collect(),
@@ -185,16 +189,27 @@ impl DrawList {
             if let Some(transform) = moved.get(&call.instance) {
                 let mesh = &scene.meshes[call.mesh];
                 call.transform = *transform;
-                call.bounds = transformed_box(&mesh.positions, mesh.bounds(), transform);
+                call.bounds = world_box(&mesh.positions, mesh.bounds(), transform);
             }
         }
+        let bounds = |&draw: &u32| (draw, self.calls[draw as usize].bounds);
+        self.hierarchy.refit(self.moving.iter().map(bounds));
         &self.moving
     }
 
     /// Indices of the draws that a view or a shadow cascade may see, ascending.
     #[must_use]
     pub fn visible(&self, clip_from_world: Mat4) -> Vec<u32> {
-        frustum::visible(self.calls.iter().map(|call| call.bounds), clip_from_world)
+        self.hierarchy.entering(clip_from_world)
+    }
+
+    /// Those of `list` that a view may see.
+    #[must_use]
+    pub(crate) fn visible_of(&self, list: &[u32], clip_from_world: Mat4) -> Vec<u32> {
+        let bounds = list.iter().map(|&draw| self.calls[draw as usize].bounds);
+        (frustum::visible(bounds, clip_from_world).into_iter())
+            .map(|position| list[position as usize])
+            .collect()
     }
 
     /// The draws of a layer that may touch a region of it, ascending.
@@ -206,10 +221,7 @@ impl DrawList {
         }
         let clip =
             frustum::crop(region.origin_px, region.size_px, size_px) * view.clip_from_world();
-        let bounds = (view.visible.iter()).map(|&draw| self.calls[draw as usize].bounds);
-        (frustum::visible(bounds, clip).into_iter())
-            .map(|position| view.visible[position as usize])
-            .collect()
+        self.visible_of(view.visible, clip)
     }
 
     /// Texture table of the trace: the scene's textures in their order, then the shadow maps.
@@ -319,6 +331,20 @@ fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
             samplers.len() - 1
         });
     index as u16
+}
+
+/// World-space bounds of a mesh, rounding of its vertices on the way through any driver included;
+/// `object_box` is its box in object space.
+fn world_box(positions: &[Vec3], object_box: [Vec3; 2], transform: &Affine3A) -> [Vec3; 2] {
+    // Parts of the magnitude of the sums that a coordinate comes from: 8 units in the last place.
+    const ROUNDING: f32 = 8.0 * f32::EPSILON / 2.0;
+    let m = &transform.matrix3;
+    let p = object_box[0].abs().max(object_box[1].abs());
+    let axes = [m.x_axis, m.y_axis, m.z_axis].map(|axis| Vec3::from(axis.abs()));
+    let start = Vec3::from(transform.translation.abs());
+    let margin = (axes[0] * p.x + axes[1] * p.y + axes[2] * p.z + start) * ROUNDING;
+    let [low, high] = transformed_box(positions, object_box, transform);
+    [low - margin, high + margin]
 }
 
 /// The draws whose instances move.

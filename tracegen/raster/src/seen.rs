@@ -2,6 +2,7 @@
 
 use super::capture::CaptureJob;
 use super::draws::{DrawCall, DrawMode, SHADOW_SIZE};
+use super::error::RasterError;
 use super::groups::MATERIAL_TEXTURES;
 use formats::texture::MipFilter;
 use formats::view::FrameViews;
@@ -20,15 +21,17 @@ impl CaptureJob<'_> {
     /// For each image of the scene, the finest mip level that may be sampled: by a draw that a view of
     /// any frame may see, or by a masked caster that a shadow cascade may see. `None` for an image that
     /// nothing samples.
-    #[must_use]
-    pub fn finest_levels(&self, frames: &[FrameViews]) -> Vec<Option<u32>> {
+    ///
+    /// # Errors
+    /// Eyes that the culling technique is not made for.
+    pub fn finest_levels(&self, frames: &[FrameViews]) -> Result<Vec<Option<u32>>, RasterError> {
         let scene = self.scene;
         if !self.skips.images {
-            return vec![Some(0); scene.images.len()];
+            return Ok(vec![Some(0); scene.images.len()]);
         }
         let mut finest = vec![None; scene.images.len()];
         for views in frames {
-            let frame = self.boxes_seen(views);
+            let frame = self.boxes_seen(views)?;
             for view in frame.views() {
                 let projection = view.layer.view.eye_to_clip;
                 let pixels = Pixels {
@@ -50,7 +53,7 @@ impl CaptureJob<'_> {
                 self.sample(scene, &pixels, casters, slots, &mut finest);
             }
         }
-        finest
+        Ok(finest)
     }
 
     /// Adds what a view samples through the first `slots` of its draws' materials.

@@ -12,6 +12,7 @@ use formats::view::{Eye, FrameViews};
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
+use raster::error::RasterError;
 use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
@@ -25,6 +26,7 @@ use techniques::layer::Predicted;
 use techniques::skips::Skip;
 use techniques::{Planner, Skips};
 use textures::TextureSet;
+use visibility::Occlusion;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;
@@ -120,7 +122,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let planner = Planner::new(
         &args.techniques.settings(&setup.hmd)?,
         &setup.hmd,
-        args.techniques.lenses(&setup.hmd),
+        args.techniques.lenses(&setup.hmd)?,
         args.views.eyes(),
         args.path.fps,
     )?;
@@ -136,7 +138,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         planner: &planner,
         skips: Skips::without(&args.no_skip),
     };
-    let finest = job.finest_levels(&setup.frames);
+    let finest = job.finest_levels(&setup.frames)?;
     let searched = started.elapsed();
     let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
     let textured = started.elapsed();
@@ -163,7 +165,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     );
     drop(uploads);
     let mut summary = Summary::default();
-    let first = summary.look(&job, &setup.frames[0]);
+    let first = summary.look(&job, &mut backend, &setup.frames[0])?;
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
@@ -196,7 +198,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let frame = match first.take() {
             Some(first) => first,
             None => {
-                let frame = summary.look(&job, views);
+                let frame = summary.look(&job, &mut backend, views)?;
                 summary.shadows += job.light(&mut backend, &frame)?;
                 frame
             }
@@ -301,17 +303,34 @@ struct Summary {
     predicted: Vec<Predicted>,
     identical: Option<bool>,
     looking: Duration,
+    culling: Duration,
+    cull_tests: u64,
+    occlusion: Occlusion,
+    occlusion_tests: u64,
+    occluded: u64,
     skipped: Skipped,
 }
 
 impl Summary {
     /// Finds what a frame draws.
-    fn look(&mut self, job: &CaptureJob<'_>, views: &FrameViews) -> Frame {
+    fn look(
+        &mut self,
+        job: &CaptureJob<'_>,
+        backend: &mut dyn CaptureBackend,
+        views: &FrameViews,
+    ) -> Result<Frame, RasterError> {
         let start = Instant::now();
-        let frame = job.frame(views);
+        let mut frame = job.frame(views)?;
+        if job.planner.settings().occlusion {
+            job.occlude(backend, &mut frame, &mut self.occlusion)?;
+        }
         self.looking += start.elapsed();
         self.skipped += frame.skipped;
-        frame
+        self.cull_tests += frame.cull_tests;
+        self.occlusion_tests += frame.occlusion_tests;
+        self.occluded += frame.occluded;
+        self.culling += frame.cull_time;
+        Ok(frame)
     }
 
     fn print(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64, work: &Work) {
@@ -367,6 +386,13 @@ impl Summary {
             self.shadows.as_secs_f64(),
             work.pipelines,
             work.samplers
+        ));
+        note(&format!(
+            "culling        {} boxes tested, {} more against depth that hides {} draws, in {:.3} ms a frame",
+            self.cull_tests,
+            self.occlusion_tests,
+            self.occluded,
+            self.culling.as_secs_f64() * 1e3 / frames as f64
         ));
         note(&format!(
             "never drawn    {empty_tiles} empty tiles, {} draws without a triangle in view, {} shadow cascades that nobody sees (draws found in {:.3} s)",

@@ -1,6 +1,7 @@
 //! Flags that say what a capture may leave out or do more coarsely.
 
-use anyhow::ensure;
+use anyhow::{bail, ensure};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use formats::view::{Hmd, Lens};
 use scene::paths::read_gazes;
@@ -10,11 +11,23 @@ use techniques::Gaze;
 use techniques::Settings;
 use techniques::gaze::GazeSample;
 use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
+use visibility::Culling;
 
 /// Techniques of a capture.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Techniques")]
 pub struct TechniqueArgs {
+    /// How the draws of a frame are found.
+    #[arg(long, value_name = "NAME", default_value = Culling::default().name(),
+          value_parser = culling_parser())]
+    cull: Culling,
+    /// Leave out draws that others hide: what the last frame showed is drawn for its depth first.
+    #[arg(long)]
+    occlusion: bool,
+    /// Radius of the circle that the lens shows of an eye's picture, as a tangent [default: half of
+    /// the sum of the longer axis's tangents].
+    #[arg(long, value_name = "TAN", allow_hyphen_values = true)]
+    lens_radius: Option<f32>,
     /// Draw nothing that the lens does not show.
     #[arg(long)]
     hidden_area_mask: bool,
@@ -119,6 +132,8 @@ impl TechniqueArgs {
     /// A gaze that cannot be read, rates that nothing uses, and what [`Settings::check`] refuses.
     pub fn settings(&self, hmd: &Hmd) -> anyhow::Result<Settings> {
         let settings = Settings {
+            culling: self.cull,
+            occlusion: self.occlusion,
             multiview: self.multiview,
             hidden_area_mask: self.hidden_area_mask,
             far_field: self.far_field.map(|SplitFlag(split)| FarField {
@@ -166,9 +181,28 @@ impl TechniqueArgs {
     }
 
     /// What the lenses show of the left and right eye's picture.
-    pub fn lenses(&self, hmd: &Hmd) -> [Lens; 2] {
-        hmd.fov.map(|fov| Lens::of(&fov))
+    ///
+    /// # Errors
+    /// A radius out of range.
+    pub fn lenses(&self, hmd: &Hmd) -> anyhow::Result<[Lens; 2]> {
+        let lenses = hmd.fov.map(|fov| {
+            let lens = Lens::of(&fov);
+            let radius = self.lens_radius.unwrap_or(lens.radius);
+            Lens { radius, ..lens }
+        });
+        for lens in &lenses {
+            if let Err(broken) = lens.check() {
+                let (expected, found) = (broken.expected, broken.found);
+                bail!("--lens-radius: expected {expected}, found {found}");
+            }
+        }
+        Ok(lenses)
     }
+}
+
+fn culling_parser() -> impl TypedValueParser<Value = Culling> {
+    let value = |technique: Culling| PossibleValue::new(technique.name()).help(technique.help());
+    PossibleValuesParser::new(Culling::all().map(value)).try_map(|name| name.parse::<Culling>())
 }
 
 /// A direction, or a file of them.

@@ -19,6 +19,7 @@ use techniques::layer::Predicted;
 use techniques::{Layer, Planner, Settings, Skips};
 use textures::TextureSet;
 
+mod culling;
 mod far_field;
 mod layers;
 mod skips;
@@ -122,7 +123,7 @@ fn capture_skipping(
         skips,
         ..job(scene, &draws, planner)
     };
-    let finest = job.finest_levels(std::slice::from_ref(&views));
+    let finest = job.finest_levels(std::slice::from_ref(&views))?;
     let set = TextureSet::prepare(scene, |image| finest[image], None).unwrap();
     let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
     let textures = draws.textures(&set);
@@ -145,7 +146,7 @@ fn capture_skipping(
         draws: draw_table,
         passes: job.passes(std::slice::from_ref(&views)),
     };
-    let frame = job.frame(&views);
+    let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
@@ -670,7 +671,7 @@ fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture
     let mut backend = Lavapipe::on(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
     let planner = baseline(SIZE_PX, BOTH);
     let job = job(&scene, &draws, &planner);
-    let frame = job.frame(&views(&scene, SIZE_PX));
+    let frame = job.frame(&views(&scene, SIZE_PX)).unwrap();
     job.light(&mut backend, &frame).unwrap();
     let (pictures, _) = job.plain_frame(&mut backend, &frame).unwrap();
     assert!(pictures == captured.pictures);

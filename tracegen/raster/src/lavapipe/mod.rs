@@ -9,8 +9,9 @@ mod records;
 mod starts;
 mod targets;
 mod upload;
+mod visible;
 
-use super::backend::{CaptureBackend, View, Work};
+use super::backend::{CaptureBackend, Marks, View, Work};
 use super::batches::{Batch, batches};
 use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
@@ -20,6 +21,7 @@ use super::shader::VIEW_BINDINGS;
 use super::uniforms::ViewData;
 use compose::Composer;
 use device::Gpu;
+use formats::view::Lens;
 use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
 use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
@@ -111,6 +113,7 @@ impl Lavapipe {
             &pipelines,
             &buffers,
             &record_buffers,
+            &record_buffers.records,
             &record_buffers.view_uniform,
             &shadow_maps.sampled,
         );
@@ -361,6 +364,7 @@ impl CaptureBackend for Lavapipe {
                 &self.pipelines,
                 &self.scene,
                 &self.buffers,
+                &self.buffers.records,
                 &uniform,
                 &stand_in.sampled,
             );
@@ -519,6 +523,19 @@ impl CaptureBackend for Lavapipe {
         self.draw_both(draws, views)
     }
 
+    fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError> {
+        self.read_depth(draws, view)
+    }
+
+    fn marks(
+        &mut self,
+        draws: &DrawList,
+        view: &View<'_>,
+        lens: &Lens,
+    ) -> Result<Vec<Marks>, RasterError> {
+        self.read_marks(draws, view, lens)
+    }
+
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
         let start = Instant::now();
         let mut composes = false;
@@ -578,6 +595,7 @@ fn bind_view(
     pipelines: &Pipelines,
     scene: &SceneBuffers,
     buffers: &RecordBuffers,
+    records: &wgpu::Buffer,
     uniform: &wgpu::Buffer,
     shadow_map: &wgpu::TextureView,
 ) -> wgpu::BindGroup {
@@ -591,7 +609,7 @@ fn bind_view(
         uniform.as_entire_binding(),
         scene.instances.as_entire_binding(),
         buffers.counter.as_entire_binding(),
-        buffers.records.as_entire_binding(),
+        records.as_entire_binding(),
         wgpu::BindingResource::TextureView(shadow_map),
         wgpu::BindingResource::Sampler(&sampler),
         buffers.depths.as_entire_binding(),

@@ -163,6 +163,7 @@ impl Lavapipe {
             &self.pipelines,
             &self.scene,
             &self.buffers,
+            &self.buffers.records,
             &multiview.uniform,
             &self.shadow_maps.sampled,
         );

@@ -116,7 +116,7 @@ fn draw(
     views: &FrameViews,
 ) -> Frame {
     let job = job(scene, draws, planner);
-    let frame = job.frame(views);
+    let frame = job.frame(views).unwrap();
     job.light(backend, &frame).unwrap();
     let (pictures, _) = job.plain_frame(backend, &frame).unwrap();
     let layers = 0..frame.plan.layers.len();
