@@ -523,10 +523,10 @@ fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
     let mut backend =
         Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap_or_else(|e| panic!("{e}"));
     let lighting = Lighting::new(&scene);
-    for pass in 0..2 {
+    for (pass, eye) in BOTH.iter().enumerate() {
         let view = View {
             target: pass,
-            layer: &Layer::whole(BOTH[pass], views(&scene, SIZE_PX).eyes[pass], SIZE_PX),
+            layer: &Layer::whole(*eye, views(&scene, SIZE_PX).eyes[pass], SIZE_PX),
             lighting: &lighting,
             visible: &[],
         };

@@ -15,6 +15,9 @@ use std::sync::{Arc, Mutex};
 /// Largest edge of a layer.
 const MAX_LAYER_PX: u32 = 8192;
 
+/// What each eye's picture is made of.
+type Patches = Arc<Vec<EyePatches>>;
+
 /// Plans frames of one display under the same settings.
 #[derive(Debug)]
 pub struct Planner {
@@ -24,7 +27,7 @@ pub struct Planner {
     eyes: Vec<Eye>,
     fps: f32,
     /// What the last gaze needed: it stays where the gaze does.
-    last: Mutex<Option<([f32; 2], Arc<Vec<EyePatches>>)>>,
+    last: Mutex<Option<([f32; 2], Patches)>>,
 }
 
 impl Planner {
@@ -164,7 +167,7 @@ impl Planner {
     }
 
     /// The layers of each eye for a gaze.
-    fn patches(&self, gaze_deg: [f32; 2]) -> Arc<Vec<EyePatches>> {
+    fn patches(&self, gaze_deg: [f32; 2]) -> Patches {
         // A plan cannot fail half-way: what a panic left behind is whole.
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
         if let Some((_, patches)) = last.as_ref().filter(|(gaze, _)| *gaze == gaze_deg) {
