@@ -145,30 +145,17 @@ impl CaptureJob<'_> {
         }
         if self.planner.settings().multiview {
             // Finds out whether the driver can be trusted.
-            self.render_frame(backend, frame)?;
+            self.render_layers(backend, frame)?;
         }
         backend.compose(frame)
     }
 
-    /// Renders a frame without capture: every layer, pictures composed and read back. The frame's
-    /// shadow maps have been rendered.
+    /// Renders every layer of a frame without capture; both eyes' in one submission where multiview asks
+    /// for that and they are nothing but their pictures. The frame's shadow maps have been rendered.
     ///
     /// # Errors
     /// Driver errors.
-    pub fn plain_frame(
-        &self,
-        backend: &mut dyn CaptureBackend,
-        frame: &Frame,
-    ) -> Result<(Pictures, Duration), RasterError> {
-        let start = Instant::now();
-        self.render_frame(backend, frame)?;
-        let pictures = pictures(backend, frame)?;
-        Ok((pictures, start.elapsed()))
-    }
-
-    /// Renders every layer of a frame; both eyes' in one submission where multiview asks for that and
-    /// they are nothing but their pictures.
-    fn render_frame(
+    pub fn render_layers(
         &self,
         backend: &mut dyn CaptureBackend,
         frame: &Frame,
@@ -187,6 +174,22 @@ impl CaptureJob<'_> {
             backend.render(self.draws, view, whole, None)?;
         }
         Ok(())
+    }
+
+    /// Renders a frame without capture: every layer, pictures composed and read back. The frame's
+    /// shadow maps have been rendered.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn plain_frame(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<(Pictures, Duration), RasterError> {
+        let start = Instant::now();
+        self.render_layers(backend, frame)?;
+        let pictures = pictures(backend, frame)?;
+        Ok((pictures, start.elapsed()))
     }
 
     /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the

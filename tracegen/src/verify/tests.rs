@@ -22,6 +22,7 @@ use textures::TextureSet;
 mod culling;
 mod far_field;
 mod layers;
+mod motion;
 mod skips;
 
 const SIZE_PX: [u32; 2] = [200, 136];
@@ -140,6 +141,7 @@ fn capture_skipping(
             seed: 0,
             hmd: display(size_px),
             frames: vec![views.clone()],
+            surfaces: None,
         },
         textures,
         samplers,

@@ -374,3 +374,11 @@ fn nothing_visible_of_the_black_forest_is_lost() {
 fn nothing_visible_of_the_plant_is_lost() {
     judge_scene("plant", None, 3);
 }
+
+#[test]
+#[ignore = "minutes: a head that turns by 180 degrees in each of the three scenes"]
+fn nothing_visible_of_any_scene_is_lost_over_many_frames() {
+    judge_scene("crytek-sponza/sponza.gltf", Some("gallery"), 60);
+    judge_scene("stk-black-forest/stk-black-forest.gltf", Some("brook"), 60);
+    judge_scene("plant", None, 60);
+}
