@@ -140,6 +140,7 @@ fn made_up_trace() -> Textrace {
             frame: 0,
             kind: PassKind::Main,
             eye: None,
+            layer: 0,
             size_px: [512; 2],
             tiles: [32; 2],
         }],

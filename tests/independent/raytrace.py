@@ -327,7 +327,7 @@ def read_tile(data, pixels, eye, meta, bvh, triangles):
 
 
 def main(path):
-    chunks = read(path, 2)
+    chunks, _minor = read(path, 2)
     require(TAGS <= set(chunks), "chunks missing")
     meta = check_ray_meta(shaped(parse_json(chunks["META"]), RAY_META))
     bvh = check_hierarchy(shaped(parse_json(chunks["RBVH"]), HIERARCHY))

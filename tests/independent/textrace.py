@@ -88,11 +88,12 @@ def read_draw(data, textures, samplers):
 
 
 def read_pass(data, meta):
-    frame, kind, eye, zero, width, height, columns, rows = data.fields("IBBHIIII")
-    require(zero == 0 and columns >= 1 and rows >= 1, "a pass")
+    frame, kind, eye, layer, width, height, columns, rows = data.fields("IBBHIIII")
+    require(columns >= 1 and rows >= 1, "a pass")
     require((columns, rows) == (-(-width // 16), -(-height // 16)), "tiles of a pass")
     require(frame in [views["frame"] for views in meta["frames"]], "a frame that is not there")
-    kind = named({0: "main", 1: "shadow"}, kind)
+    kind = named({0: "main", 1: "shadow", 2: "layer"}, kind)
+    require(kind == "layer" or layer == 0, "a number of what is no layer")
     eye = named({0: "left", 1: "right", 255: None}, eye)
     if kind == "main" and eye:
         require([width, height] == meta["hmd"]["eye_size_px"], "size of an eye's picture")
@@ -100,9 +101,16 @@ def read_pass(data, meta):
         "frame": frame,
         "kind": kind,
         "eye": eye,
+        "layer": layer,
         "size_px": [width, height],
         "tiles": [columns, rows],
     }
+
+
+def check_layers(layers, minor):
+    require(minor >= 1 or not layers, "layers in a file of version 1.0")
+    numbers = {(each["frame"], each["eye"], each["layer"]) for each in layers}
+    require(len(numbers) == len(layers), "two layers of a number")
 
 
 def read_table(chunk, least_bytes, entry):
@@ -239,13 +247,14 @@ def check_tile(heads, rows, draws):
 
 
 def main(path):
-    chunks = read(path, 1)
+    chunks, minor = read(path, 1)
     require([tag for tag in chunks if tag in TAGS] == TAGS, "chunks missing or out of order")
     meta = check_meta(shaped(parse_json(chunks["META"]), META))
     textures = read_table(chunks["TEXS"], 22, read_texture)
     samplers = read_table(chunks["SMPS"], 5, read_sampler)
     draws = read_table(chunks["DRAW"], 12, lambda data: read_draw(data, textures, samplers))
     passes = read_table(chunks["PASS"], 24, lambda data: read_pass(data, meta))
+    check_layers([each for each in passes if each["kind"] == "layer"], minor)
     print_line(
         {
             "meta": meta,

@@ -12,6 +12,8 @@ use formats::view::Eye;
 pub struct Parts {
     /// What it holds.
     pub kind: Kind,
+    /// Minor version that it needs.
+    pub minor: u16,
     /// Tag and bytes of each chunk.
     pub chunks: Vec<([u8; 4], Vec<u8>)>,
 }
@@ -30,6 +32,7 @@ impl Parts {
         });
         Self {
             kind: container.kind(),
+            minor: container.version().1,
             chunks: chunks.collect(),
         }
     }
@@ -132,7 +135,10 @@ impl Parts {
         for (tag, bytes) in &self.chunks {
             let _twice = writer.chunk(ChunkTag(*tag), bytes);
         }
-        writer.into_bytes().expect("in memory")
+        let mut bytes = writer.into_bytes().expect("in memory");
+        bytes[10..12].copy_from_slice(&self.minor.to_le_bytes());
+        repair_header(&mut bytes);
+        bytes
     }
 }
 

@@ -101,8 +101,13 @@ pub fn texture_tables() -> Tables {
         frame,
         kind,
         eye,
+        layer: 0,
         size_px,
         tiles: size_px.map(|size| size.div_ceil(16)),
+    };
+    let layer = |layer, eye, size_px| Pass {
+        layer,
+        ..pass(2, PassKind::Layer, eye, size_px)
     };
     Tables {
         meta: meta(2),
@@ -137,6 +142,11 @@ pub fn texture_tables() -> Tables {
             pass(0, PassKind::Main, Some(Eye::Left), EYE_SIZE_PX),
             pass(0, PassKind::Main, Some(Eye::Right), EYE_SIZE_PX),
             pass(2, PassKind::Shadow, None, [17, 16]),
+            layer(0, None, [35, 9]),
+            layer(0, Some(Eye::Left), [16, 16]),
+            layer(65535, Some(Eye::Left), [20, 33]),
+            layer(65535, Some(Eye::Right), [20, 33]),
+            layer(1, Some(Eye::Right), [1, 1]),
         ],
     }
 }

@@ -177,6 +177,46 @@ fn a_path_with_a_nan_pose_is_refused_by_every_command_that_follows_one() {
 }
 
 #[test]
+fn culling_that_the_display_cannot_have_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out.textrace");
+    let wide: &[&str] = &["--hfov", "100", "--cant", "42"];
+    let cases: [(&[&str], &[&str], &[&str]); 4] = [
+        (
+            &["--cull", "superfrustum"],
+            wide,
+            &["below 179 degrees", "184.0 degrees"],
+        ),
+        (
+            &["--cull", "conical-superfrustum"],
+            wide,
+            &["below 179 degrees"],
+        ),
+        (
+            &["--cull", "octree"],
+            &[],
+            &["octree", "per-eye, superfrustum"],
+        ),
+        (
+            &["--lens-radius", "-1"],
+            &[],
+            &["--lens-radius", "radius above 0", "-1"],
+        ),
+    ];
+    for (technique, display, message) in cases {
+        refuse(
+            (program("tracegen").args(["raster", "teapot", "--size", "32x32"]))
+                .args(technique)
+                .args(display)
+                .arg("-o")
+                .arg(&out),
+            message,
+        );
+        assert!(!out.exists(), "{technique:?}");
+    }
+}
+
+#[test]
 fn a_damaged_ray_trace_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let bytes = fs::read(root().join("traces/teapot-rays.raytrace")).expect("golden trace");

@@ -264,6 +264,31 @@ fn pictures_have_the_size_of_the_displays_eyes() {
 }
 
 #[test]
+fn layers_are_numbered_and_need_a_version() {
+    // Passes: two pictures, a shadow map, a layer of both eyes, two of the left eye.
+    let number = |pass: usize| 4 + 24 * pass + 6;
+    refuse_texture(
+        "pass 1: layer 0 of a pass that is no layer, found 7",
+        |parts| {
+            parts.put(b"PASS", number(1), &[7, 0]);
+        },
+    );
+    refuse_texture("pass 5: a layer number that no other layer", |parts| {
+        parts.put(b"PASS", number(5), &[0, 0]);
+    });
+    refuse_texture(
+        "version 1.1 for passes that are layers, found 1.0",
+        |parts| {
+            parts.minor = 0;
+        },
+    );
+    let mut parts = texture_parts();
+    parts.put(b"PASS", number(5), &[3, 0]);
+    parts.minor = 2;
+    assert_eq!(outcome(parts.sealed()), Ok(()));
+}
+
+#[test]
 fn a_key_stands_once_in_its_object() {
     for twice in [
         "\"seed\":1,\"seed\":",

@@ -28,7 +28,13 @@ impl Threads {
 }
 
 /// Options with a value that say where and how, not what.
-const PASSING_OPTIONS: [&str; 4] = ["--output", "--image", "--threads", "--record-budget"];
+const PASSING_OPTIONS: [&str; 5] = [
+    "--no-skip",
+    "--output",
+    "--image",
+    "--threads",
+    "--record-budget",
+];
 /// Switches that do.
 const PASSING_SWITCHES: [&str; 3] = ["--no-plain", "--no-cache", "--quiet"];
 
@@ -72,7 +78,7 @@ mod tests {
     fn output_paths_and_how_a_trace_was_made_are_not_recorded() {
         for line in [
             "raster s.gltf -o a --shadows --image=b.png --camera -x",
-            "raster s.gltf --output=a --shadows --threads 2 --no-plain --camera -x --record-budget 4MiB -ob",
+            "raster s.gltf --output=a --shadows --threads 2 --no-skip all --no-plain --camera -x --record-budget 4MiB -ob",
             "-q raster s.gltf -qo a --shadows --quiet --no-cache --image b -o=c --camera -x",
         ] {
             let kept = lasting_arguments(line.split(' ').map(OsString::from));

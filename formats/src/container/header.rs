@@ -1,7 +1,7 @@
 //! Byte layout of the header and of the directory.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{ChunkEntry, ChunkTag, Kind, MAGIC, VERSION_MAJOR, VERSION_MINOR};
+use super::{ChunkEntry, ChunkTag, Kind, MAGIC, VERSION_MAJOR};
 use crate::parse::{Fault, Parsed, ensure, zero};
 use nom::Parser;
 use nom::bytes::complete::take;
@@ -30,7 +30,7 @@ pub(super) struct Header {
 impl Header {
     pub(super) fn new(kind: Kind) -> Self {
         Self {
-            version_minor: VERSION_MINOR,
+            version_minor: 0,
             kind,
             directory_offset: 0,
             file_bytes: 0,

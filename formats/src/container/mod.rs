@@ -20,8 +20,9 @@ use std::fmt;
 pub const MAGIC: [u8; 8] = *b"PLXTRACE";
 /// Readers refuse another major version.
 pub const VERSION_MAJOR: u16 = 1;
-/// Readers accept a later minor version, which may only add chunks.
-pub const VERSION_MINOR: u16 = 0;
+/// The latest minor version. A file says the earliest that has all that is in it: 1 where a trace has
+/// layers, else 0. Readers accept a later one, which may only add.
+pub const VERSION_MINOR: u16 = 1;
 /// Chunks start at multiples of this many bytes.
 pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;
 

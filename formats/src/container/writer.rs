@@ -77,6 +77,11 @@ impl<W: Write + Seek> ContainerWriter<W> {
         Ok(writer)
     }
 
+    /// Says in the header that readers need a minor version.
+    pub(crate) fn require_minor(&mut self, minor: u16) {
+        self.header.version_minor = self.header.version_minor.max(minor);
+    }
+
     /// Writes a whole chunk.
     ///
     /// # Errors

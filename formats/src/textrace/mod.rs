@@ -118,6 +118,8 @@ pub enum PassKind {
     Main = 0,
     /// A layer of a shadow map (texture accesses of alpha-masked casters).
     Shadow = 1,
+    /// A part of the picture of one eye or of both, with a size and matrices of its own.
+    Layer = 2,
 }
 
 /// One pass: one view of one frame. Its tiles are numbered row by row from the top left.
@@ -129,6 +131,9 @@ pub struct Pass {
     pub kind: PassKind,
     /// Eye, or `None` for a pass that belongs to both.
     pub eye: Option<Eye>,
+    /// Number of a layer among those of its frame and eye: the left and the right layer of a number
+    /// show the same part. 0 for passes that are no layers.
+    pub layer: u16,
     /// Width and height in pixels.
     pub size_px: [u32; 2],
     /// Tile columns and rows; the last ones may be partly outside the image.
@@ -136,6 +141,12 @@ pub struct Pass {
 }
 
 impl Pass {
+    /// The pass shows what eyes see: all but shadow maps.
+    #[must_use]
+    pub fn is_seen(&self) -> bool {
+        self.kind != PassKind::Shadow
+    }
+
     /// Number of tiles.
     #[must_use]
     pub fn tile_count(&self) -> u32 {

@@ -13,6 +13,7 @@ use nom::bytes::complete::take;
 use nom::error::context;
 use nom::multi::count;
 use nom::number::complete::{i8, le_u16, le_u32, u8};
+use std::collections::BTreeSet;
 use std::io::{Seek, Write};
 
 /// JSON of [`TraceMeta`].
@@ -45,6 +46,8 @@ pub const MAX_GROUPS: usize = super::NO_GROUP as usize;
 pub const MAX_TEXTURE_SIZE: u32 = 1 << 16;
 /// Most array layers of a texture.
 pub const MAX_LAYERS: u32 = 1 << 16;
+/// Minor version from which on there are layers.
+const LAYERS_MINOR: u16 = 1;
 /// Id of "both eyes" in a pass.
 const NO_EYE: u8 = 255;
 
@@ -54,6 +57,9 @@ pub(super) fn write<W: Write + Seek>(
     container: &mut ContainerWriter<W>,
 ) -> Result<()> {
     check(tables).map_err(|(_, broken)| broken.unwritable())?;
+    if has_layers(tables) {
+        container.require_minor(LAYERS_MINOR);
+    }
     container.chunk(META, &json::write("trace description", &tables.meta)?)?;
     container.chunk(TEXTURES, &table(&tables.textures, write_texture)?)?;
     container.chunk(SAMPLERS, &table(&tables.samplers, write_sampler)?)?;
@@ -83,7 +89,16 @@ pub(super) fn read(container: &Container) -> Result<Tables> {
         let expected = format!("{}: {}", broken.what, broken.expected);
         container.malformed(chunk, 0, expected, broken.found)
     })?;
+    let (major, minor) = container.version();
+    if has_layers(&tables) && minor < LAYERS_MINOR {
+        let expected = format!("version {major}.{LAYERS_MINOR} for passes that are layers");
+        return Err(container.malformed(PASSES, 0, expected, format!("{major}.{minor}")));
+    }
     Ok(tables)
+}
+
+fn has_layers(tables: &Tables) -> bool {
+    (tables.passes.iter()).any(|pass| pass.kind == PassKind::Layer)
 }
 
 /// Checks each table and what ties them together; names the chunk that breaks a rule.
@@ -96,8 +111,19 @@ fn check(tables: &Tables) -> std::result::Result<(), (ChunkTag, Broken)> {
     for (index, draw) in tables.draws.iter().enumerate() {
         check_draw(tables, index, draw).map_err(located(DRAWS))?;
     }
+    let mut layers = BTreeSet::new();
     for (index, pass) in tables.passes.iter().enumerate() {
         check_pass(&tables.meta, index, pass).map_err(located(PASSES))?;
+        let key = (pass.frame, pass.eye.map(|eye| eye as u8), pass.layer);
+        let is_new = pass.kind != PassKind::Layer || layers.insert(key);
+        ensure(is_new, || {
+            Broken::new(
+                format!("pass {index}"),
+                "a layer number that no other layer of its frame and eye has",
+                pass.layer,
+            )
+        })
+        .map_err(located(PASSES))?;
     }
     Ok(())
 }
@@ -185,6 +211,9 @@ fn check_pass(meta: &TraceMeta, index: usize, pass: &Pass) -> std::result::Resul
         meta.frames.iter().any(|views| views.frame == pass.frame),
         || Broken::new(what(), "a frame of the description", pass.frame),
     )?;
+    ensure(pass.kind == PassKind::Layer || pass.layer == 0, || {
+        Broken::new(what(), "layer 0 of a pass that is no layer", pass.layer)
+    })?;
     let eye_size_px = meta.hmd.eye_size_px;
     ensure(
         pass.kind != PassKind::Main || pass.eye.is_none() || pass.size_px == eye_size_px,
@@ -308,7 +337,7 @@ const COLOR_SPACES: &[(u16, ColorSpace)] = ids!(ColorSpace: Linear, Srgb);
 const WRAPS: &[(u16, Wrap)] = ids!(Wrap: Repeat, MirroredRepeat, ClampToEdge);
 const FILTERS: &[(u16, Filter)] = ids!(Filter: Nearest, Linear);
 const MIP_FILTERS: &[(u16, MipFilter)] = ids!(MipFilter: None, Nearest, Linear);
-const PASS_KINDS: &[(u16, PassKind)] = ids!(PassKind: Main, Shadow);
+const PASS_KINDS: &[(u16, PassKind)] = ids!(PassKind: Main, Shadow, Layer);
 const EYES: &[(u16, Option<Eye>)] = &[
     (0, Some(Eye::Left)),
     (1, Some(Eye::Right)),
@@ -439,7 +468,8 @@ fn write_pass(pass: &Pass, bytes: &mut Vec<u8>) -> Result<()> {
         None => NO_EYE,
     };
     bytes.extend(pass.frame.to_le_bytes());
-    bytes.extend([pass.kind as u8, eye, 0, 0]);
+    bytes.extend([pass.kind as u8, eye]);
+    bytes.extend(pass.layer.to_le_bytes());
     for number in [pass.size_px, pass.tiles].as_flattened() {
         bytes.extend(number.to_le_bytes());
     }
@@ -450,12 +480,13 @@ fn read_pass(input: &[u8]) -> Parsed<'_, Pass> {
     let (rest, frame) = context("a pass of 24 bytes", le_u32).parse(input)?;
     let (rest, kind) = id("a pass kind", u8, PASS_KINDS)(rest)?;
     let (rest, eye) = id("an eye (0, 1 or 255)", u8, EYES)(rest)?;
-    let (rest, ()) = zero(rest, 2)?;
+    let (rest, layer) = le_u16.parse(rest)?;
     let (rest, (width, height, columns, rows)) = (le_u32, le_u32, le_u32, le_u32).parse(rest)?;
     let pass = Pass {
         frame,
         kind,
         eye,
+        layer,
         size_px: [width, height],
         tiles: [columns, rows],
     };

@@ -44,6 +44,7 @@ pub(crate) fn tables() -> Tables {
         frame: 0,
         kind: PassKind::Main,
         eye,
+        layer: 0,
         size_px: [40, 32],
         tiles: [3, 2],
     };

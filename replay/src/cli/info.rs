@@ -7,7 +7,7 @@ use anyhow::Result;
 use formats::Trace;
 use formats::container::Container;
 use formats::raytrace::{RayKind, RayTile, Raytrace, RaytraceTables};
-use formats::textrace::{Encoding, Pass, Textrace, TraceMeta};
+use formats::textrace::{Encoding, Pass, PassKind, Textrace, TraceMeta};
 use formats::texture::Texture;
 use formats::view::Eye;
 use rayon::prelude::*;
@@ -222,7 +222,10 @@ fn pass_table(trace: &Textrace) -> String {
     let columns = [
         count("pass", |r: &PassRow| r.0 as u64),
         count("frame", |r: &PassRow| r.1.frame.into()),
-        Column::text("kind", "kind", |r: &PassRow| lower(&r.1.kind)),
+        Column::text("kind", "kind", |r: &PassRow| match r.1.kind {
+            PassKind::Layer => format!("layer {}", r.1.layer),
+            kind => lower(&kind),
+        }),
         Column::text("eye", "eye", |r: &PassRow| {
             r.1.eye.map_or("both".to_owned(), |eye| lower(&eye))
         }),

@@ -3,7 +3,7 @@
 use crate::paper::z2;
 use crate::result::{TraceId, scene_name};
 use crate::stream::TileSource;
-use formats::textrace::{PassKind, Tables};
+use formats::textrace::Tables;
 use formats::texture::TexelFormat;
 
 /// A trace to replay, and how to name it.
@@ -34,8 +34,8 @@ impl<'a> Subject<'a> {
 /// Frames that a trace renders.
 #[must_use]
 pub fn frame_count(tables: &Tables) -> u32 {
-    let main = tables.passes.iter().filter(|p| p.kind == PassKind::Main);
-    let mut frames: Vec<u32> = main.map(|p| p.frame).collect();
+    let seen = tables.passes.iter().filter(|p| p.is_seen());
+    let mut frames: Vec<u32> = seen.map(|p| p.frame).collect();
     frames.sort_unstable();
     frames.dedup();
     frames.len() as u32

@@ -1,6 +1,7 @@
-//! All work of a trace in phases: a frame's monoscopic passes (shadow maps) come first, each alone
-//! in the order's single-view curve; then the two main passes, as the order combines them. Every
-//! order visits every tile of every pass exactly once.
+//! All work of a trace in phases: a frame's shadow maps and pictures for both eyes come first, each alone in
+//! the order's single-view curve; then what one eye sees, and layers, in the order of the passes: a left
+//! and a right pass that show the same as the order combines them, each other one alone. Every order
+//! visits every tile of every pass exactly once.
 
 use super::{TileOrder, View, WorkItem};
 use formats::textrace::{Pass, PassKind};
@@ -23,26 +24,40 @@ pub fn plan(order: &dyn TileOrder, passes: &[Pass]) -> Vec<Phase> {
 /// The work of one frame.
 #[must_use]
 pub fn plan_frame(order: &dyn TileOrder, passes: &[Pass], frame: u32) -> Vec<Phase> {
-    let views = |eye: Option<Eye>| {
-        let of_frame = passes
-            .iter()
-            .enumerate()
-            .filter(move |(_, p)| p.frame == frame);
-        of_frame.filter(move |(_, p)| eye == p.eye.filter(|_| p.kind == PassKind::Main))
-    };
     let view = |(index, pass): (usize, &Pass)| View {
         pass: index as u32,
         tiles: pass.tiles,
     };
-    let mut phases: Vec<Phase> = views(None).map(|mono| order.mono(view(mono))).collect();
-    let mut lefts = views(Some(Eye::Left)).map(view);
-    let mut rights = views(Some(Eye::Right)).map(view);
-    loop {
-        match (lefts.next(), rights.next()) {
-            (Some(left), Some(right)) => phases.push(order.stereo(left, right)),
-            (Some(alone), None) | (None, Some(alone)) => phases.push(order.mono(alone)),
-            (None, None) => break,
-        }
+    let of_frame = passes.iter().enumerate().filter(|(_, p)| p.frame == frame);
+    let (seen, before): (Vec<_>, Vec<_>) =
+        of_frame.partition(|(_, p)| p.kind == PassKind::Layer || (p.is_seen() && p.eye.is_some()));
+    let mut phases: Vec<Phase> = (before.into_iter())
+        .map(|pass| order.mono(view(pass)))
+        .collect();
+    let mut open = seen;
+    while !open.is_empty() {
+        let pass = open.remove(0);
+        let Some(partner) = open.iter().position(|other| pair(pass.1, other.1)) else {
+            phases.push(order.mono(view(pass)));
+            continue;
+        };
+        let other = open.remove(partner);
+        let (left, right) = match pass.1.eye {
+            Some(Eye::Left) => (pass, other),
+            _ => (other, pass),
+        };
+        phases.push(order.stereo(view(left), view(right)));
     }
     phases
+}
+
+/// Whether two passes of a frame are a left and a right one that show the same.
+fn pair(a: &Pass, b: &Pass) -> bool {
+    let eyes = matches!(
+        (a.eye, b.eye),
+        (Some(Eye::Left), Some(Eye::Right)) | (Some(Eye::Right), Some(Eye::Left))
+    );
+    eyes && a.kind == b.kind
+        && a.layer == b.layer
+        && (a.kind == PassKind::Main || a.size_px == b.size_px)
 }

@@ -118,6 +118,7 @@ impl Synthetic {
             frame: 0,
             kind: PassKind::Main,
             eye: Some(eye),
+            layer: 0,
             size_px: self.size_px,
             tiles,
         };

@@ -22,6 +22,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
         frame: 0,
         kind: PassKind::Main,
         eye: Some(eye),
+        layer: 0,
         size_px: [16, 16],
         tiles: [1, 1],
     };

@@ -4,7 +4,7 @@ use super::draws::DrawList;
 use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
-use formats::view::EyeView;
+use formats::view::Lens;
 use glam::Mat4;
 use record::{Captured, Region, Sink};
 use std::time::Duration;
@@ -27,14 +27,17 @@ impl View<'_> {
     /// World to clip space.
     #[must_use]
     pub fn clip_from_world(&self) -> Mat4 {
-        clip_from_world(&self.layer.view)
+        self.layer.clip_from_world()
     }
 }
 
-/// World to the clip space of an eye.
-#[must_use]
-pub(crate) fn clip_from_world(eye: &EyeView) -> Mat4 {
-    Mat4::from_cols_array_2d(&eye.eye_to_clip) * Mat4::from_cols_array_2d(&eye.world_to_eye)
+/// Where a draw is visible.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Marks {
+    /// Anywhere in the picture.
+    pub picture: bool,
+    /// At a pixel whose centre the lens shows.
+    pub lens: bool,
 }
 
 /// What a backend has done so far.
@@ -52,12 +55,14 @@ pub struct Work {
     pub vertices: u64,
     /// Triangles of the draws.
     pub triangles: u64,
-    /// Bytes written to the driver for views and lists of draws.
+    /// Bytes written to the driver for views, lists of draws, and draws that move.
     pub bytes_uploaded: u64,
     /// Time of batching, encoding and submitting views, pictures with their records left out.
     pub submitting: Duration,
     /// Time of waiting for their pictures.
     pub waiting: Duration,
+    /// Time of making the pictures from layers, where they are not layers.
+    pub composing: Duration,
     /// Shadow maps rendered, one a cascade.
     pub shadow_maps: u64,
     /// Pipelines made.
@@ -85,6 +90,9 @@ pub trait CaptureBackend {
     /// What was done so far.
     fn work(&self) -> Work;
 
+    /// Takes over where the draws that move stand now; the others stand as they were uploaded.
+    fn pose(&mut self, draws: &DrawList);
+
     /// Renders the shadow maps of a frame, if its lighting has any.
     ///
     /// # Errors
@@ -103,6 +111,25 @@ pub trait CaptureBackend {
         region: Region,
         sink: Option<&mut Sink<'_>>,
     ) -> Result<Captured, RasterError>;
+
+    /// Renders the depth of a view's opaque and masked draws alone, and reads it: row by row, 1 where
+    /// there is nothing.
+    ///
+    /// # Errors
+    /// Driver errors.
+    fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError>;
+
+    /// Draws everything, culled or not, and tells for each draw whether it is visible in a view: a
+    /// fragment of it passes the depth test against the final depth (and its alpha test).
+    ///
+    /// # Errors
+    /// Driver errors, and a device that cannot capture.
+    fn marks(
+        &mut self,
+        draws: &DrawList,
+        view: &View<'_>,
+        lens: &Lens,
+    ) -> Result<Vec<Marks>, RasterError>;
 
     /// Makes the frame's pictures from its layers, all of whose regions have been rendered; those
     /// that are layers are there already.

@@ -50,6 +50,7 @@ mod tests {
     /// Draws of the given meshes; mesh 9 is mirrored.
     fn list(meshes: &[usize], mode: DrawMode) -> DrawList {
         let call = |&mesh: &usize| DrawCall {
+            instance: 0,
             mesh: mesh.min(8),
             material: 0,
             mode,
@@ -61,8 +62,10 @@ mod tests {
         };
         DrawList {
             calls: meshes.iter().map(call).collect(),
+            moving: Vec::new(),
             groups: Vec::new(),
             cascades: 0,
+            hierarchy: visibility::Hierarchy::default(),
         }
     }
 

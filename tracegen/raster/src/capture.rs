@@ -7,15 +7,19 @@ use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
-use formats::view::{Eye, FrameViews, Hmd, TILE_SIZE_PX};
+use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
+use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::{FramePlan, Layer, Settings};
+use techniques::{FramePlan, Planner, Skips};
+use visibility::Rig;
 
 /// What to capture, the same for plain rendering and capture.
 pub struct CaptureJob<'a> {
-    /// Draws.
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its draws.
     pub draws: &'a DrawList,
     /// Lights; cascades are fitted per frame.
     pub lighting: Lighting,
@@ -23,12 +27,10 @@ pub struct CaptureJob<'a> {
     pub bounds: (glam::Vec3, glam::Vec3),
     /// Distances from the head that the cascades span, metres.
     pub shadow_range_m: [f32; 2],
-    /// The display.
-    pub hmd: &'a Hmd,
-    /// The eyes whose pictures each frame has, in their order.
-    pub eyes: &'a [Eye],
-    /// What is left out or done more coarsely.
-    pub settings: &'a Settings,
+    /// Which layers the frames have.
+    pub planner: &'a Planner,
+    /// What is left out because nobody sees it.
+    pub skips: Skips,
 }
 
 /// The pictures of one frame, one an eye: sRGB RGBA8.
@@ -38,17 +40,16 @@ impl CaptureJob<'_> {
     /// How a frame is rendered.
     #[must_use]
     pub fn plan(&self, views: &FrameViews) -> FramePlan {
-        FramePlan::new(self.settings, self.hmd, self.eyes, views)
+        self.planner.plan(views)
     }
 
     /// Passes of the frames in the order in which [`Self::capture_frame`] writes them.
     #[must_use]
     pub fn passes(&self, frames: &[FrameViews]) -> Vec<Pass> {
         let of_frame = |views: &FrameViews| {
-            let (plan, frame) = (self.plan(views), views.frame);
-            plan.layers
-                .into_iter()
-                .map(move |layer| pass(frame, &layer))
+            let plan = self.plan(views);
+            let pass = |number| pass(views.frame, &plan, number);
+            (0..plan.layers.len()).map(pass).collect::<Vec<_>>()
         };
         frames.iter().flat_map(of_frame).collect()
     }
@@ -62,8 +63,17 @@ impl CaptureJob<'_> {
 
     /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds what each
     /// layer may see.
-    #[must_use]
-    pub fn frame(&self, views: &FrameViews) -> Frame {
+    ///
+    /// # Errors
+    /// Eyes that the culling technique is not made for.
+    pub fn frame(&self, views: &FrameViews) -> Result<Frame, RasterError> {
+        let mut frame = self.boxes_seen(views)?;
+        self.skip(&mut frame);
+        Ok(frame)
+    }
+
+    /// The frame as the boxes of its draws tell it.
+    pub(crate) fn boxes_seen(&self, views: &FrameViews) -> Result<Frame, RasterError> {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
         lighting.cascades = cascades::fit(
@@ -74,7 +84,22 @@ impl CaptureJob<'_> {
             near,
             far,
         );
-        Frame::new(self.draws, lighting, self.plan(views))
+        let (culling, number) = (self.planner.settings().culling, views.frame);
+        let (plan, rig) = (self.plan(views), self.rig(views));
+        Ok(Frame::new(
+            self.draws, lighting, plan, rig, culling, number,
+        )?)
+    }
+
+    /// The eyes of a frame.
+    #[must_use]
+    pub fn rig(&self, views: &FrameViews) -> Rig {
+        let eye = |eye: &Eye| visibility::Eye {
+            view: views.eyes[*eye as usize],
+            lens: self.planner.lenses()[*eye as usize],
+            size_px: self.planner.hmd().eye_size_px,
+        };
+        Rig::new(self.planner.eyes().iter().map(eye).collect())
     }
 
     /// Renders the frame's shadow maps: once for all its pictures.
@@ -155,6 +180,7 @@ impl CaptureJob<'_> {
                 backend: &mut *backend,
                 draws: self.draws,
                 view,
+                skip_regions: self.skips.regions,
             };
             let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
             counts += recorded.counts;
@@ -165,11 +191,18 @@ impl CaptureJob<'_> {
 }
 
 /// The pass that a layer of a frame is written as.
-fn pass(frame: u32, layer: &Layer) -> Pass {
+fn pass(frame: u32, plan: &FramePlan, number: usize) -> Pass {
+    let layer = &plan.layers[number];
+    let (kind, number) = if plan.is_picture(number) {
+        (PassKind::Main, 0)
+    } else {
+        (PassKind::Layer, layer.number)
+    };
     Pass {
         frame,
-        kind: PassKind::Main,
+        kind,
         eye: layer.eye,
+        layer: number,
         size_px: layer.size_px,
         tiles: layer.size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
     }
@@ -188,6 +221,7 @@ struct ViewCapturer<'a> {
     backend: &'a mut dyn CaptureBackend,
     draws: &'a DrawList,
     view: View<'a>,
+    skip_regions: bool,
 }
 
 impl Capturer for ViewCapturer<'_> {
@@ -199,7 +233,11 @@ impl Capturer for ViewCapturer<'_> {
 
     fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, RasterError> {
         // A part of the layer needs only the draws that may touch it.
-        let touching = self.draws.touching(&self.view, region);
+        let touching = if self.skip_regions {
+            self.draws.touching(&self.view, region)
+        } else {
+            self.view.visible.to_vec()
+        };
         let view = View {
             visible: &touching,
             ..self.view

@@ -7,9 +7,11 @@ use formats::textrace::{Draw, Sample, UvGroup};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Mat4, Vec3};
 use record::Region;
-use scene::{AlphaMode, Material, Scene};
+use scene::geometry::transformed_box;
+use scene::{AlphaMode, Instance, Material, Mesh, Scene};
+use std::collections::{HashMap, HashSet};
 use textures::TextureSet;
-use visibility::frustum;
+use visibility::{Hierarchy, frustum};
 
 /// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
 pub const SHADOW_SIZE: u32 = 2048;
@@ -41,9 +43,49 @@ impl DrawMode {
     }
 }
 
+/// What the draws of a mesh have in common.
+struct ShownMesh {
+    mode: DrawMode,
+    object_box: [Vec3; 2],
+}
+
+impl ShownMesh {
+    /// Checks a mesh; `None` where nothing of it is seen.
+    fn new(scene: &Scene, mesh: &Mesh) -> Result<Option<Self>, RasterError> {
+        let material = scene.materials.get(mesh.material).ok_or_else(|| {
+            RasterError::Scene(format!(
+                "mesh {} uses material {} of {}",
+                mesh.name,
+                mesh.material,
+                scene.materials.len()
+            ))
+        })?;
+        let beyond = |&&index: &&u32| index as usize >= mesh.positions.len();
+        if let Some(index) = mesh.indices.iter().find(beyond) {
+            return Err(RasterError::Scene(format!(
+                "mesh {}: index {index} beyond its {} vertices",
+                mesh.name,
+                mesh.positions.len()
+            )));
+        }
+        let mode = DrawMode::new(material).filter(|_| mesh.triangles() > 0);
+        Ok(mode.map(|mode| Self {
+            mode,
+            object_box: mesh.bounds(),
+        }))
+    }
+
+    fn bounds(&self, scene: &Scene, instance: &Instance) -> [Vec3; 2] {
+        let positions = &scene.meshes[instance.mesh].positions;
+        world_box(positions, self.object_box, &instance.transform)
+    }
+}
+
 /// One draw call: one instance of one mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct DrawCall {
+    /// Index into the scene's instances.
+    pub instance: usize,
     /// Index into the scene's meshes.
     pub mesh: usize,
     /// Index into the scene's materials.
@@ -67,10 +109,14 @@ pub struct DrawCall {
 pub struct DrawList {
     /// Draws in submission order.
     pub calls: Vec<DrawCall>,
+    /// Draws that move, ascending.
+    pub moving: Vec<u32>,
     /// Texture groups by material.
     pub groups: Vec<MaterialGroups>,
     /// Shadow cascades that lit draws sample, 0 to 4.
     pub cascades: u32,
+    /// The tree over the draws' bounds.
+    pub hierarchy: Hierarchy,
 }
 
 impl DrawList {
@@ -80,51 +126,35 @@ impl DrawList {
     /// # Errors
     /// More primitives than 32 bits number, or an index out of range.
     pub fn new(scene: &Scene, cascades: u32) -> Result<Self, RasterError> {
+        let shown = (scene.meshes.iter())
+            .map(|mesh| ShownMesh::new(scene, mesh))
+            .collect::<Result<Vec<_>, _>>()?;
         let mut calls = Vec::with_capacity(scene.instances.len());
         let mut next_primitive = 0_u32;
         for blended in [false, true] {
-            for instance in &scene.instances {
-                let mesh = scene.meshes.get(instance.mesh).ok_or_else(|| {
+            for (number, instance) in scene.instances.iter().enumerate() {
+                let shown = shown.get(instance.mesh).ok_or_else(|| {
                     RasterError::Scene(format!(
                         "instance of mesh {} of {}",
                         instance.mesh,
                         scene.meshes.len()
                     ))
                 })?;
-                let material = scene.materials.get(mesh.material).ok_or_else(|| {
-                    RasterError::Scene(format!(
-                        "mesh {} uses material {} of {}",
-                        mesh.name,
-                        mesh.material,
-                        scene.materials.len()
-                    ))
-                })?;
-                let Some(mode) = DrawMode::new(material) else {
-                    continue;
-                };
-                if (mode == DrawMode::Blended) != blended || mesh.triangles() == 0 {
+                let Some(shown) = shown else { continue };
+                if (shown.mode == DrawMode::Blended) != blended {
                     continue;
                 }
-                if let Some(index) = mesh
-                    .indices
-                    .iter()
-                    .find(|&&i| i as usize >= mesh.positions.len())
-                {
-                    return Err(RasterError::Scene(format!(
-                        "mesh {}: index {index} beyond its {} vertices",
-                        mesh.name,
-                        mesh.positions.len()
-                    )));
-                }
+                let mesh = &scene.meshes[instance.mesh];
                 calls.push(DrawCall {
+                    instance: number,
                     mesh: instance.mesh,
                     material: mesh.material,
-                    mode,
+                    mode: shown.mode,
                     transform: instance.transform,
                     mirrored: instance.mirrored(),
                     first_primitive: next_primitive,
                     colored: !mesh.colors.is_empty(),
-                    bounds: bounds(&mesh.positions, &instance.transform),
+                    bounds: shown.bounds(scene, instance),
                 });
                 next_primitive = u32::try_from(mesh.triangles())
                     .ok()
@@ -136,17 +166,49 @@ impl DrawList {
                     })?;
             }
         }
+        let bounds: Vec<[Vec3; 2]> = calls.iter().map(|call| call.bounds).collect();
+        let moving = moving(scene, &calls);
         Ok(Self {
+            hierarchy: Hierarchy::new(&bounds),
             calls,
+            moving,
             groups: scene.materials.iter().map(MaterialGroups::new).collect(),
             cascades,
         })
     }
 
+    /// Puts the draws that move where they are at a time, transforms and bounds. `scene` is the one
+    /// that the list was made of, with its instances as they were.
+    pub fn pose(&mut self, scene: &Scene, time_s: f32) {
+        if self.moving.is_empty() {
+            return;
+        }
+        let moved: HashMap<usize, Affine3A> = scene.moved(time_s).collect();
+        for &draw in &self.moving {
+            let call = &mut self.calls[draw as usize];
+            if let Some(transform) = moved.get(&call.instance) {
+                let mesh = &scene.meshes[call.mesh];
+                call.transform = *transform;
+                call.bounds = world_box(&mesh.positions, mesh.bounds(), transform);
+            }
+        }
+        let bounds = |&draw: &u32| (draw, self.calls[draw as usize].bounds);
+        self.hierarchy.refit(self.moving.iter().map(bounds));
+    }
+
     /// Indices of the draws that a view or a shadow cascade may see, ascending.
     #[must_use]
     pub fn visible(&self, clip_from_world: Mat4) -> Vec<u32> {
-        frustum::visible(self.calls.iter().map(|call| call.bounds), clip_from_world)
+        self.hierarchy.entering(clip_from_world)
+    }
+
+    /// Those of `list` that a view may see.
+    #[must_use]
+    pub(crate) fn visible_of(&self, list: &[u32], clip_from_world: Mat4) -> Vec<u32> {
+        let bounds = list.iter().map(|&draw| self.calls[draw as usize].bounds);
+        (frustum::visible(bounds, clip_from_world).into_iter())
+            .map(|position| list[position as usize])
+            .collect()
     }
 
     /// The draws of a layer that may touch a region of it, ascending.
@@ -158,10 +220,7 @@ impl DrawList {
         }
         let clip =
             frustum::crop(region.origin_px, region.size_px, size_px) * view.clip_from_world();
-        let bounds = (view.visible.iter()).map(|&draw| self.calls[draw as usize].bounds);
-        (frustum::visible(bounds, clip).into_iter())
-            .map(|position| view.visible[position as usize])
-            .collect()
+        self.visible_of(view.visible, clip)
     }
 
     /// Texture table of the trace: the scene's textures in their order, then the shadow maps.
@@ -273,19 +332,40 @@ fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
     index as u16
 }
 
-fn bounds(positions: &[Vec3], transform: &Affine3A) -> [Vec3; 2] {
-    let empty = [Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY)];
-    positions.iter().fold(empty, |[lo, hi], p| {
-        let p = transform.transform_point3(*p);
-        [lo.min(p), hi.max(p)]
-    })
+/// World-space bounds of a mesh, rounding of its vertices on the way through any driver included;
+/// `object_box` is its box in object space.
+fn world_box(positions: &[Vec3], object_box: [Vec3; 2], transform: &Affine3A) -> [Vec3; 2] {
+    // Parts of the magnitude of the sums that a coordinate comes from: 8 units in the last place.
+    const ROUNDING: f32 = 8.0 * f32::EPSILON / 2.0;
+    let m = &transform.matrix3;
+    let p = object_box[0].abs().max(object_box[1].abs());
+    let axes = [m.x_axis, m.y_axis, m.z_axis].map(|axis| Vec3::from(axis.abs()));
+    let start = Vec3::from(transform.translation.abs());
+    let margin = (axes[0] * p.x + axes[1] * p.y + axes[2] * p.z + start) * ROUNDING;
+    let [low, high] = transformed_box(positions, object_box, transform);
+    [low - margin, high + margin]
+}
+
+/// The draws whose instances move.
+fn moving(scene: &Scene, calls: &[DrawCall]) -> Vec<u32> {
+    if scene.motions.is_empty() {
+        return Vec::new();
+    }
+    let moving: HashSet<usize> = (scene.motions.iter())
+        .flat_map(|motion| motion.instances.iter().copied())
+        .collect();
+    (0_u32..)
+        .zip(calls)
+        .filter(|(_, call)| moving.contains(&call.instance))
+        .map(|(draw, _)| draw)
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::Vec4;
-    use scene::{Instance, Mesh, TextureRef};
+    use scene::{Motion, Movement, TextureRef};
 
     /// A scene with one mesh of `triangles[i]` triangles and material i for each entry.
     fn scene(materials: Vec<Material>, triangles: &[usize]) -> Scene {
@@ -361,6 +441,34 @@ mod tests {
             message.contains("index 3 beyond its 3 vertices"),
             "{message}"
         );
+    }
+
+    #[test]
+    fn draws_that_move_take_their_bounds_along_and_come_back() {
+        let mut scene = scene(vec![material(AlphaMode::Opaque, false); 3], &[1, 1, 1]);
+        scene.materials[0].alpha = AlphaMode::Blend;
+        scene.motions = vec![Motion {
+            instances: vec![0, 2],
+            movements: vec![Movement::Shuttle {
+                by: Vec3::Z * 4.0,
+                period_s: 2.0,
+                phase: 0.0,
+            }],
+        }];
+        let mut draws = DrawList::new(&scene, 0).unwrap();
+        let at_rest: Vec<_> = draws.calls.iter().map(|c| (c.instance, c.bounds)).collect();
+        assert_eq!(at_rest.iter().map(|r| r.0).collect::<Vec<_>>(), [1, 2, 0]);
+        draws.pose(&scene, 1.0);
+        assert_eq!(draws.moving, [1, 2]);
+        assert_eq!(draws.calls[0].bounds, at_rest[0].1);
+        for call in &draws.calls[1..] {
+            let [low, high] = call.bounds;
+            assert!((low - Vec3::Z * 4.0).length() < 1e-5, "{low}");
+            assert!((high - Vec3::new(1.0, 1.0, 4.0)).length() < 1e-5, "{high}");
+        }
+        draws.pose(&scene, 0.0);
+        let again: Vec<_> = draws.calls.iter().map(|c| (c.instance, c.bounds)).collect();
+        assert_eq!(again, at_rest);
     }
 
     #[test]

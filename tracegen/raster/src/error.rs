@@ -1,6 +1,7 @@
 //! Why a capture failed.
 
 use record::RecordError;
+use visibility::TooWide;
 
 /// Why a capture failed.
 #[derive(Debug, thiserror::Error)]
@@ -47,6 +48,9 @@ pub enum RasterError {
     /// Inconsistent input.
     #[error("{0}")]
     Scene(String),
+    /// Eyes that the culling technique is not made for.
+    #[error(transparent)]
+    Culling(#[from] TooWide),
     /// The records could not become a trace.
     #[error(transparent)]
     Record(#[from] RecordError),

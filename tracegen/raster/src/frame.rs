@@ -1,9 +1,12 @@
 //! What one frame draws: its light, its layers, and which draws enter each of them.
 
-use super::backend::{View, clip_from_world};
+use super::backend::View;
 use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
+use super::skips::Skipped;
+use std::time::{Duration, Instant};
 use techniques::{FramePlan, Stage};
+use visibility::{Culling, Rig, Scratch, TooWide};
 
 /// One frame, ready to be drawn.
 #[derive(Clone, Debug)]
@@ -12,43 +15,95 @@ pub struct Frame {
     pub lighting: Lighting,
     /// Draws that each shadow cascade may see.
     pub casters: Vec<Vec<u32>>,
+    /// Which shadow cascades may be looked up; the others need not be rendered.
+    pub cascades_seen: Vec<bool>,
     /// The layers, and how the pictures come of them.
     pub plan: FramePlan,
+    /// Boxes that were tested to find the draws of the eyes' pictures.
+    pub cull_tests: u64,
+    /// Boxes that were held against the depth of others.
+    pub occlusion_tests: u64,
+    /// Draws of layers that others hide.
+    pub occluded: u64,
+    /// Time that all this took.
+    pub cull_time: Duration,
+    /// The eyes.
+    pub rig: Rig,
     /// Draws that each layer may see.
-    visible: Vec<Vec<u32>>,
+    pub(crate) visible: Vec<Vec<u32>>,
+    /// What nobody sees of it and has been left out.
+    pub skipped: Skipped,
 }
 
 impl Frame {
-    /// Finds the draws that each of the plan's layers and each of the lighting's cascades may see.
-    #[must_use]
-    pub fn new(draws: &DrawList, lighting: Lighting, plan: FramePlan) -> Self {
+    /// Finds the draws that each of the plan's layers and each of the lighting's cascades may see:
+    /// of frame `number` of the eyes of `rig`.
+    ///
+    /// # Errors
+    /// Eyes that the culling technique is not made for.
+    pub fn new(
+        draws: &DrawList,
+        lighting: Lighting,
+        plan: FramePlan,
+        rig: Rig,
+        culling: Culling,
+        number: u32,
+    ) -> Result<Self, TooWide> {
+        let start = Instant::now();
+        let mut kept = Vec::new();
+        let cull_tests =
+            (draws.hierarchy).cull(&rig, culling, number, &mut Scratch::default(), &mut kept)?;
+        let cull_time = start.elapsed();
         let casters = (lighting.cascades.iter())
             .map(|cascade| draws.visible(cascade.clip_from_world))
             .collect();
         let visible = (plan.layers.iter())
             .map(|layer| {
-                let mut visible = draws.visible(clip_from_world(&layer.view));
-                visible.retain(|&draw| enters(layer.draws, draws.calls[draw as usize].mode));
+                // An eye's own picture gets the technique's list, a part of it or another view what
+                // the list has for it.
+                let whole = rig.eyes().iter().any(|eye| eye.view == layer.view);
+                let mut visible = if whole {
+                    kept.clone()
+                } else {
+                    draws.visible_of(&kept, layer.clip_from_world())
+                };
+                visible.retain(|&draw| {
+                    let call = &draws.calls[draw as usize];
+                    enters(layer.draws, call.mode) && layer.may_draw(call.bounds)
+                });
                 visible
             })
             .collect();
-        Self {
+        let cascades_seen = vec![true; lighting.cascades.len()];
+        Ok(Self {
             lighting,
             casters,
+            cascades_seen,
             plan,
+            cull_tests,
+            occlusion_tests: 0,
+            occluded: 0,
+            cull_time,
+            rig,
             visible,
-        }
+            skipped: Skipped::default(),
+        })
     }
 
     /// The layers in their order, each with its draws.
     pub fn views(&self) -> impl Iterator<Item = View<'_>> {
-        let layers = self.plan.layers.iter().zip(&self.visible).enumerate();
-        layers.map(|(target, (layer, visible))| View {
-            target,
-            layer,
+        (0..self.plan.layers.len()).map(|number| self.view(number))
+    }
+
+    /// A layer with its draws.
+    #[must_use]
+    pub fn view(&self, number: usize) -> View<'_> {
+        View {
+            target: number,
+            layer: &self.plan.layers[number],
             lighting: &self.lighting,
-            visible,
-        })
+            visible: &self.visible[number],
+        }
     }
 }
 

@@ -23,6 +23,14 @@ pub(crate) enum Role {
     Count,
     /// Fragments of a blended draw, added up.
     CountBlended,
+    /// Depth alone.
+    Depth,
+    /// Depth of an alpha-masked draw alone.
+    DepthMasked,
+    /// Marks the draw where a fragment is no farther than the depth there.
+    Mark,
+    /// The same of an alpha-masked draw.
+    MarkMasked,
 }
 
 impl Role {
@@ -31,11 +39,27 @@ impl Role {
         matches!(self, Self::Shadow | Self::ShadowMasked)
     }
 
+    /// There is no colour attachment.
+    pub fn colorless(self) -> bool {
+        let alone = [Self::Depth, Self::DepthMasked, Self::Mark, Self::MarkMasked];
+        self.casts() || alone.contains(&self)
+    }
+
+    /// It marks draws: fragments as far as the depth count as well.
+    pub fn marks(self) -> bool {
+        matches!(self, Self::Mark | Self::MarkMasked)
+    }
+
+    /// Neither texture nor vertex colour changes what it does.
+    fn is_plain(self) -> bool {
+        matches!(self, Self::Shadow | Self::Depth | Self::Mark)
+    }
+
     /// Depth is tested and stays.
     pub fn keeps_depth(self) -> bool {
         matches!(
             self,
-            Self::Blended | Self::MaskedRecord | Self::CountBlended
+            Self::Blended | Self::MaskedRecord | Self::CountBlended | Self::Mark | Self::MarkMasked
         )
     }
 }
@@ -51,6 +75,10 @@ pub(crate) enum Purpose {
     Shadow,
     /// The additive count of fragments.
     Count,
+    /// Depth, for occlusion culling and for marks.
+    Depth,
+    /// Which draws are visible.
+    Mark,
 }
 
 /// Roles of a draw in the order in which it takes them.
@@ -64,8 +92,14 @@ pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
         (DrawMode::Masked, Purpose::Shadow) => &[Role::ShadowMasked],
         (DrawMode::Opaque, Purpose::Count) => &[Role::Count],
         (DrawMode::Blended, Purpose::Count) => &[Role::CountBlended],
-        // Blended draws cast no shadow, and an alpha test cannot be counted without the replay.
-        (DrawMode::Blended, Purpose::Shadow) | (DrawMode::Masked, Purpose::Count) => &[],
+        (DrawMode::Opaque, Purpose::Depth) => &[Role::Depth],
+        (DrawMode::Masked, Purpose::Depth) => &[Role::DepthMasked],
+        (DrawMode::Opaque | DrawMode::Blended, Purpose::Mark) => &[Role::Mark],
+        (DrawMode::Masked, Purpose::Mark) => &[Role::MarkMasked],
+        // Blended draws cast no shadow and write no depth, and an alpha test cannot be counted
+        // without the replay.
+        (DrawMode::Blended, Purpose::Shadow | Purpose::Depth)
+        | (DrawMode::Masked, Purpose::Count) => &[],
     }
 }
 
@@ -123,15 +157,14 @@ impl PipelineKey {
         Self {
             role,
             capture,
-            // A shadow caster without alpha test is drawn alike whatever its material.
-            textures: if role == Role::Shadow {
+            textures: if role.is_plain() {
                 0
             } else {
                 material.textures
             },
             leaders: if capture { material.leaders } else { 0 },
             cascades: if lit { cascades } else { 0 },
-            colored: role != Role::Shadow && call.colored,
+            colored: !role.is_plain() && call.colored,
             // Shadow maps hold both faces: walls that are modelled from one side block light.
             double_sided: role.casts() || material.double_sided,
             mirrored: !role.casts() && call.mirrored,

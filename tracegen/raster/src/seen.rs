@@ -1,59 +1,158 @@
-//! Which images a capture's views sample: only those need texels.
+//! What a capture's views sample of the scene's images: only that needs texels.
 
 use super::capture::CaptureJob;
-use super::draws::DrawMode;
+use super::draws::{DrawCall, DrawMode, SHADOW_SIZE};
+use super::error::RasterError;
 use super::groups::MATERIAL_TEXTURES;
+use formats::texture::MipFilter;
 use formats::view::FrameViews;
-use glam::Mat4;
-use scene::Scene;
+use glam::Vec2;
+use scene::{Mesh, Scene, TextureRef};
+use visibility::magnification::{Pixels, least_derivative_squared};
 use visibility::triangles;
 
+/// Levels by which a driver's level of detail may lie below the exact one: llvmpipe's logarithm is off by
+/// at most 0.044.
+const DRIVER_LEVELS: f64 = 0.1;
+/// Texture coordinates beyond this are too coarse in 32 bits for a promise about their derivatives.
+const LARGEST_UV: f32 = 256.0;
+
 impl CaptureJob<'_> {
-    /// For each image of the scene, whether a draw that samples it may be seen by a view of any
-    /// frame, or is a masked caster that a shadow cascade may see.
-    #[must_use]
-    pub fn seen_images(&self, scene: &Scene, frames: &[FrameViews]) -> Vec<bool> {
-        let mut seen = vec![false; scene.images.len()];
+    /// For each image of the scene, the finest mip level that may be sampled: by a draw that a view of
+    /// any frame may see, or by a masked caster that a shadow cascade may see. `None` for an image that
+    /// nothing samples.
+    ///
+    /// # Errors
+    /// Eyes that the culling technique is not made for.
+    pub fn finest_levels(&self, frames: &[FrameViews]) -> Result<Vec<Option<u32>>, RasterError> {
+        let scene = self.scene;
+        if !self.skips.images {
+            return Ok(vec![Some(0); scene.images.len()]);
+        }
+        let mut finest = vec![None; scene.images.len()];
+        // What moves is elsewhere in every frame, and little: whatever it has is wanted.
+        for &draw in &self.draws.moving {
+            let material = &scene.materials[self.draws.calls[draw as usize].material];
+            for texture in material.textures().iter().flatten() {
+                if let Some(level) = finest.get_mut(texture.image) {
+                    *level = Some(0);
+                }
+            }
+        }
         for views in frames {
-            let frame = self.frame(views);
+            let frame = self.boxes_seen(views)?;
             for view in frame.views() {
+                let projection = view.layer.view.eye_to_clip;
+                let pixels = Pixels {
+                    clip_from_world: view.clip_from_world(),
+                    size_px: view.layer.size_px,
+                    least_w: projection[3][2] / projection[2][2],
+                };
                 let all = |_| MATERIAL_TEXTURES;
-                self.mark(scene, view.clip_from_world(), view.visible, all, &mut seen);
+                self.sample(scene, &pixels, view.visible, all, &mut finest);
             }
             for (cascade, casters) in frame.lighting.cascades.iter().zip(&frame.casters) {
                 // A masked caster samples its base colour, the first slot.
                 let slots = |mode| usize::from(mode == DrawMode::Masked);
-                self.mark(scene, cascade.clip_from_world, casters, slots, &mut seen);
+                let pixels = Pixels {
+                    clip_from_world: cascade.clip_from_world,
+                    size_px: [SHADOW_SIZE; 2],
+                    least_w: 1.0,
+                };
+                self.sample(scene, &pixels, casters, slots, &mut finest);
             }
         }
-        seen
+        Ok(finest)
     }
 
-    /// Marks the images in the first `slots` of the materials that the view may see.
-    fn mark(
+    /// Adds what a view samples through the first `slots` of its draws' materials.
+    fn sample(
         &self,
         scene: &Scene,
-        clip_from_world: Mat4,
+        pixels: &Pixels,
         visible: &[u32],
         slots: impl Fn(DrawMode) -> usize,
-        seen: &mut [bool],
+        finest: &mut [Option<u32>],
     ) {
         for &index in visible {
             let call = &self.draws.calls[index as usize];
             let mesh = &scene.meshes[call.mesh];
-            let sampled = scene.materials[call.material].textures();
-            let sampled = || sampled[..slots(call.mode)].iter().flatten();
-            let inside = || {
-                let (transform, triangles) = (&call.transform, &mesh.indices);
-                triangles::any_inside(&mesh.positions, triangles, transform, clip_from_world)
-            };
-            if sampled().any(|t| seen.get(t.image) == Some(&false)) && inside() {
-                for texture in sampled() {
-                    if let Some(seen) = seen.get_mut(texture.image) {
-                        *seen = true;
-                    }
+            let textures = scene.materials[call.material].textures();
+            let sampled = || textures[..slots(call.mode)].iter().flatten();
+            if !sampled().any(|t| is_new(t, finest)) || !self.any_inside(call, mesh, pixels) {
+                continue;
+            }
+            for set in [0, 1] {
+                let of_set = || sampled().filter(move |t| t.uv_set == set);
+                if !of_set().any(|t| is_new(t, finest)) {
+                    continue;
+                }
+                let largest = LARGEST_UV / of_set().map(scale).fold(1.0, f32::max);
+                let derivative = if self.skips.mip_levels {
+                    derivative_squared(call, mesh, set, largest, pixels)
+                } else {
+                    0.0
+                };
+                for texture in of_set() {
+                    let Some(level) = finest.get_mut(texture.image) else {
+                        continue;
+                    };
+                    let least = least_level(texture, scene.images[texture.image].size, derivative);
+                    *level = Some(level.map_or(least, |known| known.min(least)));
                 }
             }
         }
     }
+
+    fn any_inside(&self, call: &DrawCall, mesh: &Mesh, pixels: &Pixels) -> bool {
+        let (transform, indices) = (&call.transform, &mesh.indices);
+        triangles::any_inside(&mesh.positions, indices, transform, pixels.clip_from_world)
+    }
+}
+
+/// Squared length of the least derivative of a mesh's texture coordinates by pixel. A coordinate larger
+/// than `largest` leaves none.
+fn derivative_squared(
+    call: &DrawCall,
+    mesh: &Mesh,
+    set: u32,
+    largest: f32,
+    pixels: &Pixels,
+) -> f64 {
+    let coordinates = if set == 0 { &mesh.uv0 } else { &mesh.uv1 };
+    let uv = |vertex: usize| {
+        let uv = coordinates.get(vertex).copied().unwrap_or(Vec2::NAN);
+        if uv.abs().max_element() <= largest {
+            uv
+        } else {
+            Vec2::NAN
+        }
+    };
+    least_derivative_squared(&mesh.positions, &mesh.indices, uv, &call.transform, pixels)
+}
+
+/// Whether more of a texture's image may be needed than is known.
+fn is_new(texture: &TextureRef, finest: &[Option<u32>]) -> bool {
+    finest
+        .get(texture.image)
+        .is_some_and(|level| *level != Some(0))
+}
+
+/// By how much a texture's transform may enlarge a coordinate.
+fn scale(texture: &TextureRef) -> f32 {
+    let sum = |row: [f32; 3]| row.map(f32::abs).iter().sum::<f32>();
+    sum(texture.uv_transform[0]).max(sum(texture.uv_transform[1]))
+}
+
+/// The finest level of an image of `size` texels that is sampled where the square of the least
+/// derivative of the coordinates is `derivative_squared`.
+fn least_level(texture: &TextureRef, size: [u32; 2], derivative_squared: f64) -> u32 {
+    if texture.sampler.mip == MipFilter::None {
+        return 0;
+    }
+    let [[a, b, _], [c, d, _]] = texture.uv_transform.map(|row| row.map(f64::from));
+    let texels = f64::from(size[0]) * f64::from(size[1]) * (a * d - b * c).abs();
+    let level = (derivative_squared * texels).log2() / 2.0 - DRIVER_LEVELS;
+    // The conversion saturates: nothing known is level 0.
+    level as u32
 }

@@ -25,6 +25,7 @@ pub(crate) struct ViewData {
     cascades: [[[f32; 4]; 4]; MAX_CASCADES],
     points: [[[f32; 4]; 2]; MAX_POINT_LIGHTS],
     counts: [u32; 4],
+    lens: [f32; 4],
 }
 
 impl ViewData {
@@ -36,6 +37,14 @@ impl ViewData {
             view.lighting,
             capacity,
         )
+    }
+
+    /// Marks count inside the lens as well.
+    pub fn with_lens(self, lens_px: [f32; 4]) -> Self {
+        Self {
+            lens: lens_px,
+            ..self
+        }
     }
 
     /// The light's view of a cascade.

@@ -23,6 +23,8 @@ pub struct CaptureCounts {
     pub not_finite: u64,
     /// Bytes of the encoded tiles.
     pub tile_bytes: u64,
+    /// Tiles that nothing covers: they cost an entry in the index.
+    pub empty_tiles: u64,
 }
 
 impl AddAssign for CaptureCounts {
@@ -33,6 +35,7 @@ impl AddAssign for CaptureCounts {
         self.masked_lanes_killed += other.masked_lanes_killed;
         self.not_finite += other.not_finite;
         self.tile_bytes += other.tile_bytes;
+        self.empty_tiles += other.empty_tiles;
     }
 }
 
@@ -102,6 +105,7 @@ impl TileRules {
             scratch.tile.runs.pop();
         }
         counts.records = scratch.tile.records.len() as u64;
+        counts.empty_tiles = u64::from(scratch.tile.records.is_empty());
         Ok(counts)
     }
 

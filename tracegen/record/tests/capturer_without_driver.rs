@@ -90,6 +90,7 @@ fn tables() -> Tables {
             frame: 0,
             kind: PassKind::Main,
             eye: Some(Eye::Left),
+            layer: 0,
             size_px: SIZE_PX,
             tiles: [4, 6],
         }],

@@ -1,6 +1,6 @@
-//! What a file leaves out of a mesh: normals, tangents, and the triangles of strips and fans.
+//! What a file leaves out of a mesh: normals, tangents, the triangles of strips and fans; and boxes.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Affine3A, Vec2, Vec3, Vec4};
 
 /// Area-weighted vertex normals.
 ///
@@ -20,6 +20,31 @@ pub fn vertex_normals(positions: &[Vec3], indices: &[u32]) -> Vec<Vec3> {
         *n = unit_or(*n, Vec3::Y);
     }
     normals
+}
+
+/// Lowest and highest coordinates, infinite inside out where there are no points.
+#[must_use]
+pub fn bounding_box(points: impl IntoIterator<Item = Vec3>) -> [Vec3; 2] {
+    let empty = [Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY)];
+    points
+        .into_iter()
+        .fold(empty, |[low, high], p| [low.min(p), high.max(p)])
+}
+
+/// [`bounding_box`] of transformed points; `object_box` is that of the points as they are.
+///
+/// It is the same to the last bit whether points or, where the transform takes axes to axes, only
+/// the box's corners are looked at: a sum with zeros rounds like its other terms, and scaling and
+/// adding keep the order of numbers.
+#[must_use]
+pub fn transformed_box(points: &[Vec3], object_box: [Vec3; 2], transform: &Affine3A) -> [Vec3; 2] {
+    let m = &transform.matrix3;
+    let one_axis = |v: glam::Vec3A| v.cmpeq(glam::Vec3A::ZERO).bitmask().count_ones() >= 2;
+    let columns = [m.x_axis, m.y_axis, m.z_axis];
+    if columns.into_iter().all(one_axis) && m.determinant() != 0.0 && !points.is_empty() {
+        return bounding_box(object_box.map(|p| transform.transform_point3(p)));
+    }
+    bounding_box(points.iter().map(|p| transform.transform_point3(*p)))
 }
 
 /// The direction of `v`, also where its length squared is beyond `f32`; `fallback` where it has none.
@@ -150,6 +175,46 @@ mod tests {
         let flipped = uv.map(|c| Vec2::new(c.x, 1.0 - c.y));
         let mirrored = vertex_tangents(&positions, &normals, &flipped, &[0, 1, 2]);
         assert_eq!(mirrored[0], Vec4::new(1.0, 0.0, 0.0, -1.0));
+    }
+
+    #[test]
+    fn a_transformed_box_is_the_box_of_the_transformed_points_to_the_last_bit() {
+        let mut state = 3_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0 * 40.0 - 20.0
+        };
+        let axes = [
+            Vec3::X,
+            Vec3::NEG_Y,
+            Vec3::Z,
+            Vec3::NEG_X,
+            Vec3::Y,
+            Vec3::NEG_Z,
+        ];
+        for i in 0..300 {
+            let points: Vec<Vec3> = (0..9)
+                .map(|_| Vec3::new(random(), random(), random()))
+                .collect();
+            let matrix = match i % 3 {
+                // Axes to axes, scaled and mirrored; or to one plane; or anywhere.
+                0 => {
+                    let [a, b] = [axes[i % 6], axes[(i + 1) % 6]];
+                    glam::Mat3::from_cols(a * random(), b * random(), a.cross(b) * random())
+                }
+                1 => glam::Mat3::from_cols(Vec3::X * random(), Vec3::X * random(), Vec3::Z),
+                _ => glam::Mat3::from_rotation_x(random()) * glam::Mat3::from_rotation_y(random()),
+            };
+            let translation = Vec3::new(random(), random(), random());
+            let transform = Affine3A::from_mat3_translation(matrix, translation);
+            let expected = bounding_box(points.iter().map(|p| transform.transform_point3(*p)));
+            let object_box = bounding_box(points.iter().copied());
+            assert_eq!(transformed_box(&points, object_box, &transform), expected);
+        }
+        assert_eq!(
+            transformed_box(&[], bounding_box([]), &Affine3A::IDENTITY),
+            bounding_box([])
+        );
     }
 
     #[test]

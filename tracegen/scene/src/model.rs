@@ -2,7 +2,8 @@
 //!
 //! World space is right-handed, y up, metres. Front faces wind counter-clockwise.
 
-use crate::Image;
+use crate::geometry::{bounding_box, transformed_box};
+use crate::{Image, Motion};
 use formats::texture::Sampler;
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 
@@ -15,6 +16,8 @@ pub struct Scene {
     pub meshes: Vec<Mesh>,
     /// Meshes placed in the world, in submission order.
     pub instances: Vec<Instance>,
+    /// Which instances move, and how.
+    pub motions: Vec<Motion>,
     /// Materials.
     pub materials: Vec<Material>,
     /// Images with their colour space (an image used in both spaces is listed twice).
@@ -58,6 +61,12 @@ impl Mesh {
     #[must_use]
     pub fn triangles(&self) -> usize {
         self.indices.len() / 3
+    }
+
+    /// Object-space bounds, infinite inside out for a mesh without vertices.
+    #[must_use]
+    pub fn bounds(&self) -> [Vec3; 2] {
+        bounding_box(self.positions.iter().copied())
     }
 }
 
@@ -289,16 +298,15 @@ impl Scene {
             .sum()
     }
 
-    /// World-space bounds, `None` for an empty scene.
+    /// World-space bounds at time 0, `None` for an empty scene.
     #[must_use]
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        let mut points = self.instances.iter().flat_map(|i| {
-            self.meshes[i.mesh]
-                .positions
-                .iter()
-                .map(move |p| i.transform.transform_point3(*p))
+        let boxes: Vec<[Vec3; 2]> = self.meshes.iter().map(Mesh::bounds).collect();
+        let placed = self.instances.iter().filter_map(|i| {
+            let positions = &self.meshes[i.mesh].positions;
+            (!positions.is_empty()).then(|| transformed_box(positions, boxes[i.mesh], &i.transform))
         });
-        let first = points.next()?;
-        Some(points.fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p))))
+        let around = |a: [Vec3; 2], b: [Vec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        placed.reduce(around).map(|[low, high]| (low, high))
     }
 }

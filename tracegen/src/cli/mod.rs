@@ -6,6 +6,7 @@ pub mod raster;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;
+mod technique_args;
 
 use clap::{Parser, Subcommand};
 use shell::{Common, Documents};

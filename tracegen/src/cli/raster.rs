@@ -3,23 +3,30 @@
 use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
+use super::technique_args::TechniqueArgs;
 use crate::picture;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
-use formats::view::Eye;
+use formats::view::{Eye, FrameViews};
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
+use raster::error::RasterError;
+use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
+use raster::skips::Skipped;
 use record::CaptureCounts;
 use scene::LoadOptions;
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use techniques::Settings;
+use techniques::layer::Predicted;
+use techniques::skips::Skip;
+use techniques::{Planner, Skips};
 use textures::TextureSet;
+use visibility::Occlusion;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;
@@ -54,6 +61,12 @@ pub struct RasterArgs {
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
     record_budget: u64,
+    /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, draws, regions or all of
+    /// them. Pictures and trace stay the same.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    no_skip: Vec<Skip>,
+    #[command(flatten)]
+    techniques: TechniqueArgs,
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
@@ -103,21 +116,20 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         setup.scene.shadow_cascades.min(CASCADES)
     };
     progress.stage("preparing textures and shaders", 0, "");
-    let draws = DrawList::new(&setup.scene, cascades)?;
+    let mut draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
-    let settings = Settings::default();
-    let job = CaptureJob {
-        draws: &draws,
-        lighting: Lighting::new(&setup.scene),
-        bounds,
-        shadow_range_m: shadow_range_m(&setup, bounds),
-        hmd: &setup.hmd,
-        eyes: args.views.eyes(),
-        settings: &settings,
-    };
-    let seen = job.seen_images(&setup.scene, &setup.frames);
-    let uploads = TextureSet::prepare(&setup.scene, |image| seen[image], cache.as_ref())?;
+    let planner = Planner::new(
+        &args.techniques.settings(&setup.hmd)?,
+        &setup.hmd,
+        args.techniques.lenses(&setup.hmd)?,
+        args.views.eyes(),
+        args.path.fps,
+    )?;
+    let job = job(args, &setup, &draws, &planner, bounds);
+    let finest = job.finest_levels(&setup.frames)?;
+    let searched = started.elapsed();
+    let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
     let textured = started.elapsed();
     for note in &uploads.notes {
         shell::warn(note);
@@ -133,9 +145,16 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         passes,
     );
     let (total, cached, unseen) = (uploads.textures.len(), uploads.cached, uploads.unseen());
+    let texels = format!(
+        "{:.1} MiB of texels, {:.1} MiB left out ({unseen} images and the finest levels of {} that no view samples, found in {:.2} s)",
+        mib(uploads.bytes()),
+        mib(uploads.skipped_bytes()),
+        uploads.shortened(),
+        (searched - loaded).as_secs_f64()
+    );
     drop(uploads);
     let mut summary = Summary::default();
-    let first = job.frame(&setup.frames[0]);
+    let first = summary.look(&job, &mut backend, &setup.frames[0])?;
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
@@ -158,10 +177,14 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let mut first_pictures: Option<Pictures> = None;
     let mut first_pass = 0;
     for views in &setup.frames {
+        let time_s = setup.moments.time_s(views.frame);
+        draws.pose(&setup.scene, time_s);
+        backend.pose(&draws);
+        let job = self::job(args, &setup, &draws, &planner, bounds);
         let frame = match first.take() {
             Some(first) => first,
             None => {
-                let frame = job.frame(views);
+                let frame = summary.look(&job, &mut backend, views)?;
                 summary.shadows += job.light(&mut backend, &frame)?;
                 frame
             }
@@ -180,6 +203,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         summary.sorting += sorting;
         summary.captured += start.elapsed();
         summary.counts += counts;
+        summary.predicted.push(frame.plan.predicted);
         if let Some(plain) = plain {
             summary.identical = Some(summary.identical.unwrap_or(true) && plain == pictures);
         }
@@ -209,9 +233,29 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
     }
-    let views = [setup.frames.len(), job.eyes.len()];
+    let views = [setup.frames.len(), planner.eyes().len()];
+    note(&texels);
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
+}
+
+/// What to capture of the draws where they stand.
+fn job<'a>(
+    args: &RasterArgs,
+    setup: &'a SceneSetup,
+    draws: &'a DrawList,
+    planner: &'a Planner,
+    bounds: (glam::Vec3, glam::Vec3),
+) -> CaptureJob<'a> {
+    CaptureJob {
+        scene: &setup.scene,
+        draws,
+        lighting: Lighting::new(&setup.scene),
+        bounds,
+        shadow_range_m: shadow_range_m(setup, bounds),
+        planner,
+        skips: Skips::without(&args.no_skip),
+    }
 }
 
 /// Near and far end of the cascades: from the near plane to where the scene ends.
@@ -261,10 +305,39 @@ struct Summary {
     captured: Duration,
     sorting: Duration,
     counts: CaptureCounts,
+    predicted: Vec<Predicted>,
     identical: Option<bool>,
+    looking: Duration,
+    culling: Duration,
+    cull_tests: u64,
+    occlusion: Occlusion,
+    occlusion_tests: u64,
+    occluded: u64,
+    skipped: Skipped,
 }
 
 impl Summary {
+    /// Finds what a frame draws.
+    fn look(
+        &mut self,
+        job: &CaptureJob<'_>,
+        backend: &mut dyn CaptureBackend,
+        views: &FrameViews,
+    ) -> Result<Frame, RasterError> {
+        let start = Instant::now();
+        let mut frame = job.frame(views)?;
+        if job.planner.settings().occlusion {
+            job.occlude(backend, &mut frame, &mut self.occlusion)?;
+        }
+        self.looking += start.elapsed();
+        self.skipped += frame.skipped;
+        self.cull_tests += frame.cull_tests;
+        self.occlusion_tests += frame.occlusion_tests;
+        self.occluded += frame.occluded;
+        self.culling += frame.cull_time;
+        Ok(frame)
+    }
+
     fn print(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64, work: &Work) {
         let CaptureCounts {
             quads,
@@ -273,6 +346,7 @@ impl Summary {
             masked_lanes_killed,
             not_finite,
             tile_bytes,
+            empty_tiles,
         } = self.counts;
         let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
         let pixels = (views * frames) as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
@@ -282,6 +356,17 @@ impl Summary {
             size_px[1],
             fragments as f64 / pixels
         ));
+        let mean = |share: fn(&Predicted) -> Option<f32>| {
+            let shares: Option<Vec<f32>> = self.predicted.iter().map(share).collect();
+            shares.map(|shares| shares.iter().sum::<f32>() / shares.len().max(1) as f32)
+        };
+        if let (Some(rate), Some(shaded)) = (mean(|p| p.rate_share), mean(|p| p.shaded_share)) {
+            note(&format!(
+                "{:.2} % of the pixels are open to be shaded: {:.2} % by their rates, the rest for reconstruction",
+                shaded * 100.0,
+                rate * 100.0
+            ));
+        }
         if masked_lanes_killed > 0 {
             note(&format!(
                 "{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw"
@@ -306,6 +391,19 @@ impl Summary {
             self.shadows.as_secs_f64(),
             work.pipelines,
             work.samplers
+        ));
+        note(&format!(
+            "culling        {} boxes tested, {} more against depth that hides {} draws, in {:.3} ms a frame",
+            self.cull_tests,
+            self.occlusion_tests,
+            self.occluded,
+            self.culling.as_secs_f64() * 1e3 / frames as f64
+        ));
+        note(&format!(
+            "never drawn    {empty_tiles} empty tiles, {} draws without a triangle in view, {} shadow cascades that nobody sees (draws found in {:.3} s)",
+            self.skipped.draws,
+            self.skipped.cascades,
+            self.looking.as_secs_f64()
         ));
         let captured = self.captured.as_secs_f64();
         let includes = "all views, reading the pictures back";
@@ -333,6 +431,11 @@ impl Summary {
             ));
         }
     }
+}
+
+/// Bytes in MiB.
+fn mib(bytes: usize) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
 }
 
 /// Largest resident set so far, where the system tells (Linux).

@@ -106,7 +106,7 @@ fn read_textures(spec: &str, cache: Option<&Cache>) -> anyhow::Result<Descriptio
     let start = Instant::now();
     let scene = load_scene(spec, &LoadOptions::ALL)?;
     let loaded = start.elapsed();
-    let set = TextureSet::prepare(&scene, |_| true, cache)?;
+    let set = TextureSet::prepare(&scene, |_| Some(0), cache)?;
     for note in &set.notes {
         shell::warn(note);
     }

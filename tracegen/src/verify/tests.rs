@@ -4,7 +4,7 @@ use super::compare::{Agreement, compare, lanes};
 use super::reference;
 use formats::textrace::{SUBTEXELS, Tables, Textrace, TextraceWriter, Tile, TraceMeta};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
-use formats::view::{Eye, FrameViews, Hmd};
+use formats::view::{Eye, FrameViews, Hmd, Lens};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
 use raster::backend::{CaptureBackend, View, Work};
 use raster::capture::CaptureJob;
@@ -12,9 +12,14 @@ use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
 use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
+use record::CaptureCounts;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
-use techniques::{Layer, Settings};
+use techniques::layer::Predicted;
+use techniques::{Layer, Planner, Settings, Skips};
 use textures::TextureSet;
+
+mod culling;
+mod layers;
 
 const SIZE_PX: [u32; 2] = [200, 136];
 const BUDGET: u64 = 128 << 20;
@@ -27,7 +32,8 @@ struct Captured {
     pictures_match: bool,
     /// RGBA8 by pass.
     pictures: Vec<Vec<u8>>,
-    killed: u64,
+    counts: CaptureCounts,
+    predicted: Predicted,
     work: Work,
 }
 
@@ -46,21 +52,26 @@ fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
         .remove(0)
 }
 
-fn job<'a>(
-    scene: &Scene,
-    draws: &'a DrawList,
-    hmd: &'a Hmd,
-    eyes: &'a [Eye],
-    settings: &'a Settings,
-) -> CaptureJob<'a> {
+/// The baseline of `eyes`.
+fn baseline(size_px: [u32; 2], eyes: &[Eye]) -> Planner {
+    planner(&Settings::default(), size_px, eyes)
+}
+
+fn planner(settings: &Settings, size_px: [u32; 2], eyes: &[Eye]) -> Planner {
+    let hmd = display(size_px);
+    let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+    Planner::new(settings, &hmd, lenses, eyes, 72.0).unwrap()
+}
+
+fn job<'a>(scene: &'a Scene, draws: &'a DrawList, planner: &'a Planner) -> CaptureJob<'a> {
     CaptureJob {
+        scene,
         draws,
         lighting: Lighting::new(scene),
         bounds: scene.bounds().unwrap_or_default(),
         shadow_range_m: [0.1, 40.0],
-        hmd,
-        eyes,
-        settings,
+        planner,
+        skips: Skips::default(),
     }
 }
 
@@ -78,12 +89,23 @@ fn try_capture(
     eyes: &[Eye],
     plain: bool,
 ) -> Result<Captured, RasterError> {
+    capture_as(&baseline(size_px, eyes), scene, cascades, budget, plain)
+}
+
+/// Captures one frame as planned, after a plain picture of it where one is wanted.
+fn capture_as(
+    planner: &Planner,
+    scene: &Scene,
+    cascades: u32,
+    budget: u64,
+    plain: bool,
+) -> Result<Captured, RasterError> {
+    let size_px = planner.hmd().eye_size_px;
     let draws = DrawList::new(scene, cascades).unwrap();
     let set = TextureSet::compress(scene).unwrap();
     let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
     let views = views(scene, size_px);
-    let (hmd, settings) = (display(size_px), Settings::default());
-    let job = job(scene, &draws, &hmd, eyes, &settings);
+    let job = job(scene, &draws, planner);
     let textures = draws.textures(&set);
     let (samplers, draw_table) = draws.tables(scene, &set, &textures);
     let tables = Tables {
@@ -96,7 +118,7 @@ fn try_capture(
             backend: "lavapipe".into(),
             driver: backend.driver().into(),
             seed: 0,
-            hmd: hmd.clone(),
+            hmd: display(size_px),
             frames: vec![views.clone()],
         },
         textures,
@@ -104,7 +126,7 @@ fn try_capture(
         draws: draw_table,
         passes: job.passes(std::slice::from_ref(&views)),
     };
-    let frame = job.frame(&views);
+    let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
@@ -115,7 +137,7 @@ fn try_capture(
     let after = backend.work();
     let trace = writer.into_bytes().unwrap();
     let reader = Textrace::from_bytes(trace.clone()).unwrap();
-    let tiles = (0..eyes.len())
+    let tiles = (0..tables.passes.len())
         .map(|pass| {
             (0..tables.passes[pass].tile_count() as usize)
                 .map(|index| {
@@ -135,7 +157,8 @@ fn try_capture(
             None => true,
         },
         pictures,
-        killed: counts.masked_lanes_killed,
+        counts,
+        predicted: frame.plan.predicted,
         work: Work {
             draws: after.draws - before.draws,
             calls: after.calls - before.calls,
@@ -328,9 +351,9 @@ fn masked_draws_keep_exactly_the_lanes_that_an_in_order_gpu_keeps() {
     let scene = scene(meshes, materials, vec![checker()]);
     let captured = capture(&scene, SIZE_PX, 0, BUDGET);
     assert!(
-        captured.killed > 10_000,
+        captured.counts.masked_lanes_killed > 10_000,
         "the scene must exercise the replay, killed {}",
-        captured.killed
+        captured.counts.masked_lanes_killed
     );
     for pass in 0..2 {
         let a = agreement(&scene, &captured, pass, &checker_passes);
@@ -438,8 +461,9 @@ fn work_that_a_frame_does_not_need_is_not_done() {
     let scene = scene(meshes, materials, vec![checker()]);
     let capture = |plain| try_capture(&scene, SIZE_PX, 2, BUDGET, BOTH, plain).unwrap();
     let (with, without) = (capture(true).work, capture(false).work);
-    // Rendered once for the plain pictures and the captured ones: one a cascade.
-    assert_eq!(with.shadow_maps, 2);
+    // Rendered once for the plain pictures and the captured ones: one a cascade that is looked up,
+    // and nothing that is seen looks up the farther one.
+    assert_eq!(with.shadow_maps, 1);
     // The textures' state and that of the slots without a texture.
     assert_eq!(with.samplers, 2);
     // Two casters, the opaque draw, the masked draw's records and its colour; the plain opaque
@@ -478,10 +502,10 @@ fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
     let mut backend =
         Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap_or_else(|e| panic!("{e}"));
     let lighting = Lighting::new(&scene);
-    for pass in 0..2 {
+    for (pass, eye) in BOTH.iter().enumerate() {
         let view = View {
             target: pass,
-            layer: &Layer::whole(BOTH[pass], views(&scene, SIZE_PX).eyes[pass], SIZE_PX),
+            layer: &Layer::whole(*eye, views(&scene, SIZE_PX).eyes[pass], SIZE_PX),
             lighting: &lighting,
             visible: &[],
         };
@@ -624,9 +648,9 @@ fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture
     let mut gpu = device::open(None).unwrap_or_else(|e| panic!("{e}"));
     gpu.no_capture = Some("what the test took away".into());
     let mut backend = Lavapipe::on(gpu, &scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
-    let (hmd, settings) = (display(SIZE_PX), Settings::default());
-    let job = job(&scene, &draws, &hmd, BOTH, &settings);
-    let frame = job.frame(&views(&scene, SIZE_PX));
+    let planner = baseline(SIZE_PX, BOTH);
+    let job = job(&scene, &draws, &planner);
+    let frame = job.frame(&views(&scene, SIZE_PX)).unwrap();
     job.light(&mut backend, &frame).unwrap();
     let (pictures, _) = job.plain_frame(&mut backend, &frame).unwrap();
     assert!(pictures == captured.pictures);

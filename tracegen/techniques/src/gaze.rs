@@ -57,18 +57,18 @@ impl Gaze {
     }
 }
 
-/// Tangents to the right and up at which an eye (0 left, 1 right) sees the direction that lies so many degrees to
-/// the right of straight ahead seen from above, and so many up seen from the side; `None` where it lies behind.
-pub(crate) fn tangents(hmd: &Hmd, eye: usize, deg: [f32; 2]) -> Option<[f32; 2]> {
-    if deg.iter().any(|angle| !(-89.9..=89.9).contains(angle)) {
-        return None;
-    }
+/// Whether a direction is one, in degrees: less than 90 to either side.
+pub(crate) fn is_ahead(deg: [f32; 2]) -> bool {
+    deg.iter().all(|angle| (-89.9..=89.9).contains(angle))
+}
+
+/// Unit vector, in the coordinates of an eye (0 left, 1 right) that looks along -z, of the direction that lies so
+/// many degrees to the right of straight ahead seen from above, and so many up seen from the side.
+pub(crate) fn direction(hmd: &Hmd, eye: usize, deg: [f32; 2]) -> Vec3 {
     let [x, y] = deg.map(|angle| angle.to_radians().tan());
-    let direction = Vec3::new(x, y, -1.0);
     // The left eye is turned to the left: a positive turn about +y.
     let side = if eye == 0 { 1.0 } else { -1.0 };
-    let seen = Mat3::from_rotation_y(-side * hmd.cant_deg.to_radians()) * direction;
-    (seen.z < -1e-6).then(|| [seen.x / -seen.z, seen.y / -seen.z])
+    (Mat3::from_rotation_y(-side * hmd.cant_deg.to_radians()) * Vec3::new(x, y, -1.0)).normalize()
 }
 
 #[cfg(test)]

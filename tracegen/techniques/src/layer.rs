@@ -2,6 +2,7 @@
 
 use crate::Mask;
 use formats::view::{Eye, EyeView};
+use glam::{Mat4, Vec2, Vec3};
 use std::sync::Arc;
 
 /// One rendering of a part of one eye's picture, or of both eyes': a pass of the trace.
@@ -34,6 +35,50 @@ impl Layer {
             draws: Stage::All,
         }
     }
+
+    /// World to clip space.
+    #[must_use]
+    pub fn clip_from_world(&self) -> Mat4 {
+        Mat4::from_cols_array_2d(&self.view.eye_to_clip)
+            * Mat4::from_cols_array_2d(&self.view.world_to_eye)
+    }
+
+    /// Whether something in world-space bounds may reach a pixel that may be drawn. Errs on the
+    /// side of drawing.
+    #[must_use]
+    pub fn may_draw(&self, [low, high]: [Vec3; 2]) -> bool {
+        let Some(mask) = &self.mask else { return true };
+        let clip_from_world = self.clip_from_world();
+        let (mut first, mut last) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+        for corner in 0..8 {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
+            let at = clip_from_world * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
+            // Beside the eye or behind it, or not a number: it may be anywhere.
+            if at.w.is_nan() || at.w < 1e-3 {
+                return true;
+            }
+            let ndc = Vec2::new(at.x, -at.y) / at.w;
+            (first, last) = (first.min(ndc), last.max(ndc));
+        }
+        let size = Vec2::new(self.size_px[0] as f32, self.size_px[1] as f32);
+        let px = |ndc: Vec2| (ndc + 1.0) / 2.0 * size;
+        // A pixel around it for the rounding of vertices to the raster's grid.
+        let (first, last) = (px(first) - 1.0, px(last) + 1.0);
+        if first.is_nan() || last.is_nan() {
+            return true;
+        }
+        mask.any_in(
+            [first.x as u32, first.y as u32],
+            [last.x.ceil() as u32, last.y.ceil() as u32],
+        )
+    }
+
+    /// Pixels that may be drawn.
+    #[must_use]
+    pub fn drawn_px(&self) -> u64 {
+        let all = u64::from(self.size_px[0]) * u64::from(self.size_px[1]);
+        self.mask.as_ref().map_or(all, |mask| mask.count())
+    }
 }
 
 /// A part of a frame's draws.
@@ -51,13 +96,76 @@ pub enum Stage {
 /// What a technique promises of a frame, to be held against what is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Predicted {
-    /// Pixels that may be shaded, borders for reconstruction included, in pixels of the pictures.
+    /// Pixels that may be shaded, those that reconstruction needs besides included, in pixels of the
+    /// pictures.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shaded_share: Option<f32>,
+    /// The same without what only reconstruction needs: the mean rate of the pictures' pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_share: Option<f32>,
     /// Largest distance between a far point's place in the picture and its true place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disparity_px: Option<f32>,
     /// Distance from which on there is one picture for both eyes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split_m: Option<f32>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::camera::rh::proj::directx::perspective;
+
+    /// A view along -z of which only the leftmost tiles may be drawn.
+    fn layer() -> Layer {
+        let view = EyeView {
+            eye_to_clip: perspective(1.0, 1.0, 0.1, 100.0).to_cols_array_2d(),
+            ..EyeView::default()
+        };
+        Layer {
+            mask: Some(Arc::new(Mask::new([64, 64], |x, _| x < 16))),
+            ..Layer::whole(Eye::Left, view, [64, 64])
+        }
+    }
+
+    #[test]
+    fn bounds_behind_the_mask_are_not_drawn_and_those_that_reach_out_are() {
+        let may_draw = |x: f32, z: f32, half: f32| {
+            let center = Vec3::new(x, 0.0, z);
+            layer().may_draw([center - half, center + half])
+        };
+        // At 10 m the picture is 10.9 m wide, a tile 2.7 m.
+        assert!(!may_draw(3.0, -10.0, 0.5));
+        assert!(may_draw(-4.0, -10.0, 0.5));
+        assert!(may_draw(0.0, -10.0, 4.0));
+        // Around the eye.
+        assert!(may_draw(3.0, -1.0, 4.0));
+        assert!(may_draw(f32::NAN, -10.0, 0.5));
+    }
+
+    #[test]
+    fn no_bounds_with_a_point_in_a_drawn_pixel_are_left_out() {
+        let layer = layer();
+        let clip = layer.clip_from_world();
+        let mut state = 7_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0 * 20.0 - 10.0
+        };
+        let mut drawn = 0;
+        for _ in 0..5000 {
+            let (p, q) = (
+                Vec3::new(random(), random(), random()),
+                Vec3::new(random(), random(), random()),
+            );
+            let c = clip * p.extend(1.0);
+            if c.w > 0.1 && c.x.abs() <= c.w && c.y.abs() <= c.w && (c.x / c.w + 1.0) * 32.0 < 16.0
+            {
+                drawn += 1;
+                assert!(layer.may_draw([p.min(q), p.max(q)]), "{p} {q}");
+                assert!(layer.may_draw([p, p]), "{p}");
+            }
+        }
+        assert!(drawn > 50, "{drawn}");
+    }
 }

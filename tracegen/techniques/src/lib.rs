@@ -2,16 +2,24 @@
 //!
 //! Knows displays and angles, and neither drivers nor scenes: a driver renders the [`layer::Layer`]s.
 
+mod eye;
 pub mod far_field;
+mod foveation;
 pub mod gaze;
+mod hidden_area;
 pub mod layer;
 pub mod least_work;
 pub mod mask;
+mod patch;
 pub mod plan;
+pub mod planner;
 pub mod settings;
+pub mod skips;
 
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};
 pub use mask::Mask;
 pub use plan::FramePlan;
+pub use planner::Planner;
 pub use settings::{Settings, SettingsError};
+pub use skips::Skips;

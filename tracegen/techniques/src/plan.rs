@@ -1,8 +1,7 @@
 //! A frame as layers, and how the eyes' pictures come of them.
 
+use crate::Mask;
 use crate::layer::{Layer, Predicted};
-use crate::{Mask, Settings};
-use formats::view::{Eye, FrameViews, Hmd};
 use std::sync::Arc;
 
 /// How one frame is rendered.
@@ -21,8 +20,13 @@ pub struct FramePlan {
 pub enum Picture {
     /// It is a layer, by its position in the plan.
     Layer(usize),
-    /// Parts of layers, each drawn over the ones before.
-    Composed(Vec<Part>),
+    /// Parts of layers, each drawn over the ones before, on black.
+    Composed {
+        /// Width and height of the picture.
+        size_px: [u32; 2],
+        /// The parts.
+        parts: Vec<Part>,
+    },
 }
 
 /// A part of a picture that a layer fills.
@@ -30,10 +34,11 @@ pub enum Picture {
 pub struct Part {
     /// Position of the layer in the plan.
     pub layer: usize,
-    /// Left and top edge, in pixels of the picture, of the rectangle that the whole layer covers.
+    /// Left and top edge of the layer, in pixels of the picture.
     pub origin_px: [u32; 2],
-    /// Width and height of that rectangle; it may reach beyond the picture's right and lower edge.
-    pub covers_px: [u32; 2],
+    /// Columns and rows of the picture that a pixel of the layer covers. The layer may reach beyond
+    /// the picture's right and lower edge.
+    pub coarseness: [u32; 2],
     /// Tiles of the picture (16x16 pixels, a bit each) that the part fills; all where there is none.
     pub tiles: Option<Arc<Mask>>,
     /// How its pixels come of the layer's.
@@ -41,29 +46,21 @@ pub struct Part {
 }
 
 /// How a picture's pixels come of a layer's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Filter {
     /// The layer has the picture's pixels: they are copied.
     Copy,
     /// Linear between the four nearest pixels of the layer, in linear light.
     Bilinear,
+    /// The layer's mask leaves out 2x2 quads: their pixels are the mean of the linear interpolations
+    /// along row and column between the nearest pixels that are there, in linear light. The others are copied.
+    FillQuads,
 }
 
 impl FramePlan {
-    /// Plans a frame of the eyes asked for; `settings` have been checked.
+    /// Whether a layer is the picture of an eye as it is.
     #[must_use]
-    pub fn new(_settings: &Settings, hmd: &Hmd, eyes: &[Eye], views: &FrameViews) -> Self {
-        let whole = |eye: &Eye| Layer::whole(*eye, views.eyes[*eye as usize], hmd.eye_size_px);
-        Self {
-            layers: eyes.iter().map(whole).collect(),
-            pictures: (0..eyes.len()).map(Picture::Layer).collect(),
-            predicted: Predicted::default(),
-        }
-    }
-
-    /// Every layer is the picture of an eye: nothing has to be composed.
-    #[must_use]
-    pub fn is_direct(&self) -> bool {
-        (self.pictures.iter()).all(|picture| matches!(picture, Picture::Layer(_)))
+    pub fn is_picture(&self, layer: usize) -> bool {
+        self.pictures.contains(&Picture::Layer(layer))
     }
 }

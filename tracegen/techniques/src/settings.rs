@@ -1,6 +1,6 @@
 //! What a capture leaves out or does more coarsely.
 
-use crate::Gaze;
+use crate::gaze::{self, Gaze};
 use formats::view::Hmd;
 use serde::{Deserialize, Serialize};
 use visibility::Culling;
@@ -127,6 +127,13 @@ impl Settings {
         }
         if let Some(far_field) = &self.far_field {
             far_field.check()?;
+            if self.foveation.is_some() {
+                return Err(SettingsError {
+                    what: "foveation with a far field",
+                    expected: "one of both".into(),
+                    found: "both".into(),
+                });
+            }
         }
         Ok(())
     }
@@ -176,11 +183,11 @@ impl Foveation {
 fn in_view(hmd: &Hmd, deg: [f32; 2]) -> bool {
     let sees = |eye: usize| {
         let fov = &hmd.fov[eye];
-        crate::gaze::tangents(hmd, eye, deg).is_some_and(|[x, y]| {
-            (-fov.left..=fov.right).contains(&x) && (-fov.down..=fov.up).contains(&y)
-        })
+        let seen = gaze::direction(hmd, eye, deg);
+        let [x, y] = [seen.x / -seen.z, seen.y / -seen.z];
+        seen.z < 0.0 && (-fov.left..=fov.right).contains(&x) && (-fov.down..=fov.up).contains(&y)
     };
-    sees(0) || sees(1)
+    gaze::is_ahead(deg) && (sees(0) || sees(1))
 }
 
 /// The widest angles of both eyes, for messages.

@@ -24,8 +24,21 @@ pub fn level_count([width, height]: [u32; 2]) -> u32 {
     width.max(height).ilog2() + 1
 }
 
-/// Bytes of all levels of a compressed texture; `None` for a format that is not made here.
-pub fn chain_bytes(texture: &Texture) -> Option<usize> {
+/// The finest level that has to be there where no finer one than `wanted` is sampled. A texture of the
+/// coarser levels alone must be sampled as the whole one is: its base must be whole blocks, and each
+/// level exactly half of the one before.
+pub fn first_level(size: [u32; 2], wanted: u32) -> u32 {
+    if size.iter().all(|extent| extent.is_power_of_two()) {
+        let halvings = (size[0].min(size[1]) / BLOCK).max(1).ilog2();
+        wanted.min(halvings)
+    } else {
+        0
+    }
+}
+
+/// Bytes of a compressed texture's levels from `first_level` on; `None` for a format that is not made
+/// here.
+pub fn chain_bytes(texture: &Texture, first_level: u32) -> Option<usize> {
     let format = match texture.format {
         TexelFormat::Bc1 => Format::Bc1,
         TexelFormat::Bc3 => Format::Bc3,
@@ -35,16 +48,17 @@ pub fn chain_bytes(texture: &Texture) -> Option<usize> {
         let [width, height] = texture.level_size(level).map(|e| e as usize);
         format.compressed_size(width, height)
     };
-    Some((0..texture.levels).map(bytes).sum())
+    Some((first_level..texture.levels).map(bytes).sum())
 }
 
-/// Compresses RGBA8 texels of the given size; the blocks of all levels follow each other, largest
-/// level first.
+/// Compresses RGBA8 texels of the given size; the blocks of the levels from `first_level` on follow
+/// each other, largest level first.
 pub fn compress(
     rgba: &[u8],
     size: [u32; 2],
     color_space: ColorSpace,
     role: Role,
+    first_level: u32,
 ) -> (TexelFormat, Vec<u8>) {
     let kind = mipmap::Kind {
         srgb: color_space == ColorSpace::Srgb,
@@ -73,7 +87,11 @@ pub fn compress(
         _ => 1.0,
     };
     let mut blocks = Vec::new();
-    let mut texels = base.to_vec();
+    let mut texels = if first_level == 0 {
+        base.to_vec()
+    } else {
+        Vec::new()
+    };
     let mut level: Option<Level> = None;
     for index in 0..level_count(base_size) {
         if index > 0 {
@@ -83,8 +101,13 @@ pub fn compress(
                 None => Level::half_of(&base, base_size, kind, weigh_by_alpha),
                 Some(level) => level.half(kind),
             };
-            texels = next.encode(kind);
+            if index >= first_level {
+                texels = next.encode(kind);
+            }
             level = Some(next);
+        }
+        if index < first_level {
+            continue;
         }
         match alpha {
             Alpha::Ignored => mipmap::make_opaque(&mut texels),

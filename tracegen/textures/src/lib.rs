@@ -33,8 +33,10 @@ use scene::{Image, MAX_IMAGE_SIZE, Scene, SceneError};
 pub struct CompressedTexture {
     /// Its entry in the trace's texture table.
     pub texture: Texture,
-    /// Blocks of all levels, largest level first, each row by row from the top. Empty for a
-    /// texture that no view sees.
+    /// Finest level that there are blocks of: finer ones are never sampled.
+    pub first_level: u32,
+    /// Blocks of the levels from there on, largest level first, each row by row from the top. Empty
+    /// for a texture that no view sees.
     pub blocks: Vec<u8>,
 }
 
@@ -75,17 +77,18 @@ impl TextureSet {
     /// # Errors
     /// As [`Self::prepare`].
     pub fn compress(scene: &Scene) -> Result<Self, TextureError> {
-        Self::prepare(scene, |_| true, None)
+        Self::prepare(scene, |_| Some(0), None)
     }
 
-    /// Makes the textures of all images that the scene samples, on all cores. Blocks are made for
-    /// the images that are `seen`, and taken from the cache where it has them.
+    /// Makes the textures of all images that the scene samples, on all cores. `finest` tells of an
+    /// image that is seen the finest level that may be sampled; blocks of that and of coarser ones are
+    /// made, and taken from the cache where it has them.
     ///
     /// # Errors
     /// An image that cannot be read or decoded, of no size or of more than 16384 texels an edge.
     pub fn prepare(
         scene: &Scene,
-        seen: impl Fn(usize) -> bool + Sync,
+        finest: impl Fn(usize) -> Option<u32> + Sync,
         cache: Option<&Cache>,
     ) -> Result<Self, TextureError> {
         let roles = role::of_images(scene);
@@ -100,7 +103,7 @@ impl TextureSet {
                         index,
                         image: &scene.images[index],
                         role,
-                        seen: seen(index),
+                        finest: finest(index),
                     })
                 });
                 prepare_source(members.collect(), cache)
@@ -129,6 +132,24 @@ impl TextureSet {
         self.textures.iter().map(|t| t.blocks.len()).sum()
     }
 
+    /// Bytes that the levels would have that are never sampled, those of textures that no view sees
+    /// among them.
+    #[must_use]
+    pub fn skipped_bytes(&self) -> usize {
+        let whole = |t: &CompressedTexture| compress::chain_bytes(&t.texture, 0).unwrap_or(0);
+        self.textures
+            .iter()
+            .map(|t| whole(t) - t.blocks.len())
+            .sum()
+    }
+
+    /// Textures whose finest levels are never sampled.
+    #[must_use]
+    pub fn shortened(&self) -> usize {
+        let shortened = |t: &&CompressedTexture| t.first_level > 0 && !t.blocks.is_empty();
+        self.textures.iter().filter(shortened).count()
+    }
+
     /// Textures that no view sees.
     #[must_use]
     pub fn unseen(&self) -> usize {
@@ -142,7 +163,7 @@ struct Member<'a> {
     index: usize,
     image: &'a Image,
     role: Role,
-    seen: bool,
+    finest: Option<u32>,
 }
 
 /// What became of it.
@@ -153,6 +174,12 @@ struct Made {
 }
 
 impl Member<'_> {
+    /// Finest level to make.
+    fn first_level(&self) -> u32 {
+        let size = compress::whole_blocks(self.image.size);
+        compress::first_level(size, self.finest.unwrap_or(0))
+    }
+
     fn made(&self, format: TexelFormat, blocks: Vec<u8>, cached: bool) -> Made {
         let size = compress::whole_blocks(self.image.size);
         let texture = Texture {
@@ -165,17 +192,33 @@ impl Member<'_> {
         };
         Made {
             index: self.index,
-            texture: CompressedTexture { texture, blocks },
+            texture: CompressedTexture {
+                texture,
+                first_level: self.first_level(),
+                blocks,
+            },
             cached,
         }
     }
 
-    /// The cached texture of this key, if it is one of this image's size.
-    fn cached(&self, cache: &Cache, key: cache::Key) -> Option<Made> {
-        let (format, blocks) = cache.load(key)?;
-        let made = self.made(format, blocks, true);
-        let expected = compress::chain_bytes(&made.texture.texture)?;
-        (made.texture.blocks.len() == expected).then_some(made)
+    /// The cached texture, whole or without the levels that are not needed, if it is one of this
+    /// image's size.
+    fn cached(&self, cache: &Cache, source: &KeyHasher) -> Option<Made> {
+        let first_level = self.first_level();
+        let of = |kept: u32| {
+            let (format, mut blocks) = cache.load(self.key(source, kept))?;
+            let unneeded = self.bytes(format, kept)? - self.bytes(format, first_level)?;
+            let whole = blocks.len() == self.bytes(format, kept)?;
+            blocks.drain(..unneeded.min(blocks.len()));
+            whole.then(|| self.made(format, blocks, true))
+        };
+        of(0).or_else(|| (first_level > 0).then(|| of(first_level))?)
+    }
+
+    /// Bytes of the levels from one on.
+    fn bytes(&self, format: TexelFormat, first_level: u32) -> Option<usize> {
+        let made = self.made(format, Vec::new(), false);
+        compress::chain_bytes(&made.texture.texture, first_level)
     }
 
     fn check_size(&self) -> Result<(), TextureError> {
@@ -212,8 +255,8 @@ impl Member<'_> {
         }
     }
 
-    /// The key of the texture, from that of its source.
-    fn key(&self, source: &KeyHasher) -> cache::Key {
+    /// The key of the texture with its levels from `first_level` on, from the key of its source.
+    fn key(&self, source: &KeyHasher, first_level: u32) -> cache::Key {
         let mut hasher = source.clone();
         let [width, height] = self.image.size;
         hasher.add(&(self.image.part as u64).to_le_bytes());
@@ -228,6 +271,9 @@ impl Member<'_> {
             Alpha::Mask(cutoff) => [1, cutoff],
             Alpha::Smooth => [2, 0],
         });
+        if first_level > 0 {
+            hasher.add(&first_level.to_le_bytes());
+        }
         hasher.finish()
     }
 }
@@ -242,7 +288,7 @@ fn prepare_source(
     for member in members {
         member.check_size()?;
         // Only the texels tell whether smooth alpha is smooth, and so the format in the table.
-        if member.seen || member.role.alpha == Alpha::Smooth {
+        if member.finest.is_some() || member.role.alpha == Alpha::Smooth {
             wanted.push(member);
         } else {
             made.push(member.made(TexelFormat::Bc1, Vec::new(), false));
@@ -258,7 +304,7 @@ fn prepare_source(
         (cache, hasher)
     });
     if let Some((cache, hasher)) = &source_key {
-        wanted.retain(|member| match member.cached(cache, member.key(hasher)) {
+        wanted.retain(|member| match member.cached(cache, hasher) {
             Some(hit) => {
                 made.push(hit);
                 false
@@ -275,10 +321,11 @@ fn prepare_source(
         let Image {
             size, color_space, ..
         } = *member.image;
-        let (format, blocks) = compress::compress(&rgba, size, color_space, member.role);
+        let (format, blocks) =
+            compress::compress(&rgba, size, color_space, member.role, member.first_level());
         drop(rgba);
         if let Some((cache, hasher)) = &source_key {
-            cache.store(member.key(hasher), format, &blocks);
+            cache.store(member.key(hasher, member.first_level()), format, &blocks);
         }
         made.push(member.made(format, blocks, false));
     }

@@ -181,7 +181,7 @@ fn a_cached_texture_is_the_one_that_compressing_gives() {
     for alpha in [AlphaMode::Opaque, AlphaMode::Mask(0.3), AlphaMode::Blend] {
         let scene = scene_of([30, 16], picture([30, 16]), alpha);
         let fresh = TextureSet::compress(&scene).unwrap();
-        let prepare = || TextureSet::prepare(&scene, |_| true, Some(&cache)).unwrap();
+        let prepare = || TextureSet::prepare(&scene, |_| Some(0), Some(&cache)).unwrap();
         assert_eq!(prepare(), fresh);
         let hit = prepare();
         assert_eq!(hit.cached, 1);
@@ -191,11 +191,50 @@ fn a_cached_texture_is_the_one_that_compressing_gives() {
 }
 
 #[test]
+fn levels_finer_than_what_is_sampled_are_left_out_and_the_others_stay_the_same() {
+    for (size, wanted, first) in [
+        ([64, 32], 0, 0),
+        ([64, 32], 2, 2),
+        ([64, 32], 9, 3),
+        ([30, 16], 2, 2),
+        ([24, 16], 1, 0),
+    ] {
+        for alpha in [AlphaMode::Opaque, AlphaMode::Mask(0.3), AlphaMode::Blend] {
+            let scene = scene_of(size, picture(size), alpha);
+            let folder = tempfile::tempdir().unwrap();
+            let cache = Cache::new(folder.path().to_owned(), 1 << 30);
+            let whole = TextureSet::compress(&scene).unwrap().textures.remove(0);
+            let shorter = |cache| {
+                let set = TextureSet::prepare(&scene, |_| Some(wanted), cache).unwrap();
+                assert_eq!(set.skipped_bytes(), whole.blocks.len() - set.bytes());
+                assert_eq!(set.shortened(), usize::from(first > 0));
+                (set.textures[0].clone(), set.cached)
+            };
+            let (texture, _) = shorter(None);
+            assert_eq!(
+                (texture.first_level, &texture.texture),
+                (first, &whole.texture)
+            );
+            let [width, height] = texture.texture.level_size(first);
+            assert!(whole.blocks.ends_with(&texture.blocks));
+            assert_eq!(first > 0, texture.blocks.len() < whole.blocks.len());
+            assert!(first == 0 || (width % 4, height % 4) == (0, 0));
+            // Kept under a key of its own, and taken from a whole texture where that is kept.
+            assert_eq!(shorter(Some(&cache)), (texture.clone(), 0));
+            assert_eq!(shorter(Some(&cache)), (texture.clone(), 1));
+            let full = TextureSet::prepare(&scene, |_| Some(0), Some(&cache)).unwrap();
+            assert_eq!(full.cached, usize::from(first == 0));
+            assert_eq!(shorter(Some(&cache)), (texture, 1));
+        }
+    }
+}
+
+#[test]
 fn a_damaged_cache_is_made_anew() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path().to_owned(), 1 << 30);
     let scene = scene_of([16, 16], picture([16, 16]), AlphaMode::Opaque);
-    let prepare = || TextureSet::prepare(&scene, |_| true, Some(&cache)).unwrap();
+    let prepare = || TextureSet::prepare(&scene, |_| Some(0), Some(&cache)).unwrap();
     let fresh = prepare();
     let file = folder.path().read_dir().unwrap().next().unwrap().unwrap();
     let whole = std::fs::read(file.path()).unwrap();
@@ -226,7 +265,7 @@ fn whatever_decides_the_blocks_decides_the_key() {
     normals.materials[0].normal_texture = Some(TextureRef::new(0));
     scenes.extend([linear, normals]);
     for scene in &scenes {
-        let set = TextureSet::prepare(scene, |_| true, Some(&cache)).unwrap();
+        let set = TextureSet::prepare(scene, |_| Some(0), Some(&cache)).unwrap();
         assert_eq!(set.cached, 0);
     }
     assert_eq!(folder.path().read_dir().unwrap().count(), scenes.len());
@@ -249,7 +288,7 @@ fn what_no_view_sees_keeps_its_table_entry_and_is_not_read() {
         if alpha != AlphaMode::Blend {
             scene.images[0].source = std::sync::Arc::new(Unreadable);
         }
-        let unseen = TextureSet::prepare(&scene, |_| false, None).unwrap();
+        let unseen = TextureSet::prepare(&scene, |_| None, None).unwrap();
         assert_eq!(unseen.textures[0].texture, seen.textures[0].texture);
         assert_eq!(
             (&unseen.of_image, &unseen.notes),
@@ -272,7 +311,7 @@ fn the_encoder_named_in_keys_makes_these_bytes() {
         for alpha in [Alpha::Ignored, Alpha::Mask(77), Alpha::Smooth] {
             for (size, normal_map) in [([64, 32], false), ([64, 32], true), ([30, 17], false)] {
                 let role = Role { alpha, normal_map };
-                let (_, blocks) = compress(&picture(size), size, color_space, role);
+                let (_, blocks) = compress(&picture(size), size, color_space, role, 0);
                 hasher.add(&blocks);
             }
         }

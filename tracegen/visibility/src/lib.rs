@@ -1,7 +1,28 @@
 //! Which draw enters which view or shadow cascade. One technique a file.
+//!
+//! ```text
+//! bounds -> Hierarchy (kept, refitted)
+//!                |
+//! Rig -> Culling -> volumes -> walk -> list of draws, tests
+//!                                            |
+//!     depth of what was visible -> Pyramid -> Occlusion -> shorter list
+//! ```
 
 pub mod culling;
+mod draw_set;
 pub mod frustum;
+pub mod hierarchy;
+pub mod magnification;
+pub mod occlusion;
+pub mod receivers;
+pub mod rig;
+#[cfg(test)]
+mod testing;
 pub mod triangles;
+mod volume;
 
 pub use culling::Culling;
+pub use hierarchy::{Hierarchy, Scratch};
+pub use occlusion::{Occlusion, Pyramid};
+pub use rig::{Eye, Rig, TooWide};
+pub use volume::Volume;

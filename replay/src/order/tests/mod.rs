@@ -15,6 +15,7 @@ fn pass(kind: PassKind, frame: u32, eye: Option<Eye>, tiles: [u32; 2]) -> Pass {
         frame,
         kind,
         eye,
+        layer: 0,
         size_px: tiles.map(|t| t * 16),
         tiles,
     }
@@ -35,7 +36,13 @@ proptest! {
     fn every_order_is_a_permutation_of_the_tiles_of_all_passes(
         columns in 1_u32..40, rows in 1_u32..40, other in 1_u32..40, shadow in 1_u32..20,
     ) {
+        let layer = |layer, eye, tiles| Pass { layer, ..pass(PassKind::Layer, 1, eye, tiles) };
         let passes = [
+            layer(3, Some(Eye::Left), [columns, rows]),
+            layer(3, Some(Eye::Right), [columns, rows]),
+            layer(0, None, [other, rows]),
+            layer(1, Some(Eye::Right), [other, 1]),
+            layer(1, Some(Eye::Left), [other, 2]),
             pass(PassKind::Shadow, 0, None, [shadow, shadow]),
             pass(PassKind::Main, 0, Some(Eye::Left), [columns, rows]),
             pass(PassKind::Main, 0, Some(Eye::Right), [other, rows]),
@@ -121,6 +128,36 @@ fn single_view_orders_finish_the_left_view_first() {
             order.name()
         );
     }
+}
+
+#[test]
+fn left_and_right_layers_of_a_number_and_size_pair_and_others_run_alone() {
+    let layer = |layer, eye, tiles| Pass {
+        layer,
+        ..pass(PassKind::Layer, 0, eye, tiles)
+    };
+    let (left, right) = (Some(Eye::Left), Some(Eye::Right));
+    let passes = [
+        layer(0, left, [1, 1]),
+        layer(1, left, [1, 1]),
+        layer(1, right, [1, 1]),
+        layer(0, right, [1, 1]),
+        layer(0, None, [1, 1]),
+        layer(2, left, [1, 1]),
+        layer(2, right, [1, 2]),
+        pass(PassKind::Shadow, 0, None, [1, 1]),
+    ];
+    let tile = |pass, tile| TileRef { pass, tile };
+    let pair = |left, right| WorkItem::Pair(tile(left, 0), tile(right, 0), Interleave::Alternate);
+    let expected = [
+        vec![WorkItem::Tile(tile(7, 0))],
+        vec![pair(0, 3)],
+        vec![pair(1, 2)],
+        vec![WorkItem::Tile(tile(4, 0))],
+        vec![WorkItem::Tile(tile(5, 0))],
+        vec![WorkItem::Tile(tile(6, 0)), WorkItem::Tile(tile(6, 1))],
+    ];
+    assert_eq!(plan(&*Order::Z2_STA.build(0), &passes), expected);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::report::columns::{Column, Records, Row, Value};
 use crate::report::figures::{Figure, number};
 use crate::report::table::Table;
 use crate::result::{Part, TOOL, TileMap, TraceId};
-use formats::textrace::{PassKind, TraceMeta};
+use formats::textrace::TraceMeta;
 use serde::Serialize;
 
 /// Schema of the object that `replay paper --json` prints.
@@ -313,7 +313,7 @@ fn info(subject: &Subject, row: Option<&ResultRow>) -> TraceInfo {
     let tables = subject.source.tables();
     let first_frame = tables.passes.iter().map(|p| p.frame).min().unwrap_or(0);
     let passes = tables.passes.iter().enumerate();
-    let main = passes.filter(|(_, p)| p.kind == PassKind::Main);
+    let seen = passes.filter(|(_, p)| p.is_seen());
     let result = row.map(|r| r.result);
     TraceInfo {
         label: subject.label.clone(),
@@ -324,8 +324,8 @@ fn info(subject: &Subject, row: Option<&ResultRow>) -> TraceInfo {
         lanes: result.map_or(0, |r| r.lanes),
         footprints: result.map_or(0, |r| r.footprints),
         textures: tables.textures.len(),
-        tiles: main.clone().next().map_or([0, 0], |(_, p)| p.tiles),
-        eye_passes: main
+        tiles: seen.clone().next().map_or([0, 0], |(_, p)| p.tiles),
+        eye_passes: seen
             .filter(|(_, p)| p.frame == first_frame)
             .map(|(i, _)| i as u32)
             .collect(),

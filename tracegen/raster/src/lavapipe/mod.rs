@@ -1,13 +1,15 @@
 //! Capture through lavapipe, Mesa's Vulkan driver on llvmpipe.
 
+mod compose;
 mod counter;
 pub mod device;
 mod pipelines;
 mod records;
 mod targets;
 mod upload;
+mod visible;
 
-use super::backend::{CaptureBackend, View, Work};
+use super::backend::{CaptureBackend, Marks, View, Work};
 use super::batches::{Batch, batches};
 use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
@@ -15,13 +17,16 @@ use super::frame::Frame;
 use super::roles::{MaterialState, PipelineKey, Purpose, roles};
 use super::shader::VIEW_BINDINGS;
 use super::uniforms::ViewData;
+use compose::Composer;
 use device::Gpu;
+use formats::view::Lens;
 use pipelines::Pipelines;
 use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
 use records::RecordBuffers;
 use scene::Scene;
+use std::sync::Arc;
 use std::time::Instant;
-use targets::{ColorTarget, LayerTarget, Readback, ShadowMaps};
+use targets::{ColorTarget, LayerMask, LayerTarget, Readback, ShadowMaps};
 use techniques::plan::Picture;
 use textures::TextureSet;
 use upload::SceneBuffers;
@@ -35,8 +40,10 @@ pub struct Lavapipe {
     buffers: RecordBuffers,
     /// What each layer is rendered into, by its position in the frame's plan.
     layers: Vec<Option<LayerTarget>>,
-    /// What each picture that is not a layer is composed into.
-    composed: Vec<ColorTarget>,
+    /// What each picture that is not a layer is composed into, by its number in the plan.
+    composed: Vec<Option<ColorTarget>>,
+    /// Made when a plan first needs it.
+    composer: Option<Composer>,
     readback: Readback,
     shadow_maps: ShadowMaps,
     /// Group 0 for the eyes.
@@ -95,6 +102,7 @@ impl Lavapipe {
             &pipelines,
             &buffers,
             &record_buffers,
+            &record_buffers.records,
             &record_buffers.view_uniform,
             &shadow_maps.sampled,
         );
@@ -112,6 +120,7 @@ impl Lavapipe {
             buffers: record_buffers,
             layers: Vec::new(),
             composed: Vec::new(),
+            composer: None,
             readback: Readback::default(),
             shadow_maps,
             eye_bindings,
@@ -134,10 +143,33 @@ impl Lavapipe {
             self.layers.resize_with(view.target + 1, || None);
         }
         let target = &mut self.layers[view.target];
-        if (target.as_ref()).is_none_or(|target| target.color.size_px != size_px) {
-            *target = Some(LayerTarget::new(gpu, size_px)?);
+        target.take_if(|target| target.color.size_px != size_px);
+        let target = match target {
+            Some(target) => target,
+            None => target.insert(LayerTarget::new(gpu, size_px)?),
+        };
+        let wanted = view.layer.mask.as_ref();
+        let found = target.mask.as_ref().map(|mask| &mask.mask);
+        if wanted.map(Arc::as_ptr) == found.map(Arc::as_ptr) {
+            return Ok(());
         }
-        Ok(())
+        target.mask = match wanted {
+            None => None,
+            Some(mask) => {
+                self.work.bytes_uploaded += mask.flags().len() as u64;
+                let composer = match &mut self.composer {
+                    Some(composer) => composer,
+                    None => self.composer.insert(Composer::new(gpu)?),
+                };
+                Some(LayerMask {
+                    bindings: composer.bind_mask(gpu, mask),
+                    bounds: (mask.bounds_px())
+                        .map(|[origin_px, size_px]| Region { origin_px, size_px }),
+                    mask: Arc::clone(mask),
+                })
+            }
+        };
+        target.clear(gpu)
     }
 
     /// Batches a list of draws and makes the pipelines that they need and that are not there yet.
@@ -232,6 +264,10 @@ impl CaptureBackend for Lavapipe {
         }
     }
 
+    fn pose(&mut self, draws: &DrawList) {
+        self.work.bytes_uploaded += self.scene.pose(&self.gpu, draws);
+    }
+
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError> {
         let lighting = &frame.lighting;
         if lighting.cascades.is_empty() {
@@ -241,6 +277,9 @@ impl CaptureBackend for Lavapipe {
         let stand_in = ShadowMaps::new(&self.gpu, 0);
         for (number, (cascade, visible)) in lighting.cascades.iter().zip(&frame.casters).enumerate()
         {
+            if !frame.cascades_seen[number] {
+                continue;
+            }
             let plan = self.plan(draws, visible, Purpose::Shadow)?;
             self.work.shadow_maps += 1;
             let uniform = self
@@ -256,6 +295,7 @@ impl CaptureBackend for Lavapipe {
                 &self.pipelines,
                 &self.scene,
                 &self.buffers,
+                &self.buffers.records,
                 &uniform,
                 &stand_in.sampled,
             );
@@ -300,8 +340,12 @@ impl CaptureBackend for Lavapipe {
             });
         }
         let start = Instant::now();
-        let plan = self.plan(draws, view.visible, purpose)?;
         self.prepare_target(view)?;
+        // Tiles in which nothing may be drawn are not rasterised.
+        let Some(region) = self.target(view.target)?.open_part(region) else {
+            return Ok(Captured::Complete);
+        };
+        let plan = self.plan(draws, view.visible, purpose)?;
         self.work.regions += 1;
         self.work.bytes_uploaded += size_of::<ViewData>() as u64 + 4;
         let gpu = &self.gpu;
@@ -346,6 +390,12 @@ impl CaptureBackend for Lavapipe {
             }
             pass.set_pipeline(&self.pipelines.background);
             pass.draw(0..3, 0..1);
+            if let (Some(mask), Some(composer)) = (&target.mask, &self.composer) {
+                pass.set_pipeline(&composer.mask);
+                pass.set_bind_group(0, &mask.bindings, &[]);
+                pass.draw(0..3, 0..1);
+                pass.set_bind_group(0, &self.eye_bindings, &[]);
+            }
             let changes = self.issue(&mut pass, draws, &plan);
             drop(pass);
             gpu.queue.submit([encoder.finish()]);
@@ -385,15 +435,61 @@ impl CaptureBackend for Lavapipe {
         Ok(Captured::Complete)
     }
 
+    fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError> {
+        self.read_depth(draws, view)
+    }
+
+    fn marks(
+        &mut self,
+        draws: &DrawList,
+        view: &View<'_>,
+        lens: &Lens,
+    ) -> Result<Vec<Marks>, RasterError> {
+        self.read_marks(draws, view, lens)
+    }
+
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
-        let _ = frame;
+        let start = Instant::now();
+        let mut composes = false;
+        for (number, picture) in frame.plan.pictures.iter().enumerate() {
+            let Picture::Composed { size_px, parts } = picture else {
+                continue;
+            };
+            composes = true;
+            if self.composed.len() <= number {
+                self.composed.resize_with(number + 1, || None);
+            }
+            let gpu = &self.gpu;
+            let target = &mut self.composed[number];
+            target.take_if(|target| target.size_px != *size_px);
+            if target.is_none() {
+                targets::check_size(gpu, *size_px)?;
+                *target = Some(ColorTarget::new(gpu, *size_px)?);
+            }
+            if self.composer.is_none() {
+                self.composer = Some(Composer::new(gpu)?);
+            }
+            let layers = (parts.iter())
+                .map(|part| Ok((part, self.target(part.layer)?)))
+                .collect::<Result<Vec<_>, RasterError>>()?;
+            if let (Some(composer), Some(target)) = (&self.composer, &self.composed[number]) {
+                composer.compose(gpu, target, &layers)?;
+            }
+        }
+        if composes {
+            self.gpu.wait("composing the pictures")?;
+            self.work.composing += start.elapsed();
+        }
         Ok(())
     }
 
     fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {
         let picture = match frame.plan.pictures[number] {
             Picture::Layer(layer) => &self.target(layer)?.color,
-            Picture::Composed(_) => &self.composed[number],
+            Picture::Composed { .. } => (self.composed.get(number).and_then(Option::as_ref))
+                .ok_or_else(|| {
+                    RasterError::Scene(format!("picture {number} has not been composed"))
+                })?,
         };
         picture.read(&self.gpu, &self.readback)
     }
@@ -411,6 +507,7 @@ fn bind_view(
     pipelines: &Pipelines,
     scene: &SceneBuffers,
     buffers: &RecordBuffers,
+    records: &wgpu::Buffer,
     uniform: &wgpu::Buffer,
     shadow_map: &wgpu::TextureView,
 ) -> wgpu::BindGroup {
@@ -424,7 +521,7 @@ fn bind_view(
         uniform.as_entire_binding(),
         scene.instances.as_entire_binding(),
         buffers.counter.as_entire_binding(),
-        buffers.records.as_entire_binding(),
+        records.as_entire_binding(),
         wgpu::BindingResource::TextureView(shadow_map),
         wgpu::BindingResource::Sampler(&sampler),
         buffers.depths.as_entire_binding(),

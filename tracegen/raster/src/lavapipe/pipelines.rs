@@ -148,13 +148,15 @@ impl Pipelines {
                 attributes: &color,
             }));
         }
-        let shadow = key.role.casts();
+        let (shadow, colorless) = (key.role.casts(), key.role.colorless());
         let entry_point = match key.role {
             Role::Opaque | Role::Blended => Some("fragment_early"),
             Role::Masked => Some("fragment_masked"),
             Role::MaskedRecord => Some("fragment_masked_record"),
-            Role::Shadow => None,
-            Role::ShadowMasked => Some("fragment_shadow"),
+            Role::Shadow | Role::Depth => None,
+            Role::ShadowMasked | Role::DepthMasked => Some("fragment_shadow"),
+            Role::Mark => Some("fragment_mark"),
+            Role::MarkMasked => Some("fragment_mark_masked"),
             Role::Count | Role::CountBlended => Some("fragment_count"),
         };
         let (format, blend) = match key.role {
@@ -197,7 +199,11 @@ impl Pipelines {
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: DEPTH_FORMAT,
                     depth_write_enabled: Some(!key.role.keeps_depth()),
-                    depth_compare: Some(wgpu::CompareFunction::Less),
+                    depth_compare: Some(if key.role.marks() {
+                        wgpu::CompareFunction::LessEqual
+                    } else {
+                        wgpu::CompareFunction::Less
+                    }),
                     stencil: wgpu::StencilState::default(),
                     bias: if shadow {
                         wgpu::DepthBiasState {
@@ -214,7 +220,7 @@ impl Pipelines {
                     module: &self.module,
                     entry_point: Some(entry_point),
                     compilation_options,
-                    targets: if shadow { &[] } else { &color },
+                    targets: if colorless { &[] } else { &color },
                 }),
                 multiview_mask: None,
                 cache: None,

@@ -4,7 +4,10 @@ use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
 use crate::draws::SHADOW_SIZE;
 use crate::error::RasterError;
+use record::Region;
 use std::cell::RefCell;
+use std::sync::Arc;
+use techniques::Mask;
 
 /// Colour that is rendered into, sampled and read back.
 pub struct ColorTarget {
@@ -22,6 +25,18 @@ pub struct LayerTarget {
     pub color: ColorTarget,
     /// View of its depth buffer.
     pub depth_view: wgpu::TextureView,
+    /// Pixels that may be drawn.
+    pub mask: Option<LayerMask>,
+}
+
+/// A layer's mask in the driver's memory.
+pub struct LayerMask {
+    /// What was uploaded.
+    pub mask: Arc<Mask>,
+    /// It, bound for the shader of the layers.
+    pub bindings: wgpu::BindGroup,
+    /// Tiles with pixels that may be drawn, if there are any.
+    pub bounds: Option<Region>,
 }
 
 impl LayerTarget {
@@ -37,7 +52,49 @@ impl LayerTarget {
             Self {
                 color,
                 depth_view: depth.create_view(&Default::default()),
+                mask: None,
             }
+        })
+    }
+
+    /// The part of a region that may have pixels to draw.
+    #[must_use]
+    pub fn open_part(&self, region: Region) -> Option<Region> {
+        let Some(mask) = &self.mask else {
+            return Some(region);
+        };
+        let bounds = mask.bounds?;
+        let end = |r: &Region, axis: usize| r.origin_px[axis] + r.size_px[axis];
+        let origin_px = [0, 1].map(|axis| region.origin_px[axis].max(bounds.origin_px[axis]));
+        let end_px = [0, 1].map(|axis| end(&region, axis).min(end(&bounds, axis)));
+        let is_open = (0..2).all(|axis| origin_px[axis] < end_px[axis])
+            && mask.mask.any_in(origin_px, end_px);
+        is_open.then(|| Region {
+            origin_px,
+            size_px: [0, 1].map(|axis: usize| end_px[axis] - origin_px[axis]),
+        })
+    }
+
+    /// Makes the picture black, as it stays where the mask lets nothing be drawn.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn clear(&self, gpu: &Gpu) -> Result<(), RasterError> {
+        gpu.checked("clearing a layer", || {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &self.color.view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..Default::default()
+            });
+            gpu.queue.submit([encoder.finish()]);
         })
     }
 }

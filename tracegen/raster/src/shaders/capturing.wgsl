@@ -46,3 +46,20 @@ fn fragment_masked_record(
 fn fragment_count() -> @location(0) vec4<f32> {
     return vec4(1.0);
 }
+
+// Marks a draw as visible, and as visible through the lens. Whoever writes a word writes the same.
+fn mark(in: Fragment) {
+    records[2u * in.ids.x] = 1u;
+    let from_center = (in.position.xy - view.lens.xy) * view.lens.zw;
+    if dot(from_center, from_center) <= 1.0 { records[2u * in.ids.x + 1u] = 1u; }
+}
+
+@fragment @early_depth_test(force)
+fn fragment_mark(in: Fragment) {
+    mark(in);
+}
+
+@fragment @early_depth_test(force)
+fn fragment_mark_masked(in: Fragment) {
+    if base_color(in).a >= material.specular.w { mark(in); }
+}

@@ -41,6 +41,8 @@ struct View {
     points: array<PointLight, MAX_POINT_LIGHTS>,
     // x: point lights, y: records that the buffer holds.
     counts: vec4<u32>,
+    // What the lens shows: xy: centre, zw: inverse radii, pixels.
+    lens: vec4<f32>,
 }
 
 struct Instance {

@@ -1,5 +1,10 @@
 //! The table of culling techniques. Flags, settings, help and error messages come from its rows.
 
+use super::{Frame, Volumes};
+use super::{
+    conical, conical_round_robin, conical_superfrustum, none, per_eye, round_robin, superfrustum,
+};
+use crate::rig::TooWide;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::str::FromStr;
@@ -11,6 +16,7 @@ pub struct Technique {
     title: &'static str,
     help: &'static str,
     lossless: bool,
+    volumes: fn(&Frame<'_>) -> Result<Volumes, TooWide>,
 }
 
 const fn row(
@@ -18,12 +24,14 @@ const fn row(
     title: &'static str,
     lossless: bool,
     help: &'static str,
+    volumes: fn(&Frame<'_>) -> Result<Volumes, TooWide>,
 ) -> Technique {
     Technique {
         name,
         title,
         help,
         lossless,
+        volumes,
     }
 }
 
@@ -43,13 +51,13 @@ macro_rules! techniques {
 
 techniques! {
     // constant                  name                    title                              inside the lens, nothing visible is lost   help
-    NONE                 = row("none",                 "No culling",                      true,  "Every draw, in both eyes");
-    PER_EYE              = row("per-eye",              "Per-eye frustum culling",         true,  "What enters either eye's frustum: two frusta, their lists merged");
-    SUPERFRUSTUM         = row("superfrustum",         "Superfrustum culling",            true,  "What enters one frustum around both eyes'");
-    ROUND_ROBIN          = row("round-robin",          "Round-robin culling",             false, "What enters the left eye's frustum in even frames, the right eye's in odd ones");
-    CONICAL              = row("conical",              "Conical culling",                 true,  "What enters the part of either eye's frustum that its lens shows");
-    CONICAL_ROUND_ROBIN  = row("conical-round-robin",  "Conical round-robin culling",     false, "What the left eye's lens shows in even frames, the right eye's in odd ones");
-    CONICAL_SUPERFRUSTUM = row("conical-superfrustum", "Conical superfrustum culling",    true,  "What enters one cone around what both lenses show");
+    NONE                 = row("none",                 "No culling",                      true,  "Every draw, in both eyes", none::volumes);
+    PER_EYE              = row("per-eye",              "Per-eye frustum culling",         true,  "What enters either eye's frustum: two frusta, their lists merged", per_eye::volumes);
+    SUPERFRUSTUM         = row("superfrustum",         "Superfrustum culling",            true,  "What enters one frustum around both eyes'", superfrustum::volumes);
+    ROUND_ROBIN          = row("round-robin",          "Round-robin culling",             false, "What enters the left eye's frustum in even frames, the right eye's in odd ones", round_robin::volumes);
+    CONICAL              = row("conical",              "Conical culling",                 true,  "What enters the part of either eye's frustum that its lens shows", conical::volumes);
+    CONICAL_ROUND_ROBIN  = row("conical-round-robin",  "Conical round-robin culling",     false, "What the left eye's lens shows in even frames, the right eye's in odd ones", conical_round_robin::volumes);
+    CONICAL_SUPERFRUSTUM = row("conical-superfrustum", "Conical superfrustum culling",    true,  "What enters one cone around what both lenses show", conical_superfrustum::volumes);
 }
 
 /// A culling technique, by reference to its row. Written and read by its name.
@@ -84,6 +92,11 @@ impl Culling {
     #[must_use]
     pub fn help(self) -> &'static str {
         self.0.help
+    }
+
+    /// Where it looks for draws.
+    pub(super) fn volumes(self, frame: &Frame<'_>) -> Result<Volumes, TooWide> {
+        (self.0.volumes)(frame)
     }
 
     /// Whatever is visible inside the lens is kept: no false negatives.

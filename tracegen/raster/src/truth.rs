@@ -1,0 +1,128 @@
+//! What culling got wrong, by drawing everything.
+
+use super::backend::{CaptureBackend, Marks};
+use super::capture::CaptureJob;
+use super::error::RasterError;
+use super::frame::Frame;
+use std::ops::AddAssign;
+use techniques::Layer;
+
+/// Wrong guesses about the draws of an eye.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wrong {
+    /// Visible and left out.
+    pub negatives: u64,
+    /// Drawn and not visible.
+    pub positives: u64,
+}
+
+impl AddAssign for Wrong {
+    fn add_assign(&mut self, other: Self) {
+        self.negatives += other.negatives;
+        self.positives += other.positives;
+    }
+}
+
+/// What culling got wrong of an eye's picture.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Judgement {
+    /// Against everything in the picture.
+    pub picture: Wrong,
+    /// Against what the lens shows of it.
+    pub lens: Wrong,
+    /// Draws that the lens shows and that are left out, ascending.
+    pub lost: Vec<u32>,
+}
+
+impl Judgement {
+    /// Of a list of draws (ascending) against what is visible, by draw.
+    #[must_use]
+    pub fn new(listed: &[u32], visible: &[Marks]) -> Self {
+        let mut found = Self::default();
+        for (draw, marks) in (0..).zip(visible) {
+            let listed = listed.binary_search(&draw).is_ok();
+            for (wrong, seen) in [
+                (&mut found.picture, marks.picture),
+                (&mut found.lens, marks.lens),
+            ] {
+                wrong.negatives += u64::from(seen && !listed);
+                wrong.positives += u64::from(listed && !seen);
+            }
+            if marks.lens && !listed {
+                found.lost.push(draw);
+            }
+        }
+        found
+    }
+}
+
+impl CaptureJob<'_> {
+    /// Which draws each eye's picture shows in truth, in the order of the job's eyes: a draw is
+    /// visible where a fragment of it passes against the final depth of everything.
+    ///
+    /// # Errors
+    /// Driver errors, and a device that cannot capture.
+    pub fn truth(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<Vec<Vec<Marks>>, RasterError> {
+        (self.planner.eyes().iter().zip(frame.rig.eyes()))
+            .map(|(eye, seen)| {
+                let layer = Layer::whole(*eye, seen.view, seen.size_px);
+                let mut view = frame.view(0);
+                view.layer = &layer;
+                backend.marks(self.draws, &view, &seen.lens)
+            })
+            .collect()
+    }
+
+    /// What the frame's lists get wrong, in the order of the job's eyes: an eye's list is that of
+    /// all layers that its picture is made of.
+    ///
+    /// # Errors
+    /// Driver errors, and a device that cannot capture.
+    pub fn judge(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<Vec<Judgement>, RasterError> {
+        let truth = self.truth(backend, frame)?;
+        let judge = |(eye, visible): (_, &Vec<Marks>)| {
+            let of_eye = |layer: &Layer| layer.eye.is_none() || layer.eye == Some(eye);
+            let mut listed: Vec<u32> = (frame.views())
+                .filter(|view| of_eye(view.layer))
+                .flat_map(|view| view.visible.iter().copied())
+                .collect();
+            listed.sort_unstable();
+            listed.dedup();
+            Judgement::new(&listed, visible)
+        };
+        let eyes = self.planner.eyes().iter().copied();
+        Ok(eyes.zip(&truth).map(judge).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_lost_and_what_is_drawn_in_vain_are_counted_apart() {
+        let marks = |picture, lens| Marks { picture, lens };
+        let visible = [
+            marks(true, true),
+            marks(true, false),
+            marks(false, false),
+            marks(true, true),
+        ];
+        let found = Judgement::new(&[0, 2], &visible);
+        let wrong = |negatives, positives| Wrong {
+            negatives,
+            positives,
+        };
+        assert_eq!(found.picture, wrong(2, 1));
+        assert_eq!(found.lens, wrong(1, 1));
+        assert_eq!(found.lost, [3]);
+    }
+}

@@ -1,0 +1,202 @@
+//! Flags that say what a capture may leave out or do more coarsely.
+
+use anyhow::{bail, ensure};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
+use formats::view::{Hmd, Lens};
+use scene::paths::read_gazes;
+use std::path::Path;
+use std::str::FromStr;
+use techniques::Gaze;
+use techniques::Settings;
+use techniques::gaze::GazeSample;
+use techniques::settings::{Foveation, FoveationKind, Rates};
+use visibility::Culling;
+
+/// Techniques of a capture.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Techniques")]
+pub struct TechniqueArgs {
+    /// How the draws of a frame are found.
+    #[arg(long, value_name = "NAME", default_value = Culling::default().name(),
+          value_parser = culling_parser())]
+    cull: Culling,
+    /// Leave out draws that others hide: what the last frame showed is drawn for its depth first.
+    #[arg(long)]
+    occlusion: bool,
+    /// Radius of the circle that the lens shows of an eye's picture, as a tangent [default: half of
+    /// the sum of the longer axis's tangents].
+    #[arg(long, value_name = "TAN", allow_hyphen_values = true)]
+    lens_radius: Option<f32>,
+    /// Draw nothing that the lens does not show.
+    #[arg(long)]
+    hidden_area_mask: bool,
+    /// Shade more coarsely away from the gaze.
+    #[arg(long, value_enum, value_name = "HOW")]
+    foveate: Option<Foveate>,
+    /// Where the user looks: degrees right and up of straight ahead, or a CSV file with the header
+    /// time_s,x_deg,y_deg [default: 0,0].
+    #[arg(
+        long,
+        value_name = "X,Y|FILE.csv",
+        requires = "foveate",
+        allow_hyphen_values = true
+    )]
+    gaze: Option<String>,
+    /// Degrees from the gaze at which rates 1/2, 1/4, 1/8 and 1/16 begin (radial-density: every other
+    /// quad at the first), or `acuity`: where the eye cannot tell [default: 15,25,35,45].
+    #[arg(long, value_name = "A,B,C,D|acuity", requires = "foveate")]
+    rates: Option<RatesFlag>,
+}
+
+/// `--foveate`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Foveate {
+    /// A rate for each 16x16 tile: 1, 1/2, 1/4, 1/8 or 1/16 of the pixels.
+    Rings,
+    /// 3x3 viewports, the outer ones at half the resolution.
+    MultiResolution,
+    /// Every other 2x2 quad of the periphery, filled from its neighbours.
+    RadialDensity,
+}
+
+/// `--rates`.
+#[derive(Clone, Copy, Debug)]
+enum RatesFlag {
+    Edges([f32; 4]),
+    Acuity,
+}
+
+impl FromStr for RatesFlag {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "acuity" {
+            return Ok(Self::Acuity);
+        }
+        numbers(text).map(Self::Edges).ok_or_else(|| {
+            format!("expected four angles as in 15,25,35,45 or acuity, found '{text}'")
+        })
+    }
+}
+
+impl TechniqueArgs {
+    /// What is left out or done more coarsely.
+    ///
+    /// # Errors
+    /// A gaze that cannot be read, rates that nothing uses, and what [`Settings::check`] refuses.
+    pub fn settings(&self, hmd: &Hmd) -> anyhow::Result<Settings> {
+        let settings = Settings {
+            culling: self.cull,
+            occlusion: self.occlusion,
+            hidden_area_mask: self.hidden_area_mask,
+            foveation: self.foveation(hmd)?,
+            ..Settings::default()
+        };
+        settings.check(hmd)?;
+        Ok(settings)
+    }
+
+    fn foveation(&self, hmd: &Hmd) -> anyhow::Result<Option<Foveation>> {
+        let Some(foveate) = self.foveate else {
+            return Ok(None);
+        };
+        let kind = match foveate {
+            Foveate::Rings => FoveationKind::Rings,
+            Foveate::MultiResolution => FoveationKind::MultiResolution,
+            Foveate::RadialDensity => FoveationKind::RadialDensity,
+        };
+        ensure!(
+            kind != FoveationKind::MultiResolution || self.rates.is_none(),
+            "--rates: expected with --foveate rings or radial-density, found with multi-resolution, whose rates are those of its viewports"
+        );
+        Ok(Some(Foveation {
+            kind,
+            gaze: self
+                .gaze
+                .as_deref()
+                .map(gaze)
+                .transpose()?
+                .unwrap_or_default(),
+            rates: match self.rates {
+                None => Rates::default(),
+                Some(RatesFlag::Edges(edges_deg)) => Rates { edges_deg },
+                Some(RatesFlag::Acuity) => Rates::of_acuity(hmd),
+            },
+        }))
+    }
+
+    /// What the lenses show of the left and right eye's picture.
+    ///
+    /// # Errors
+    /// A radius out of range.
+    pub fn lenses(&self, hmd: &Hmd) -> anyhow::Result<[Lens; 2]> {
+        let lenses = hmd.fov.map(|fov| {
+            let lens = Lens::of(&fov);
+            let radius = self.lens_radius.unwrap_or(lens.radius);
+            Lens { radius, ..lens }
+        });
+        for lens in &lenses {
+            if let Err(broken) = lens.check() {
+                let (expected, found) = (broken.expected, broken.found);
+                bail!("--lens-radius: expected {expected}, found {found}");
+            }
+        }
+        Ok(lenses)
+    }
+}
+
+fn culling_parser() -> impl TypedValueParser<Value = Culling> {
+    let value = |technique: Culling| PossibleValue::new(technique.name()).help(technique.help());
+    PossibleValuesParser::new(Culling::all().map(value)).try_map(|name| name.parse::<Culling>())
+}
+
+/// A direction, or a file of them.
+fn gaze(text: &str) -> anyhow::Result<Gaze> {
+    if let Some(deg) = numbers(text) {
+        return Ok(Gaze::Fixed(deg));
+    }
+    ensure!(
+        text.to_lowercase().ends_with(".csv"),
+        "--gaze: expected degrees as in 5,-3 or a file FILE.csv, found '{text}'"
+    );
+    let sample = |row: scene::paths::GazeRow| GazeSample {
+        time_s: row.time_s as f32,
+        deg: [row.x_deg as f32, row.y_deg as f32],
+    };
+    let rows = read_gazes(Path::new(text))?;
+    Ok(Gaze::Path(rows.into_iter().map(sample).collect()))
+}
+
+/// Exactly N numbers with commas between them.
+fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    numbers?.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gaze_is_two_numbers_or_a_file() {
+        assert_eq!(gaze("5,-3.5").unwrap(), Gaze::Fixed([5.0, -3.5]));
+        for bad in ["5", "5,6,7", "left", ""] {
+            let message = gaze(bad).unwrap_err().to_string();
+            assert!(message.contains("5,-3 or a file"), "{message}");
+        }
+        assert!(gaze("absent.csv").is_err());
+    }
+
+    #[test]
+    fn rates_are_four_numbers_or_acuity() {
+        assert!(matches!("acuity".parse(), Ok(RatesFlag::Acuity)));
+        assert!(matches!(
+            "1,2,3,4.5".parse(),
+            Ok(RatesFlag::Edges([1.0, 2.0, 3.0, 4.5]))
+        ));
+        for bad in ["", "1,2,3", "1,2,3,4,5", "a,b,c,d"] {
+            assert!(bad.parse::<RatesFlag>().is_err(), "{bad}");
+        }
+    }
+}

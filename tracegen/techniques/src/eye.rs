@@ -1,0 +1,113 @@
+//! The pixels of an eye's picture as directions.
+
+use crate::gaze;
+use formats::view::{FovTangents, Hmd, Lens, TILE_SIZE_PX};
+use glam::{DVec2, DVec3};
+
+/// One eye's picture: its pixels as tangents, what the lens shows of it, and where the user looks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EyePicture {
+    pub size_px: [u32; 2],
+    fov: FovTangents,
+    /// What the lens shows, where that matters.
+    pub lens: Option<Lens>,
+    /// Direction of the gaze, the eye looking along -z.
+    gaze: DVec3,
+}
+
+impl EyePicture {
+    /// Eye 0 (left) or 1 (right) of a display; the gaze is in degrees right and up of straight ahead.
+    pub fn new(hmd: &Hmd, eye: usize, lens: Option<Lens>, gaze_deg: [f32; 2]) -> Self {
+        Self {
+            size_px: hmd.eye_size_px,
+            fov: hmd.fov[eye],
+            lens,
+            gaze: gaze::direction(hmd, eye, gaze_deg).as_dvec3(),
+        }
+    }
+
+    /// Tangents to the right and up at a point in pixels from the top left.
+    fn tangents(&self, px: DVec2) -> DVec2 {
+        let FovTangents {
+            left,
+            right,
+            up,
+            down,
+        } = self.fov;
+        let part = px / DVec2::new(self.size_px[0].into(), self.size_px[1].into());
+        DVec2::new(
+            f64::from(left + right) * part.x - f64::from(left),
+            f64::from(up) - f64::from(up + down) * part.y,
+        )
+    }
+
+    /// A rectangle as tangents: its left and lower, and its right and upper edge.
+    fn rectangle(&self, low_px: [u32; 2], high_px: [u32; 2]) -> [DVec2; 2] {
+        let at = |px: [u32; 2]| self.tangents(DVec2::new(px[0].into(), px[1].into()));
+        let (a, b) = (at(low_px), at(high_px));
+        [a.min(b), a.max(b)]
+    }
+
+    /// Whether the lens shows a point of a rectangle of pixels, of which `high_px` is the end.
+    pub fn shows(&self, low_px: [u32; 2], high_px: [u32; 2]) -> bool {
+        let Some(lens) = self.lens else { return true };
+        let [low, high] = self.rectangle(low_px, high_px);
+        let center = DVec2::new(lens.center[0].into(), lens.center[1].into());
+        let nearest = center.clamp(low, high);
+        // Within rounding of the lens's own test of a pixel's centre, which lies half a pixel inside.
+        nearest.distance_squared(center) <= f64::from(lens.radius) * f64::from(lens.radius)
+    }
+
+    /// Degrees between the gaze and the point nearest to it of a rectangle of pixels: the nearest in
+    /// the plane of the picture, or a corner.
+    pub fn least_angle_deg(&self, low_px: [u32; 2], high_px: [u32; 2]) -> f64 {
+        let [low, high] = self.rectangle(low_px, high_px);
+        let corners = [
+            low,
+            high,
+            DVec2::new(low.x, high.y),
+            DVec2::new(high.x, low.y),
+        ];
+        let ahead = (self.gaze.z < -1e-6).then(|| {
+            let at = self.gaze.truncate() / -self.gaze.z;
+            at.clamp(low, high)
+        });
+        let angle = |at: DVec2| at.extend(-1.0).angle_between(self.gaze).to_degrees();
+        (corners.into_iter().chain(ahead))
+            .map(angle)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Where the gaze meets the picture, in pixels from the top left; straight ahead where it does
+    /// not meet its plane.
+    pub fn gaze_px(&self) -> [f64; 2] {
+        let at = if self.gaze.z < -1e-6 {
+            self.gaze.truncate() / -self.gaze.z
+        } else {
+            DVec2::ZERO
+        };
+        let FovTangents {
+            left,
+            right,
+            up,
+            down,
+        } = self.fov;
+        [
+            (at.x + f64::from(left)) / f64::from(left + right) * f64::from(self.size_px[0]),
+            (f64::from(up) - at.y) / f64::from(up + down) * f64::from(self.size_px[1]),
+        ]
+    }
+
+    /// Columns and rows of the picture's tiles.
+    pub fn tiles(&self) -> [u32; 2] {
+        self.size_px.map(|size| size.div_ceil(TILE_SIZE_PX))
+    }
+
+    /// Pixels of a tile, cut off at the picture's edge: first and end.
+    pub fn tile_px(&self, tile: [u32; 2]) -> [[u32; 2]; 2] {
+        let edge = |step: u32| {
+            [0, 1].map(|axis: usize| ((tile[axis] + step) * TILE_SIZE_PX).min(self.size_px[axis]))
+        };
+        [edge(0), edge(1)]
+    }
+}

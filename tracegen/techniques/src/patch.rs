@@ -1,0 +1,140 @@
+//! The layers of one eye before they have a pose: the same for every frame with the same gaze.
+
+use crate::Mask;
+use crate::eye::EyePicture;
+use crate::layer::{Layer, Stage};
+use crate::plan::{Filter, Part};
+use formats::view::{Eye, EyeView, TILE_SIZE_PX};
+use glam::{DMat4, DVec4, Mat4};
+use std::sync::Arc;
+
+/// A layer of an eye's picture.
+#[derive(Clone, Debug)]
+pub(crate) struct Patch {
+    pub number: u16,
+    /// Left and top edge in pixels of the picture.
+    pub origin_px: [u32; 2],
+    /// Columns and rows of the picture that a pixel covers.
+    pub coarseness: [u32; 2],
+    pub size_px: [u32; 2],
+    pub mask: Option<Arc<Mask>>,
+    /// Tiles of the picture that it fills.
+    pub tiles: Option<Arc<Mask>>,
+    pub filter: Filter,
+}
+
+/// What an eye's picture is made of.
+#[derive(Clone, Debug)]
+pub(crate) struct EyePatches {
+    pub patches: Vec<Patch>,
+    /// The only patch is the picture.
+    pub is_picture: bool,
+    /// Pixels to shade, had each pixel of the picture its rate.
+    pub rate_px: f64,
+}
+
+impl Patch {
+    /// A whole picture, of which what `drawn` says may be drawn.
+    pub fn whole(picture: &EyePicture, mask: Option<Arc<Mask>>) -> Self {
+        Self {
+            number: 0,
+            origin_px: [0, 0],
+            coarseness: [1, 1],
+            size_px: picture.size_px,
+            mask,
+            tiles: None,
+            filter: Filter::Copy,
+        }
+    }
+
+    /// Fills the tiles of a picture that `owned` holds from a layer over the whole of it: pixels
+    /// that the lens shows, and those around them from which the picture's are interpolated.
+    pub fn of_tiles(picture: &EyePicture, number: u16, coarseness: [u32; 2], owned: Mask) -> Self {
+        let cover = Patch {
+            number,
+            coarseness,
+            size_px: [0, 1].map(|axis| picture.size_px[axis].div_ceil(coarseness[axis])),
+            filter: if coarseness == [1, 1] {
+                Filter::Copy
+            } else {
+                Filter::Bilinear
+            },
+            ..Self::whole(picture, None)
+        };
+        let shown = Mask::new(cover.size_px, |x, y| {
+            let [low, high] = cover.covered_px(picture, [x, y]);
+            let tile = low.map(|px| px / TILE_SIZE_PX);
+            owned.get(tile[0], tile[1]) && picture.shows(low, high)
+        });
+        let mask = match cover.filter {
+            Filter::Copy => shown,
+            _ => shown.grown(coarseness.map(|n| u32::from(n > 1))),
+        };
+        Self {
+            mask: Some(Arc::new(mask)),
+            tiles: Some(Arc::new(owned)),
+            ..cover
+        }
+    }
+
+    /// Pixels of the picture that a pixel covers, cut off at the edge: first and end.
+    pub fn covered_px(&self, picture: &EyePicture, pixel: [u32; 2]) -> [[u32; 2]; 2] {
+        let edge = |step: u32| {
+            [0, 1].map(|axis: usize| {
+                (self.origin_px[axis] + (pixel[axis] + step) * self.coarseness[axis])
+                    .min(picture.size_px[axis])
+            })
+        };
+        [edge(0), edge(1)]
+    }
+
+    /// The layer for an eye's pose.
+    pub fn layer(&self, eye: Eye, view: &EyeView, picture_px: [u32; 2]) -> Layer {
+        let covers = [0, 1].map(|axis| self.size_px[axis] * self.coarseness[axis]);
+        Layer {
+            eye: Some(eye),
+            number: self.number,
+            view: narrowed(view, self.origin_px, covers, picture_px),
+            size_px: self.size_px,
+            mask: self.mask.clone(),
+            draws: Stage::All,
+        }
+    }
+
+    /// The part of the picture that it fills; `layer` is its position in the plan.
+    pub fn part(&self, layer: usize) -> Part {
+        Part {
+            layer,
+            origin_px: self.origin_px,
+            coarseness: self.coarseness,
+            tiles: self.tiles.clone(),
+            filter: self.filter,
+        }
+    }
+}
+
+/// The view through a rectangle of an eye's picture, which may reach beyond it.
+fn narrowed(view: &EyeView, origin: [u32; 2], covers: [u32; 2], picture_px: [u32; 2]) -> EyeView {
+    if origin == [0, 0] && covers == picture_px {
+        return *view;
+    }
+    // Scale and shift of clip space along an axis, by the rectangle's edges in it.
+    let axis = |axis: usize| {
+        let ndc = |px: u32| 2.0 * f64::from(px) / f64::from(picture_px[axis]) - 1.0;
+        let (low, high) = (ndc(origin[axis]), ndc(origin[axis] + covers[axis]));
+        (2.0 / (high - low), -(high + low) / (high - low))
+    };
+    let ((x_scale, x_shift), (y_scale, y_shift)) = (axis(0), axis(1));
+    // Rows of pixels count downwards, clip space upwards.
+    let narrow = DMat4::from_cols(
+        DVec4::new(x_scale, 0.0, 0.0, 0.0),
+        DVec4::new(0.0, y_scale, 0.0, 0.0),
+        DVec4::Z,
+        DVec4::new(x_shift, -y_shift, 0.0, 1.0),
+    );
+    let eye_to_clip = Mat4::from_cols_array_2d(&view.eye_to_clip).as_dmat4();
+    EyeView {
+        eye_to_clip: (narrow * eye_to_clip).as_mat4().to_cols_array_2d(),
+        ..*view
+    }
+}

@@ -1,0 +1,151 @@
+//! From settings to plans.
+
+use crate::eye::EyePicture;
+use crate::foveation::{multi_resolution, radial_density, rings};
+use crate::layer::Predicted;
+use crate::patch::EyePatches;
+use crate::plan::{FramePlan, Picture};
+use crate::settings::{FoveationKind, SettingsError};
+use crate::{Settings, hidden_area};
+use formats::view::{Eye, FrameViews, Hmd, Lens};
+use std::sync::{Arc, Mutex};
+
+/// What each eye's picture is made of.
+type Patches = Arc<Vec<EyePatches>>;
+
+/// Plans frames of one display under the same settings.
+#[derive(Debug)]
+pub struct Planner {
+    settings: Settings,
+    hmd: Hmd,
+    lenses: [Lens; 2],
+    eyes: Vec<Eye>,
+    fps: f32,
+    /// What the last gaze needed: it stays where the gaze does.
+    last: Mutex<Option<([f32; 2], Patches)>>,
+}
+
+impl Planner {
+    /// For frames with the pictures of `eyes`, in their order, seen through `lenses`, `fps` a second.
+    ///
+    /// # Errors
+    /// [`Settings::check`].
+    pub fn new(
+        settings: &Settings,
+        hmd: &Hmd,
+        lenses: [Lens; 2],
+        eyes: &[Eye],
+        fps: f32,
+    ) -> Result<Self, SettingsError> {
+        settings.check(hmd)?;
+        Ok(Self {
+            settings: settings.clone(),
+            hmd: hmd.clone(),
+            lenses,
+            eyes: eyes.to_vec(),
+            fps,
+            last: Mutex::new(None),
+        })
+    }
+
+    /// The eyes whose pictures the frames have.
+    #[must_use]
+    pub fn eyes(&self) -> &[Eye] {
+        &self.eyes
+    }
+
+    /// What is left out or done more coarsely.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The display.
+    #[must_use]
+    pub fn hmd(&self) -> &Hmd {
+        &self.hmd
+    }
+
+    /// What the user sees of the left and right eye's picture.
+    #[must_use]
+    pub fn lenses(&self) -> &[Lens; 2] {
+        &self.lenses
+    }
+
+    /// Plans a frame.
+    #[must_use]
+    pub fn plan(&self, views: &FrameViews) -> FramePlan {
+        let time_s = views.frame as f32 / self.fps;
+        let gaze = (self.settings.foveation.as_ref())
+            .map_or([0.0; 2], |foveation| foveation.gaze.at(time_s));
+        let eyes = self.patches(gaze);
+        let mut numbered: Vec<_> = (0..eyes.len())
+            .flat_map(|eye| (0..eyes[eye].patches.len()).map(move |patch| (eye, patch)))
+            .collect();
+        // Left and right layers of a number follow each other.
+        numbered.sort_by_key(|&(eye, patch)| (eyes[eye].patches[patch].number, eye));
+        let layers: Vec<_> = (numbered.iter())
+            .map(|&(eye, patch)| {
+                let which = self.eyes[eye];
+                let view = &views.eyes[which as usize];
+                eyes[eye].patches[patch].layer(which, view, self.hmd.eye_size_px)
+            })
+            .collect();
+        let of_eye = |eye: usize| {
+            let own = (numbered.iter().enumerate()).filter(move |(_, (of, _))| *of == eye);
+            own.map(|(layer, (_, patch))| (layer, *patch))
+        };
+        let picture = |(eye, made): (usize, &EyePatches)| match of_eye(eye).next() {
+            Some((layer, _)) if made.is_picture => Picture::Layer(layer),
+            _ => Picture::Composed {
+                size_px: self.hmd.eye_size_px,
+                parts: (of_eye(eye))
+                    .map(|(layer, patch)| made.patches[patch].part(layer))
+                    .collect(),
+            },
+        };
+        let all = (self.hmd.eye_size_px.map(f64::from).iter()).product::<f64>();
+        let all = all * eyes.len() as f64;
+        let rate_px: f64 = eyes.iter().map(|eye| eye.rate_px).sum();
+        let drawn_px: u64 = layers.iter().map(|layer| layer.drawn_px()).sum();
+        let shares = self.settings.foveation.is_some() || self.settings.hidden_area_mask;
+        FramePlan {
+            predicted: Predicted {
+                shaded_share: shares.then_some((drawn_px as f64 / all) as f32),
+                rate_share: shares.then_some((rate_px / all) as f32),
+                ..Predicted::default()
+            },
+            pictures: eyes.iter().enumerate().map(picture).collect(),
+            layers,
+        }
+    }
+
+    /// The layers of each eye for a gaze.
+    fn patches(&self, gaze_deg: [f32; 2]) -> Patches {
+        // A plan cannot fail half-way: what a panic left behind is whole.
+        let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some((_, patches)) = last.as_ref().filter(|(gaze, _)| *gaze == gaze_deg) {
+            return Arc::clone(patches);
+        }
+        let of_eye = |eye: &Eye| {
+            let lens = (self.settings.hidden_area_mask).then_some(self.lenses[*eye as usize]);
+            let picture = EyePicture::new(&self.hmd, *eye as usize, lens, gaze_deg);
+            match &self.settings.foveation {
+                None => hidden_area::patches(&picture),
+                Some(foveation) => match foveation.kind {
+                    FoveationKind::Rings => rings::patches(&picture, &foveation.rates),
+                    FoveationKind::MultiResolution => multi_resolution::patches(&picture),
+                    FoveationKind::RadialDensity => {
+                        radial_density::patches(&picture, &foveation.rates)
+                    }
+                },
+            }
+        };
+        let patches = Arc::new(self.eyes.iter().map(of_eye).collect());
+        *last = Some((gaze_deg, Arc::clone(&patches)));
+        patches
+    }
+}
+
+#[cfg(test)]
+mod tests;

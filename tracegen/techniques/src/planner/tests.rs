@@ -1,0 +1,297 @@
+use super::*;
+use crate::gaze::Gaze;
+use crate::layer::Layer;
+use crate::plan::{Filter, Part};
+use crate::settings::{Foveation, Rates};
+use formats::view::{EyeView, FovTangents};
+
+const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
+
+/// Off-axis eyes whose picture has odd tiles and coarse pixels at its edges.
+fn hmd(size_px: [u32; 2]) -> Hmd {
+    let fov = |left, right| FovTangents {
+        left,
+        right,
+        up: 1.1,
+        down: 1.0,
+    };
+    Hmd {
+        eye_size_px: size_px,
+        fov: [fov(1.3, 1.0), fov(1.0, 1.3)],
+        ..Hmd::default()
+    }
+}
+
+fn foveated(kind: FoveationKind, gaze: [f32; 2], hidden_area_mask: bool) -> Settings {
+    Settings {
+        hidden_area_mask,
+        foveation: Some(Foveation {
+            kind,
+            gaze: Gaze::Fixed(gaze),
+            rates: Rates::default(),
+        }),
+        ..Settings::default()
+    }
+}
+
+fn plan(settings: &Settings, hmd: &Hmd) -> FramePlan {
+    let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+    let planner = Planner::new(settings, hmd, lenses, BOTH, 72.0).unwrap();
+    planner.plan(&FrameViews::default())
+}
+
+/// Every setting that makes layers, with a gaze ahead and one at a corner.
+fn all() -> Vec<Settings> {
+    let mut all = vec![
+        Settings::default(),
+        Settings {
+            hidden_area_mask: true,
+            ..Settings::default()
+        },
+    ];
+    for kind in [
+        FoveationKind::Rings,
+        FoveationKind::MultiResolution,
+        FoveationKind::RadialDensity,
+    ] {
+        for gaze in [[0.0, 0.0], [-40.0, 30.0]] {
+            for masked in [false, true] {
+                all.push(foveated(kind, gaze, masked));
+            }
+        }
+    }
+    all
+}
+
+/// What the pixels of a layer are read for a pixel of the picture.
+fn taps(part: &Part, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
+    let own = [0, 1].map(|axis: usize| pixel[axis] - part.origin_px[axis]);
+    match part.filter {
+        Filter::Copy => vec![own],
+        Filter::FillQuads if layer.mask.as_ref().is_some_and(|m| m.get(own[0], own[1])) => {
+            vec![own]
+        }
+        Filter::FillQuads => {
+            let [x, y] = own;
+            let [a, b] = [x / 2 * 2, y / 2 * 2];
+            vec![
+                [a.wrapping_sub(1), y],
+                [a + 2, y],
+                [x, b.wrapping_sub(1)],
+                [x, b + 2],
+            ]
+        }
+        Filter::Bilinear => {
+            let axis = |axis: usize| {
+                let n = f64::from(part.coarseness[axis]);
+                let at = (f64::from(own[axis]) + 0.5) / n - 0.5;
+                let last = f64::from(layer.size_px[axis] - 1);
+                // A tap without weight is not read.
+                let next = if at.fract() == 0.0 {
+                    at
+                } else {
+                    at.floor() + 1.0
+                };
+                [
+                    at.floor().clamp(0.0, last) as u32,
+                    next.clamp(0.0, last) as u32,
+                ]
+            };
+            let ([x0, x1], [y0, y1]) = (axis(0), axis(1));
+            vec![[x0, y0], [x1, y0], [x0, y1], [x1, y1]]
+        }
+    }
+}
+
+#[test]
+fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
+    for size_px in [[120, 104], [131, 97]] {
+        let hmd = hmd(size_px);
+        for settings in all() {
+            let plan = plan(&settings, &hmd);
+            for (eye, picture) in plan.pictures.iter().enumerate() {
+                let whole = match picture {
+                    Picture::Layer(layer) => vec![Part {
+                        layer: *layer,
+                        origin_px: [0, 0],
+                        coarseness: [1, 1],
+                        tiles: None,
+                        filter: Filter::Copy,
+                    }],
+                    Picture::Composed { parts, .. } => parts.clone(),
+                };
+                let lens = Lens::of(&hmd.fov[eye]);
+                for pixel in (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| [x, y])) {
+                    if settings.hidden_area_mask
+                        && !lens.pixel_visible(&hmd.fov[eye], size_px, pixel)
+                    {
+                        continue;
+                    }
+                    let fills = |part: &&Part| {
+                        let tile = pixel.map(|px| px / 16);
+                        part.tiles
+                            .as_ref()
+                            .is_none_or(|tiles| tiles.get(tile[0], tile[1]))
+                    };
+                    let filling: Vec<&Part> = whole.iter().filter(fills).collect();
+                    assert_eq!(filling.len(), 1, "{settings:?} {pixel:?}");
+                    let part = filling[0];
+                    let layer = &plan.layers[part.layer];
+                    assert_eq!(layer.eye, Some(BOTH[eye]));
+                    let drawn = |[x, y]: &[u32; 2]| {
+                        *x < layer.size_px[0]
+                            && *y < layer.size_px[1]
+                            && layer.mask.as_ref().is_none_or(|mask| mask.get(*x, *y))
+                    };
+                    let taps = taps(part, layer, pixel);
+                    let ok = match part.filter {
+                        Filter::FillQuads => taps.iter().any(drawn),
+                        _ => taps.iter().all(drawn),
+                    };
+                    assert!(ok, "{settings:?} eye {eye} {pixel:?}: {taps:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
+    let hmd = hmd([131, 97]);
+    let eye_to_clip = glam::camera::rh::proj::directx::perspective(1.4, 1.2, 0.1, 90.0);
+    let view = EyeView {
+        eye_to_clip: eye_to_clip.to_cols_array_2d(),
+        ..EyeView::default()
+    };
+    let views = FrameViews {
+        frame: 0,
+        eyes: [view; 2],
+    };
+    for settings in all() {
+        let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+        let plan = Planner::new(&settings, &hmd, lenses, BOTH, 72.0)
+            .unwrap()
+            .plan(&views);
+        for picture in &plan.pictures {
+            let Picture::Composed { parts, .. } = picture else {
+                continue;
+            };
+            for part in parts {
+                let layer = &plan.layers[part.layer];
+                for corner in [[0, 0], layer.size_px] {
+                    // A point in the picture's pixels, and the same in the layer's.
+                    let px = [0, 1].map(|axis: usize| {
+                        f64::from(part.origin_px[axis] + corner[axis] * part.coarseness[axis])
+                    });
+                    let ndc = |px: [f64; 2], size: [u32; 2]| {
+                        let [x, y] = [px[0] / f64::from(size[0]), px[1] / f64::from(size[1])];
+                        glam::Vec2::new((2.0 * x - 1.0) as f32, (1.0 - 2.0 * y) as f32)
+                    };
+                    let of_picture = ndc(px, hmd.eye_size_px);
+                    let of_layer = ndc(corner.map(f64::from), layer.size_px);
+                    let point = eye_to_clip.inverse().project_point3(of_picture.extend(0.5));
+                    let found = layer.clip_from_world().project_point3(point).truncate();
+                    assert!(
+                        found.distance(of_layer) < 1e-4,
+                        "{settings:?} {found} {of_layer}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn shares_are_those_of_the_rates_and_the_borders_cost_little() {
+    let hmd = hmd([960, 1080]);
+    let shares = |settings: &Settings| {
+        let predicted = plan(settings, &hmd).predicted;
+        (
+            predicted.rate_share.unwrap(),
+            predicted.shaded_share.unwrap(),
+        )
+    };
+    // The viewports end at tiles, so that the share is not exactly 49 %.
+    let (rate, shaded) = shares(&foveated(FoveationKind::MultiResolution, [0.0, 0.0], false));
+    assert!(
+        (rate - 0.49).abs() < 0.02 && shaded > rate && shaded < rate + 0.01,
+        "{rate} {shaded}"
+    );
+    let (rate, shaded) = shares(&foveated(FoveationKind::RadialDensity, [0.0, 0.0], false));
+    assert!(rate == shaded && (0.5..0.6).contains(&rate), "{rate}");
+    let (rate, shaded) = shares(&foveated(FoveationKind::Rings, [0.0, 0.0], false));
+    assert!(shaded > rate && shaded < rate + 0.05, "{rate} {shaded}");
+    let masked = Settings {
+        hidden_area_mask: true,
+        ..Settings::default()
+    };
+    // A circle that touches the left and right edges, by the vertical tangents' span.
+    let (rate, shaded) = shares(&masked);
+    let expected = std::f32::consts::PI * 1.15 * 1.15 / (2.3 * 2.1);
+    assert!(
+        rate == shaded && rate < 1.0 && shaded > expected * 0.9,
+        "{rate} {expected}"
+    );
+}
+
+#[test]
+fn rings_around_the_gaze_have_the_shares_that_a_circle_has() {
+    // One rate beyond 20 degrees: a disc of tan(20) in a square picture of tangent 1.15.
+    let mut hmd = hmd([1600, 1600]);
+    hmd.fov = [FovTangents {
+        left: 1.15,
+        right: 1.15,
+        up: 1.15,
+        down: 1.15,
+    }; 2];
+    let mut settings = foveated(FoveationKind::Rings, [0.0, 0.0], false);
+    if let Some(foveation) = &mut settings.foveation {
+        foveation.rates.edges_deg = [20.0; 4];
+    }
+    let share = plan(&settings, &hmd).predicted.rate_share.unwrap();
+    let disc = std::f32::consts::PI * 20.0_f32.to_radians().tan().powi(2) / 2.3_f32.powi(2);
+    let expected = disc + (1.0 - disc) / 16.0;
+    // Tiles that touch the disc belong to it: a ring of half a tile at most.
+    assert!(
+        share > expected && share < expected + 0.02,
+        "{share} {expected}"
+    );
+}
+
+#[test]
+fn left_and_right_layers_of_a_number_follow_each_other() {
+    for settings in all() {
+        let plan = plan(&settings, &hmd([131, 97]));
+        let keys: Vec<_> = plan
+            .layers
+            .iter()
+            .map(|l| (l.number, l.eye.map(|e| e as u8)))
+            .collect();
+        assert!(keys.is_sorted_by(|a, b| a < b), "{keys:?}");
+    }
+}
+
+#[test]
+fn the_layers_of_a_gaze_that_stays_are_made_once() {
+    let hmd = hmd([131, 97]);
+    let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+    let settings = foveated(FoveationKind::Rings, [3.0, 4.0], true);
+    let planner = Planner::new(&settings, &hmd, lenses, BOTH, 72.0).unwrap();
+    let masks = |frame| {
+        let plan = planner.plan(&FrameViews {
+            frame,
+            ..FrameViews::default()
+        });
+        plan.layers
+            .into_iter()
+            .map(|layer| layer.mask)
+            .collect::<Vec<_>>()
+    };
+    for (a, b) in masks(0).iter().zip(masks(9)) {
+        assert!(
+            a.as_ref()
+                .zip(b.as_ref())
+                .is_some_and(|(a, b)| Arc::ptr_eq(a, b))
+        );
+    }
+}

@@ -1,0 +1,115 @@
+//! What a capture leaves out because nobody can tell: on by default, and proven case by case.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// What is left out. Pictures and traces are the same bit for bit with and without each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Skips {
+    /// Texels of images that no view samples.
+    pub images: bool,
+    /// Mip levels finer than any that a view can sample.
+    pub mip_levels: bool,
+    /// Shadow cascades in which nothing that is seen looks up its shadow.
+    pub cascades: bool,
+    /// Draws whose box a view may see but none of whose triangles.
+    pub draws: bool,
+    /// Draws that do not touch the region of a view that is captured.
+    pub regions: bool,
+}
+
+/// Names for [`Skips::without`], what they stand for, and the switch.
+type Row = (&'static str, fn(&mut Skips) -> &mut bool);
+const ROWS: [Row; 5] = [
+    ("images", |skips| &mut skips.images),
+    ("mip-levels", |skips| &mut skips.mip_levels),
+    ("cascades", |skips| &mut skips.cascades),
+    ("draws", |skips| &mut skips.draws),
+    ("regions", |skips| &mut skips.regions),
+];
+
+impl Default for Skips {
+    fn default() -> Self {
+        Self {
+            images: true,
+            mip_levels: true,
+            cascades: true,
+            draws: true,
+            regions: true,
+        }
+    }
+}
+
+impl Skips {
+    /// Everything is prepared and drawn, whether anybody sees it or not.
+    pub const NONE: Self = Self {
+        images: false,
+        mip_levels: false,
+        cascades: false,
+        draws: false,
+        regions: false,
+    };
+
+    /// All but those named.
+    #[must_use]
+    pub fn without(kept: &[Skip]) -> Self {
+        let mut skips = Self::default();
+        for Skip(number) in kept {
+            match ROWS.get(*number) {
+                Some((_, switch)) => *switch(&mut skips) = false,
+                None => skips = Self::NONE,
+            }
+        }
+        skips
+    }
+}
+
+/// One of them by its name, or `all`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Skip(usize);
+
+impl FromStr for Skip {
+    type Err = UnknownSkip;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSkip> {
+        if name == "all" {
+            return Ok(Self(ROWS.len()));
+        }
+        let found = ROWS.iter().position(|(known, _)| *known == name);
+        found.map(Self).ok_or_else(|| UnknownSkip(name.into()))
+    }
+}
+
+/// No skip of that name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownSkip(String);
+
+impl fmt::Display for UnknownSkip {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = ROWS.map(|(name, _)| name).join(", ");
+        write!(f, "expected all or one of {names}, found '{}'", self.0)
+    }
+}
+
+impl std::error::Error for UnknownSkip {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_skip_is_switched_off_by_its_name_and_all_of_them_by_all() {
+        let skip = |name: &str| name.parse::<Skip>().unwrap();
+        assert_eq!(Skips::without(&[]), Skips::default());
+        assert_eq!(Skips::without(&[skip("all")]), Skips::NONE);
+        let each: Vec<Skip> = ROWS.iter().map(|(name, _)| skip(name)).collect();
+        assert_eq!(Skips::without(&each), Skips::NONE);
+        let some = Skips::without(&[skip("cascades"), skip("mip-levels")]);
+        assert!(!some.cascades && !some.mip_levels && some.images && some.draws && some.regions);
+        let error = "mips".parse::<Skip>().unwrap_err().to_string();
+        assert!(
+            error.contains("mip-levels") && error.contains("'mips'"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,16 @@
+//! Conical culling: the part of each eye's frustum that its round lens shows.
+//!
+//! The frustum stays: where the lens is larger than the picture, the picture ends first.
+
+use super::{Frame, Volumes};
+use crate::rig::TooWide;
+use crate::volume::Volume;
+
+/// The frustum and lens cone of each eye.
+pub(super) fn volumes(frame: &Frame<'_>) -> Result<Volumes, TooWide> {
+    let eyes = frame.rig.eyes().iter();
+    Ok(Volumes::Any(
+        eyes.map(|eye| Volume::new(eye.frustum(frame.extent), Some(eye.lens_cone())))
+            .collect(),
+    ))
+}

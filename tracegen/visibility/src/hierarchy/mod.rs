@@ -1,0 +1,106 @@
+//! A kept tree over the world-space bounds of a scene's draws.
+//!
+//! Four boxes a node, one array a coordinate, so that a volume is tested against four boxes at a
+//! time. The draws below any box are a range of one array: a box wholly inside a volume is accepted
+//! as that range without another test. What is outside costs one test for the largest box that
+//! holds it.
+
+mod build;
+mod refit;
+#[cfg(test)]
+mod tests;
+mod walk;
+
+pub use walk::Scratch;
+
+use glam::{DVec3, Vec3, Vec4};
+
+/// Boxes of a node.
+const WIDTH: usize = 4;
+
+/// Four boxes and what is in each.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// Lower and upper corners: `[low or high][axis]`, a lane a box.
+    corners: [[Vec4; 3]; 2],
+    /// Node of each box's parts, where it holds more than one draw.
+    child: [u32; WIDTH],
+    /// Draws of box `i`: `order[begin[i]..begin[i + 1]]`.
+    begin: [u32; WIDTH + 1],
+    /// Boxes that are there, the first ones.
+    count: u32,
+}
+
+impl Node {
+    fn lane(&self, lane: usize) -> [Vec3; 2] {
+        self.corners
+            .map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]))
+    }
+
+    fn set_lane(&mut self, lane: usize, bounds: [Vec3; 2]) {
+        for (corner, point) in self.corners.iter_mut().zip(bounds) {
+            for axis in 0..3 {
+                corner[axis][lane] = point[axis];
+            }
+        }
+    }
+
+    /// The box around the node's boxes.
+    fn bounds(&self) -> [Vec3; 2] {
+        (0..self.count as usize)
+            .map(|lane| self.lane(lane))
+            .fold(EMPTY, union)
+    }
+}
+
+/// A tree over the bounds of draws `0..len`.
+#[derive(Clone, Debug, Default)]
+pub struct Hierarchy {
+    /// Parents before children, the root first.
+    nodes: Vec<Node>,
+    /// Draws by their place in the tree.
+    order: Vec<u32>,
+    /// Node and lane (`WIDTH * node + lane`) that hold each node's bounds; the root's is unused.
+    parent: Vec<u32>,
+    /// Node and lane of each draw, or [`NOWHERE`].
+    place: Vec<u32>,
+    /// Draws without finite bounds: always drawn.
+    unbounded: Vec<u32>,
+}
+
+/// Place of a draw without finite bounds.
+const NOWHERE: u32 = u32::MAX;
+
+const EMPTY: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+
+fn union(a: [Vec3; 2], b: [Vec3; 2]) -> [Vec3; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+fn is_finite([low, high]: [Vec3; 2]) -> bool {
+    low.is_finite() && high.is_finite()
+}
+
+impl Hierarchy {
+    /// Draws, those without finite bounds among them.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.place.len()
+    }
+
+    /// No draws at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.place.is_empty()
+    }
+
+    /// Largest absolute coordinate of any finite bounds, by axis: what rounding errors grow with.
+    #[must_use]
+    pub fn extent(&self) -> DVec3 {
+        let Some(root) = self.nodes.first() else {
+            return DVec3::ZERO;
+        };
+        let [low, high] = root.bounds();
+        low.abs().max(high.abs()).as_dvec3()
+    }
+}

@@ -1,0 +1,127 @@
+//! The eyes of a frame, as culling sees them.
+
+use crate::volume::{Affine, Cone, HalfSpace, frustum, meeting_point};
+use formats::view::{EyeView, Lens};
+use glam::{DMat4, DVec3, Mat4};
+
+/// One eye.
+#[derive(Clone, Copy, Debug)]
+pub struct Eye {
+    /// Matrices.
+    pub view: EyeView,
+    /// What the user sees of its picture.
+    pub lens: Lens,
+    /// Width and height of its picture.
+    pub size_px: [u32; 2],
+}
+
+/// The eyes of a frame: one, or left and right.
+#[derive(Clone, Debug)]
+pub struct Rig {
+    eyes: Vec<Eye>,
+}
+
+/// Eyes that look too far apart for one volume around both.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "one volume around both eyes: expected a combined field of view below {limit} degrees, found {found}",
+    limit = MAX_COMBINED_DEG,
+    found = found_deg.map_or("eyes that look to opposite sides".to_owned(), |deg| format!("{deg:.1} degrees"))
+)]
+pub struct TooWide {
+    /// The combined field of view, where there is one.
+    pub found_deg: Option<f64>,
+}
+
+/// Widest combined field of view that one volume is made around, degrees: at 180 there is none, and
+/// close to it, it holds almost everything.
+pub const MAX_COMBINED_DEG: f64 = 179.0;
+
+impl Rig {
+    /// # Panics
+    /// Without eyes.
+    #[must_use]
+    pub fn new(eyes: Vec<Eye>) -> Self {
+        assert!(!eyes.is_empty(), "somebody has to look");
+        Self { eyes }
+    }
+
+    /// The eyes, left before right.
+    #[must_use]
+    pub fn eyes(&self) -> &[Eye] {
+        &self.eyes
+    }
+
+    /// The one eye whose turn it is in a frame: left in even ones, right in odd ones.
+    pub(crate) fn turn(&self, frame: u32) -> &Eye {
+        &self.eyes[frame as usize % self.eyes.len()]
+    }
+}
+
+impl Eye {
+    /// World to clip space, as the driver gets it.
+    pub(crate) fn clip_from_world(&self) -> Mat4 {
+        Mat4::from_cols_array_2d(&self.view.eye_to_clip)
+            * Mat4::from_cols_array_2d(&self.view.world_to_eye)
+    }
+
+    /// Sides of what is drawn for it, of geometry whose coordinates are at most `extent`.
+    pub(crate) fn frustum(&self, extent: DVec3) -> [HalfSpace; 6] {
+        frustum(self.clip_from_world(), extent)
+    }
+
+    /// Right, up and forward coordinate of world space as seen from the eye, metres.
+    pub(crate) fn axes(&self) -> [Affine; 3] {
+        let matrix: DMat4 = Mat4::from_cols_array_2d(&self.view.world_to_eye).as_dmat4();
+        let axis = |row: usize, sign: f64| Affine {
+            gradient: matrix.row(row).truncate() * sign,
+            constant: matrix.row(row).w * sign,
+        };
+        [axis(0, 1.0), axis(1, 1.0), axis(2, -1.0)]
+    }
+
+    /// Position in world space.
+    pub(crate) fn position(&self) -> DVec3 {
+        let matrix: DMat4 = Mat4::from_cols_array_2d(&self.view.world_to_eye).as_dmat4();
+        matrix.inverse().w_axis.truncate()
+    }
+
+    /// Radius of the lens and a pixel around it, for the rounding of vertices to the raster's grid.
+    pub(crate) fn lens_radius(&self) -> f64 {
+        let scale = &self.view.eye_to_clip;
+        let pixel = |axis: usize| 2.0 / f64::from(scale[axis][axis] * self.size_px[axis] as f32);
+        f64::from(self.lens.radius) + pixel(0).abs().max(pixel(1).abs())
+    }
+
+    /// What the lens shows: its circle, as a cone from the eye.
+    pub(crate) fn lens_cone(&self) -> Cone {
+        let [right, up, forward] = self.axes();
+        let [x, y] = self.lens.center.map(f64::from);
+        Cone {
+            x: right.plus(-x, forward),
+            y: up.plus(-y, forward),
+            radius: forward.times(self.lens_radius()),
+        }
+    }
+
+    /// Corners of the frustum: near and far end of each of its four edges. The far end is at the
+    /// far plane, or where geometry whose coordinates are at most `extent` ends, if that is nearer.
+    pub(crate) fn edges(&self, extent: DVec3) -> [[DVec3; 2]; 4] {
+        let [left, right, bottom, top, near, far] = self.frustum(extent);
+        let forward = near.normal;
+        let near_m = -near.offset;
+        let far_m = if far.normal.dot(forward) < -0.5 {
+            far.offset
+        } else {
+            f64::INFINITY
+        };
+        let last_m = forward.abs().dot(extent);
+        let step = 1e-6 * (1.0 + near_m.abs());
+        let far = HalfSpace {
+            normal: -forward,
+            offset: far_m.min(last_m).max(near_m + step),
+        };
+        [[left, bottom], [left, top], [right, bottom], [right, top]]
+            .map(|[a, b]| [near, far].map(|end| meeting_point([a, b, end])))
+    }
+}

@@ -1,0 +1,72 @@
+//! Eyes and random numbers for the tests.
+
+use crate::rig::{Eye, Rig};
+use formats::view::{FovTangents, Hmd, Lens};
+use glam::Vec3;
+use scene::{Camera, cameras};
+
+/// Pixels of an eye's picture.
+pub const SIZE_PX: [u32; 2] = [1000, 1000];
+
+/// Eyes at the origin that look along -z, as the cameras make them; the lenses are the default
+/// ones.
+pub fn rig(fov: [FovTangents; 2], ipd_m: f32, cant_deg: f32, near: f32, far: f32) -> Rig {
+    let hmd = Hmd {
+        eye_size_px: SIZE_PX,
+        fov,
+        ipd_m,
+        cant_deg,
+        ..Hmd::default()
+    };
+    let camera = camera(Vec3::ZERO, Vec3::NEG_Z, near, far);
+    rig_of(&camera, &hmd, fov.map(|fov| Lens::of(&fov)))
+}
+
+/// A head at `eye` that looks along `direction`.
+pub fn camera(eye: Vec3, direction: Vec3, near: f32, far: f32) -> Camera {
+    Camera {
+        name: String::new(),
+        eye,
+        target: eye + direction,
+        up: Vec3::Y,
+        vfov_deg: 60.0,
+        near,
+        far,
+    }
+}
+
+/// The eyes of a head.
+pub fn rig_of(camera: &Camera, hmd: &Hmd, lenses: [Lens; 2]) -> Rig {
+    let views = cameras::eye_views(camera, hmd);
+    let eyes = views.into_iter().zip(lenses).map(|(view, lens)| Eye {
+        view,
+        lens,
+        size_px: SIZE_PX,
+    });
+    Rig::new(eyes.collect())
+}
+
+/// Numbers from 0 to 1 (SplitMix64).
+pub struct Random(pub u64);
+
+impl Random {
+    /// The next number.
+    pub fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
+    }
+
+    /// The next number from `low` to `high`.
+    pub fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.next()
+    }
+
+    /// A point of a box.
+    pub fn within(&mut self, [low, high]: [Vec3; 2]) -> Vec3 {
+        let t = Vec3::new(self.next(), self.next(), self.next());
+        // Rounding must not carry it out.
+        (low + (high - low) * t).clamp(low, high)
+    }
+}
