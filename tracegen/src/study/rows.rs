@@ -1,6 +1,6 @@
 //! The techniques by name, and the rows of a study: each technique alone, and combinations.
 
-use techniques::settings::{Foveation, FoveationKind, Rates};
+use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
 use techniques::{Gaze, Settings};
 use visibility::Culling;
 
@@ -31,6 +31,10 @@ pub enum Setting {
     Occlusion,
     /// Whether what the lens hides is drawn.
     Mask,
+    /// Whether both eyes are drawn at once.
+    Multiview,
+    /// Where and how both eyes share a picture of what is far.
+    FarField,
     /// How the periphery is coarsened.
     Foveation,
 }
@@ -106,6 +110,19 @@ impl Part {
     pub fn options() -> Vec<Self> {
         let mut parts = Self::all();
         parts.extend([
+            Self::far_field("far-field-0.5px", "Mono far field, 0.5 px", |s| {
+                s.far_field = far_field(Split::Pixels(0.5), Variant::Plain);
+            }),
+            Self::far_field("far-field-2px", "Mono far field, 2 px", |s| {
+                s.far_field = far_field(Split::Pixels(2.0), Variant::Plain);
+            }),
+            Self::far_field(
+                "far-field-depth-shift-2px",
+                "Shifted far field, 2 px",
+                |s| {
+                    s.far_field = far_field(Split::Pixels(2.0), Variant::DepthShift);
+                },
+            ),
             Self::new(
                 "foveation-rings-wide",
                 "Foveation by rings, 1.5 times as wide",
@@ -143,6 +160,10 @@ impl Part {
         }
     }
 
+    fn far_field(name: &str, title: &str, change: fn(&mut Settings)) -> Self {
+        Self::new(name, title, false, Setting::FarField, change)
+    }
+
     fn culling(culling: Culling) -> Self {
         Self {
             name: culling.name().to_owned(),
@@ -155,9 +176,7 @@ impl Part {
     /// Its error is a shift of what is seen, in pixels, and bounded for every frame.
     #[must_use]
     pub fn is_shift(&self) -> bool {
-        match self.change {
-            Change::Culling(_) | Change::Switch(..) => false,
-        }
+        self.setting() == Setting::FarField
     }
 
     /// The setting that it changes.
@@ -175,6 +194,10 @@ impl Part {
             Change::Switch(_, change) => change(settings),
         }
     }
+}
+
+fn far_field(split: Split, variant: Variant) -> Option<FarField> {
+    Some(FarField { split, variant })
 }
 
 /// Straight ahead.
@@ -197,12 +220,16 @@ fn wide() -> Rates {
 const COMBINATIONS: &[(&str, &str)] = &[
     ("Culling and occlusion", "superfrustum+occlusion"),
     (
-        "All that lose nothing",
-        "superfrustum+occlusion+hidden-area-mask",
+        "Lossless",
+        "superfrustum+occlusion+multiview+hidden-area-mask",
+    ),
+    (
+        "Lossless but for 1 px in the distance",
+        "superfrustum+occlusion+multiview+hidden-area-mask+far-field",
     ),
     (
         "Everything",
-        "superfrustum+occlusion+hidden-area-mask+foveation-rings",
+        "superfrustum+occlusion+multiview+hidden-area-mask+foveation-rings",
     ),
 ];
 

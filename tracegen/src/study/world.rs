@@ -85,6 +85,7 @@ impl World {
     /// They do not.
     pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
         let planner = self.planner(settings)?;
+        planner.check_views(&self.views[0])?;
         self.job(&planner).frame(&self.views[0])?;
         Ok(())
     }
@@ -105,6 +106,7 @@ impl World {
         let start = Instant::now();
         self.draws.pose(&self.scene, number as f32 / self.fps);
         backend.pose(&self.draws);
+        let posed = backend.work() - before;
         let job = self.job(planner);
         let mut frame = job.frame(&self.views[number as usize])?;
         if planner.settings().occlusion {
@@ -112,16 +114,19 @@ impl World {
         }
         let planned = start.elapsed();
         job.light(backend, &frame)?;
+        let before = backend.work();
         let start = Instant::now();
         job.render_layers(backend, &frame)?;
         let rendered = start.elapsed();
         backend.compose(&frame)?;
         let done = start.elapsed();
+        let mut work = backend.work() - before;
+        work.bytes_uploaded += posed.bytes_uploaded;
         Ok(Shot {
             frame,
             compose: done - rendered,
             total: planned + done,
-            work: backend.work() - before,
+            work,
         })
     }
 
