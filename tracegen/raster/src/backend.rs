@@ -71,6 +71,29 @@ pub struct Work {
     pub samplers: u64,
 }
 
+impl std::ops::Sub for Work {
+    type Output = Self;
+
+    /// What was done since `earlier`.
+    fn sub(self, earlier: Self) -> Self {
+        Self {
+            regions: self.regions - earlier.regions,
+            draws: self.draws - earlier.draws,
+            calls: self.calls - earlier.calls,
+            state_changes: self.state_changes - earlier.state_changes,
+            vertices: self.vertices - earlier.vertices,
+            triangles: self.triangles - earlier.triangles,
+            bytes_uploaded: self.bytes_uploaded - earlier.bytes_uploaded,
+            submitting: self.submitting - earlier.submitting,
+            waiting: self.waiting - earlier.waiting,
+            composing: self.composing - earlier.composing,
+            shadow_maps: self.shadow_maps - earlier.shadow_maps,
+            pipelines: self.pipelines - earlier.pipelines,
+            samplers: self.samplers - earlier.samplers,
+        }
+    }
+}
+
 /// A driver that renders a scene and hands over what its fragments sampled.
 ///
 /// A backend owns the uploaded scene. It renders one region of one layer at a time, so that the

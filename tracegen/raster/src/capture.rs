@@ -137,6 +137,25 @@ impl CaptureJob<'_> {
         backend.compose(frame)
     }
 
+    /// Renders every layer of a frame without capture. The frame's shadow maps have been rendered.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn render_layers(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<(), RasterError> {
+        for view in frame.views() {
+            let whole = Region {
+                origin_px: [0, 0],
+                size_px: view.layer.size_px,
+            };
+            backend.render(self.draws, &view, whole, None)?;
+        }
+        Ok(())
+    }
+
     /// Renders a frame without capture: every layer, pictures composed and read back. The frame's
     /// shadow maps have been rendered.
     ///
@@ -148,13 +167,7 @@ impl CaptureJob<'_> {
         frame: &Frame,
     ) -> Result<(Pictures, Duration), RasterError> {
         let start = Instant::now();
-        for view in frame.views() {
-            let whole = Region {
-                origin_px: [0, 0],
-                size_px: view.layer.size_px,
-            };
-            backend.render(self.draws, &view, whole, None)?;
-        }
+        self.render_layers(backend, frame)?;
         let pictures = pictures(backend, frame)?;
         Ok((pictures, start.elapsed()))
     }

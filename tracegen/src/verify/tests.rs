@@ -121,6 +121,7 @@ fn capture_as(
             seed: 0,
             hmd: display(size_px),
             frames: vec![views.clone()],
+            surfaces: None,
         },
         textures,
         samplers,

@@ -8,6 +8,8 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Its queue.
     pub queue: wgpu::Queue,
+    /// Name of the device.
+    pub adapter: String,
     /// Driver string as it names itself.
     pub driver: String,
     /// It runs on the processor.
@@ -97,6 +99,7 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
     Ok(Gpu {
         device,
         queue,
+        adapter: info.name.clone(),
         driver,
         is_software: info.device_type == wgpu::DeviceType::Cpu,
         no_capture,
