@@ -82,15 +82,9 @@ impl Part {
                     s.hidden_area_mask = true;
                 },
             ),
-            Self::new(
-                "multiview",
-                "Multiview",
-                true,
-                Setting::Multiview,
-                |s| {
-                    s.multiview = true;
-                },
-            ),
+            Self::new("multiview", "Multiview", true, Setting::Multiview, |s| {
+                s.multiview = true;
+            }),
             Self::new(
                 "far-field",
                 "Mono far field, 1 px",
