@@ -55,7 +55,7 @@ pub struct Work {
     pub vertices: u64,
     /// Triangles of the draws.
     pub triangles: u64,
-    /// Bytes written to the driver for views and lists of draws.
+    /// Bytes written to the driver for views, lists of draws, and draws that move.
     pub bytes_uploaded: u64,
     /// Time of batching, encoding and submitting views, pictures with their records left out.
     pub submitting: Duration,
@@ -89,6 +89,9 @@ pub trait CaptureBackend {
 
     /// What was done so far.
     fn work(&self) -> Work;
+
+    /// Takes over where the draws that move stand now; the others stand as they were uploaded.
+    fn pose(&mut self, draws: &DrawList);
 
     /// Renders the shadow maps of a frame, if its lighting has any.
     ///

@@ -177,11 +177,11 @@ impl DrawList {
         })
     }
 
-    /// Puts the draws that move where they are at a time, transforms and bounds, and tells which.
-    /// `scene` is the one that the list was made of, with its instances as they were.
-    pub fn pose(&mut self, scene: &Scene, time_s: f32) -> &[u32] {
+    /// Puts the draws that move where they are at a time, transforms and bounds. `scene` is the one
+    /// that the list was made of, with its instances as they were.
+    pub fn pose(&mut self, scene: &Scene, time_s: f32) {
         if self.moving.is_empty() {
-            return &[];
+            return;
         }
         let moved: HashMap<usize, Affine3A> = scene.moved(time_s).collect();
         for &draw in &self.moving {
@@ -194,7 +194,6 @@ impl DrawList {
         }
         let bounds = |&draw: &u32| (draw, self.calls[draw as usize].bounds);
         self.hierarchy.refit(self.moving.iter().map(bounds));
-        &self.moving
     }
 
     /// Indices of the draws that a view or a shadow cascade may see, ascending.
@@ -459,7 +458,8 @@ mod tests {
         let mut draws = DrawList::new(&scene, 0).unwrap();
         let at_rest: Vec<_> = draws.calls.iter().map(|c| (c.instance, c.bounds)).collect();
         assert_eq!(at_rest.iter().map(|r| r.0).collect::<Vec<_>>(), [1, 2, 0]);
-        assert_eq!(draws.pose(&scene, 1.0), [1, 2]);
+        draws.pose(&scene, 1.0);
+        assert_eq!(draws.moving, [1, 2]);
         assert_eq!(draws.calls[0].bounds, at_rest[0].1);
         for call in &draws.calls[1..] {
             let [low, high] = call.bounds;

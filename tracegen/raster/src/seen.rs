@@ -30,6 +30,15 @@ impl CaptureJob<'_> {
             return Ok(vec![Some(0); scene.images.len()]);
         }
         let mut finest = vec![None; scene.images.len()];
+        // What moves is elsewhere in every frame, and little: whatever it has is wanted.
+        for &draw in &self.draws.moving {
+            let material = &scene.materials[self.draws.calls[draw as usize].material];
+            for texture in material.textures().iter().flatten() {
+                if let Some(level) = finest.get_mut(texture.image) {
+                    *level = Some(0);
+                }
+            }
+        }
         for views in frames {
             let frame = self.boxes_seen(views)?;
             for view in frame.views() {

@@ -1,6 +1,6 @@
 //! Vertices and instances as the shader reads them.
 
-use crate::draws::DrawList;
+use crate::draws::{DrawCall, DrawList};
 use glam::{Mat4, Vec4};
 use scene::Mesh;
 
@@ -23,6 +23,27 @@ pub(crate) const VERTEX_STRIDE: u64 = size_of::<VertexData>() as u64;
 pub(crate) struct InstanceData {
     world_from_object: [[f32; 4]; 4],
     normal_from_object: [[f32; 4]; 4],
+}
+
+impl InstanceData {
+    /// The row of a draw.
+    pub fn new(draw: u32, call: &DrawCall) -> Self {
+        let matrix = glam::Mat3::from(call.transform.matrix3);
+        let inverse = matrix.inverse().transpose();
+        // A flattened instance has no inverse; its normals keep the object's direction.
+        let normal = if inverse.is_finite() { inverse } else { matrix };
+        let mut normal_from_object = Mat4::from_mat3(normal);
+        normal_from_object.w_axis = Vec4::new(
+            f32::from_bits(draw),
+            f32::from_bits(call.first_primitive),
+            0.0,
+            1.0,
+        );
+        Self {
+            world_from_object: Mat4::from(call.transform).to_cols_array_2d(),
+            normal_from_object: normal_from_object.to_cols_array_2d(),
+        }
+    }
 }
 
 /// Interleaves a mesh's vertices; what it lacks gets a default.
@@ -74,23 +95,7 @@ pub(crate) fn pack_colors(mesh: &Mesh) -> Vec<ColorData> {
 pub(crate) fn instances(draws: &DrawList) -> Vec<InstanceData> {
     let mut rows: Vec<InstanceData> = (0_u32..)
         .zip(&draws.calls)
-        .map(|(draw, call)| {
-            let matrix = glam::Mat3::from(call.transform.matrix3);
-            let inverse = matrix.inverse().transpose();
-            // A flattened instance has no inverse; its normals keep the object's direction.
-            let normal = if inverse.is_finite() { inverse } else { matrix };
-            let mut normal_from_object = Mat4::from_mat3(normal);
-            normal_from_object.w_axis = Vec4::new(
-                f32::from_bits(draw),
-                f32::from_bits(call.first_primitive),
-                0.0,
-                1.0,
-            );
-            InstanceData {
-                world_from_object: Mat4::from(call.transform).to_cols_array_2d(),
-                normal_from_object: normal_from_object.to_cols_array_2d(),
-            }
-        })
+        .map(|(draw, call)| InstanceData::new(draw, call))
         .collect();
     if rows.is_empty() {
         rows.push(bytemuck::Zeroable::zeroed());

@@ -14,6 +14,14 @@ pub enum SceneError {
         /// Names the built-in scenes, or is empty where they are not meant.
         or_built_in: String,
     },
+    /// A built-in scene with a parameter that it cannot have.
+    #[error("scene '{spec}': expected {expected}")]
+    Parameter {
+        /// As given.
+        spec: String,
+        /// What can be asked for.
+        expected: String,
+    },
     /// A file that cannot be read.
     #[error("{}: {place}: cannot read: {reason}", path(file))]
     Io {

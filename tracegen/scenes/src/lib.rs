@@ -25,17 +25,22 @@ pub mod music_box;
 pub mod music_train;
 pub mod noise;
 pub mod organic;
+pub mod plant;
+pub mod plant_machines;
+pub mod plant_materials;
+pub mod plant_parts;
 pub mod scene_builder;
 pub mod teapot;
 pub mod teapot_patches;
 pub mod texture_synth;
 
 use scene::{LoadOptions, Loaded, Scene, SceneError};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 /// A built-in scene. What the table says of it is held true by a test, so that listing the scenes
 /// builds none.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Builtin {
     /// Name on the command line.
     pub name: &'static str,
@@ -45,7 +50,18 @@ pub struct Builtin {
     pub triangles: u64,
     /// Its cameras; the first is the default.
     pub cameras: &'static [&'static str],
-    builder: fn() -> Scene,
+    /// Numbers of instances that can be asked for with `name:NUMBER`.
+    pub instances: Option<RangeInclusive<u32>>,
+    builder: Builder,
+}
+
+/// How a scene is built.
+#[derive(Clone, Copy, Debug)]
+enum Builder {
+    /// Always the same.
+    Fixed(fn() -> Scene),
+    /// With a number of instances; the usual one first.
+    Sized(u32, fn(u32) -> Scene),
 }
 
 /// The built-in scenes.
@@ -55,79 +71,119 @@ pub const BUILTINS: &[Builtin] = &[
         description: "two-storey colonnaded courtyard, 26 materials with three to four maps each",
         triangles: 274_152,
         cameras: &["default", "gallery", "arcade"],
-        builder: atrium::rich,
+        instances: None,
+        builder: Builder::Fixed(atrium::rich),
     },
     Builtin {
         name: "atrium-plain",
         description: "the same architecture with few simple textures",
         triangles: 66_672,
         cameras: &["default", "gallery", "arcade"],
-        builder: atrium::plain,
+        instances: None,
+        builder: Builder::Fixed(atrium::plain),
     },
     Builtin {
         name: "atrium-shadows",
         description: "atrium-plain with four cascaded shadow maps",
         triangles: 66_672,
         cameras: &["default", "gallery", "arcade"],
-        builder: atrium::shadows,
+        instances: None,
+        builder: Builder::Fixed(atrium::shadows),
     },
     Builtin {
         name: "jungle",
         description: "temple ruin among instanced foliage with alpha masks, one shadow map",
         triangles: 440_886,
         cameras: &["default", "ruin", "thicket"],
-        builder: jungle::scene,
+        instances: None,
+        builder: Builder::Fixed(jungle::scene),
     },
     Builtin {
         name: "teapot",
         description: "the Utah teapot on a polished floor",
         triangles: 14_972,
         cameras: &["default", "low"],
-        builder: teapot::scene,
+        instances: None,
+        builder: Builder::Fixed(teapot::scene),
     },
     Builtin {
         name: "chess",
         description: "a chess set on a reflective board",
         triangles: 42_468,
         cameras: &["default", "low"],
-        builder: chess::scene,
+        instances: None,
+        builder: Builder::Fixed(chess::scene),
     },
     Builtin {
         name: "car",
         description: "a sports car in a studio, paint, glass and chrome",
         triangles: 55_596,
         cameras: &["default", "rear", "side"],
-        builder: car::scene,
+        instances: None,
+        builder: Builder::Fixed(car::scene),
     },
     Builtin {
         name: "lab",
         description: "glassware on a chemistry bench, refraction",
         triangles: 97_886,
         cameras: &["default", "side"],
-        builder: lab::scene,
+        instances: None,
+        builder: Builder::Fixed(lab::scene),
     },
     Builtin {
         name: "music-box",
         description: "gears, comb and pinned cylinder in reflective brass and steel",
         triangles: 106_752,
         cameras: &["default", "train"],
-        builder: music_box::scene,
+        instances: None,
+        builder: Builder::Fixed(music_box::scene),
     },
     Builtin {
         name: "meadow",
         description: "lavender rows before a farm house",
         triangles: 599_974,
         cameras: &["default", "yard", "rows"],
-        builder: meadow::scene,
+        instances: None,
+        builder: Builder::Fixed(meadow::scene),
+    },
+    Builtin {
+        name: "plant",
+        description: "industrial hall of 20,000 instances (plant:N has N) under moving cranes",
+        triangles: 1_037_726,
+        cameras: &["default", "aisle", "walkway", "pumps", "overview"],
+        instances: Some(plant::INSTANCES),
+        builder: Builder::Sized(plant::DEFAULT_INSTANCES, plant::with_instances),
     },
 ];
 
 /// Builds a built-in scene; `None` if there is none of that name. The same name gives the same
 /// scene, bit for bit, whatever the number of threads.
-#[must_use]
-pub fn build(name: &str) -> Option<Scene> {
-    let found = BUILTINS.iter().find(|b| b.name == name)?;
-    Some((found.builder)())
+///
+/// # Errors
+/// A number of instances (`name:NUMBER`) that the scene cannot have.
+pub fn build(spec: &str) -> Result<Option<Scene>, SceneError> {
+    let (name, number) = match spec.split_once(':') {
+        Some((name, number)) => (name, Some(number)),
+        None => (spec, None),
+    };
+    let Some(found) = BUILTINS.iter().find(|b| b.name == name) else {
+        return Ok(None);
+    };
+    let refused = |expected: String| SceneError::Parameter {
+        spec: spec.to_owned(),
+        expected,
+    };
+    match (found.builder, &found.instances, number) {
+        (Builder::Fixed(build), _, None) => Ok(Some(build())),
+        (Builder::Sized(usual, build), _, None) => Ok(Some(build(usual))),
+        (Builder::Sized(_, build), Some(range), Some(number)) => {
+            let number = number.parse().ok().filter(|number| range.contains(number));
+            let (low, high) = (range.start(), range.end());
+            let expected = || format!("{name}:N with N instances from {low} to {high}");
+            Ok(Some(build(number.ok_or_else(|| refused(expected()))?)))
+        }
+        (_, _, Some(_)) => Err(refused(format!("{name}, which has no parameter"))),
+    }
 }
 
 /// Loads a built-in scene by name, or a glTF or OBJ file by path, with all its images.
@@ -143,7 +199,7 @@ pub fn load(spec: &str) -> Result<Scene, SceneError> {
 /// # Errors
 /// See [`SceneError`].
 pub fn load_with(spec: &str, options: &LoadOptions) -> Result<Loaded, SceneError> {
-    if let Some(mut scene) = build(spec) {
+    if let Some(mut scene) = build(spec)? {
         scene::complete(&mut scene);
         if options.slots != LoadOptions::ALL.slots {
             scene.keep_texture_slots(options.slots);

@@ -3,7 +3,7 @@
 use super::mesh_builder::MeshBuilder;
 use super::texture_synth::{Map, Recipe, Rgb, linear};
 use glam::{Affine3A, Vec3};
-use scene::{Camera, Instance, Light, Material, Scene, TextureRef};
+use scene::{Camera, Instance, Light, Material, Motion, Movement, Scene, TextureRef};
 
 /// A material's index, with what a mesh needs to know of it.
 #[derive(Clone, Copy, Debug)]
@@ -107,6 +107,14 @@ impl SceneBuilder {
     /// Places a mesh.
     pub fn place(&mut self, mesh: usize, transform: Affine3A) {
         self.scene.instances.push(Instance { mesh, transform });
+    }
+
+    /// Lets instances move, by their numbers in the order in which they were placed.
+    pub fn motion(&mut self, instances: Vec<usize>, movements: Vec<Movement>) {
+        self.scene.motions.push(Motion {
+            instances,
+            movements,
+        });
     }
 
     /// Adds a mesh that stands where it was modelled.

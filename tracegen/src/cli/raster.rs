@@ -116,7 +116,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         setup.scene.shadow_cascades.min(CASCADES)
     };
     progress.stage("preparing textures and shaders", 0, "");
-    let draws = DrawList::new(&setup.scene, cascades)?;
+    let mut draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
     let bounds = setup.scene.bounds().unwrap_or_default();
     let planner = Planner::new(
@@ -126,15 +126,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         args.views.eyes(),
         args.path.fps,
     )?;
-    let job = CaptureJob {
-        scene: &setup.scene,
-        draws: &draws,
-        lighting: Lighting::new(&setup.scene),
-        bounds,
-        shadow_range_m: shadow_range_m(&setup, bounds),
-        planner: &planner,
-        skips: Skips::without(&args.no_skip),
-    };
+    let job = job(args, &setup, &draws, &planner, bounds);
     let finest = job.finest_levels(&setup.frames)?;
     let searched = started.elapsed();
     let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
@@ -185,6 +177,10 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let mut first_pictures: Option<Pictures> = None;
     let mut first_pass = 0;
     for views in &setup.frames {
+        let time_s = setup.moments.time_s(views.frame);
+        draws.pose(&setup.scene, time_s);
+        backend.pose(&draws);
+        let job = self::job(args, &setup, &draws, &planner, bounds);
         let frame = match first.take() {
             Some(first) => first,
             None => {
@@ -241,6 +237,25 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     note(&texels);
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
+}
+
+/// What to capture of the draws where they stand.
+fn job<'a>(
+    args: &RasterArgs,
+    setup: &'a SceneSetup,
+    draws: &'a DrawList,
+    planner: &'a Planner,
+    bounds: (glam::Vec3, glam::Vec3),
+) -> CaptureJob<'a> {
+    CaptureJob {
+        scene: &setup.scene,
+        draws,
+        lighting: Lighting::new(&setup.scene),
+        bounds,
+        shadow_range_m: shadow_range_m(setup, bounds),
+        planner,
+        skips: Skips::without(&args.no_skip),
+    }
 }
 
 /// Near and far end of the cascades: from the near plane to where the scene ends.

@@ -113,11 +113,13 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
 /// Builds the hierarchy and everything of the trace but its tiles.
 fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, RaytraceTables)> {
     let SceneSetup {
-        scene,
+        mut scene,
         camera,
         hmd,
         frames,
+        moments,
     } = setup;
+    scene.pose(moments.time_s(moments.frames.start));
     let scene_triangles = scene.triangle_count();
     let scene = TraceScene::new(scene)?;
     let traversal = match args.bvh {

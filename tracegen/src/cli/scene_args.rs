@@ -4,6 +4,7 @@ use super::path_args::PathArgs;
 use clap::Args;
 use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::Vec3;
+use scene::paths::Moments;
 use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd};
 use scenes::load_with;
 use shell::Output;
@@ -35,6 +36,8 @@ pub struct SceneSetup {
     pub hmd: Hmd,
     /// The eyes' matrices by frame.
     pub frames: Vec<FrameViews>,
+    /// When the frames are.
+    pub moments: Moments,
 }
 
 impl SceneArgs {
@@ -85,6 +88,7 @@ impl SceneArgs {
             camera,
             hmd,
             frames,
+            moments,
         })
     }
 }

@@ -20,6 +20,7 @@ use textures::TextureSet;
 
 mod culling;
 mod layers;
+mod motion;
 
 const SIZE_PX: [u32; 2] = [200, 136];
 const BUDGET: u64 = 128 << 20;

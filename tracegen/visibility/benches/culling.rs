@@ -35,7 +35,7 @@ fn boxes(count: usize, [low, high]: [Vec3; 2]) -> Vec<[Vec3; 2]> {
         .collect()
 }
 
-/// A head in the middle of the hall, 25 m of which lie within the far plane.
+/// A head in the middle of the hall, looking along it.
 fn rig() -> Rig {
     let hmd = hmd::preset(hmd::PRESETS[0]).unwrap();
     let camera = Camera {

@@ -264,6 +264,10 @@ impl CaptureBackend for Lavapipe {
         }
     }
 
+    fn pose(&mut self, draws: &DrawList) {
+        self.work.bytes_uploaded += self.scene.pose(&self.gpu, draws);
+    }
+
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError> {
         let lighting = &frame.lighting;
         if lighting.cascades.is_empty() {

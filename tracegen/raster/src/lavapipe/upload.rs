@@ -6,7 +6,7 @@ use crate::draws::DrawList;
 use crate::error::RasterError;
 use crate::shader::{MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
 use crate::uniforms::MaterialData;
-use crate::vertices::{self, VERTEX_STRIDE};
+use crate::vertices::{self, InstanceData, VERTEX_STRIDE};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
 use scene::{Material, Mesh, Scene};
 use textures::{CompressedTexture, TextureSet};
@@ -83,7 +83,7 @@ impl SceneBuffers {
             .create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some("instances"),
                 contents: bytemuck::cast_slice(&instances),
-                usage: wgpu::BufferUsages::STORAGE,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
             });
         let instance_draws = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("draws by instance"),
@@ -98,6 +98,23 @@ impl SceneBuffers {
             instance_draws,
             samplers: samplers.made.len(),
         })
+    }
+}
+
+impl SceneBuffers {
+    /// Writes the rows of the draws that move, those of consecutive draws at once; tells the bytes.
+    pub fn pose(&self, gpu: &Gpu, draws: &DrawList) -> u64 {
+        let mut bytes = 0;
+        for run in draws.moving.chunk_by(|a, b| a + 1 == *b) {
+            let rows: Vec<InstanceData> = (run.iter())
+                .map(|&draw| InstanceData::new(draw, &draws.calls[draw as usize]))
+                .collect();
+            let contents: &[u8] = bytemuck::cast_slice(&rows);
+            let offset = u64::from(run[0]) * size_of::<InstanceData>() as u64;
+            gpu.queue.write_buffer(&self.instances, offset, contents);
+            bytes += contents.len() as u64;
+        }
+        bytes
     }
 }
 

@@ -1,0 +1,477 @@
+//! What stands in the plant: tanks, pumps, machines, conveyors, racks and their loads, and the
+//! crane, each about its own origin on the floor.
+
+use super::mesh_builder::{MeshBuilder, sharp, smooth};
+use super::plant_materials::Kit;
+use super::plant_parts::{NAVE_M, bar};
+use super::scene_builder::SceneBuilder;
+use glam::{Affine3A, Vec3, vec3};
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+/// Mesh numbers.
+pub(super) struct Machines {
+    pub(super) tank: usize,
+    pub(super) vessel: usize,
+    pub(super) tank_leg: usize,
+    pub(super) saddle: usize,
+    pub(super) ladder: usize,
+    pub(super) pump: usize,
+    pub(super) motor: usize,
+    pub(super) plinth: usize,
+    pub(super) mill: usize,
+    pub(super) mill_guard: usize,
+    pub(super) press: usize,
+    pub(super) cabinet: usize,
+    pub(super) panel: usize,
+    pub(super) signal: [usize; 2],
+    pub(super) conveyor: usize,
+    pub(super) roller: usize,
+    pub(super) upright: usize,
+    pub(super) beam: usize,
+    pub(super) pallet: usize,
+    pub(super) crate_box: usize,
+    pub(super) carton: usize,
+    pub(super) drum: usize,
+    pub(super) bin: usize,
+    pub(super) bench: usize,
+    pub(super) girder: usize,
+    pub(super) end_truck: usize,
+    pub(super) trolley: usize,
+    pub(super) rope: usize,
+    pub(super) hook: usize,
+    pub(super) cart: usize,
+    pub(super) wheel: usize,
+}
+
+fn block(low: [f32; 3], high: [f32; 3], bevel: f32) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.block(Vec3::from(low), Vec3::from(high), bevel);
+    m
+}
+
+fn boxes(list: &[([f32; 3], [f32; 3])], bevel: f32) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    for (low, high) in list {
+        m.block(Vec3::from(*low), Vec3::from(*high), bevel);
+    }
+    m
+}
+
+/// An upright tank of radius 1.1 m from 0.7 m to 4.4 m above the floor.
+fn tank() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.lathe(
+        &[
+            smooth(0.0, 0.62),
+            smooth(0.7, 0.7),
+            smooth(1.05, 0.92),
+            sharp(1.1, 1.1),
+            sharp(1.1, 2.2),
+            sharp(1.13, 2.2),
+            sharp(1.13, 2.26),
+            sharp(1.1, 2.26),
+            sharp(1.1, 3.9),
+            smooth(1.02, 4.1),
+            smooth(0.6, 4.3),
+            sharp(0.3, 4.36),
+            sharp(0.3, 4.5),
+            sharp(0.0, 4.5),
+        ],
+        18,
+    );
+    m
+}
+
+/// A vessel of radius 0.6 m that lies along z from 0 to 4.2 m, its axis at the origin's height.
+fn vessel() -> MeshBuilder {
+    let mut upright = MeshBuilder::new();
+    upright.lathe(
+        &[
+            smooth(0.0, 0.0),
+            smooth(0.42, 0.08),
+            sharp(0.6, 0.3),
+            sharp(0.6, 0.9),
+            sharp(0.68, 0.9),
+            sharp(0.68, 1.0),
+            sharp(0.6, 1.0),
+            sharp(0.6, 3.9),
+            smooth(0.42, 4.12),
+            smooth(0.0, 4.2),
+        ],
+        16,
+    );
+    let mut m = MeshBuilder::new();
+    m.merge(&upright, Affine3A::from_rotation_x(FRAC_PI_2));
+    m
+}
+
+fn ladder() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    for x in [-0.22, 0.22] {
+        m.block(vec3(x - 0.02, 0.0, -0.03), vec3(x + 0.02, 4.6, 0.03), 0.0);
+    }
+    for i in 1..15 {
+        let y = 0.3 * i as f32;
+        m.block(
+            vec3(-0.2, y - 0.012, -0.012),
+            vec3(0.2, y + 0.012, 0.012),
+            0.0,
+        );
+    }
+    m
+}
+
+/// A centrifugal pump: shaft towards +z at 0.35 m, suction along -z, discharge up to 0.95 m.
+fn pump() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    let mut volute = MeshBuilder::new();
+    volute.lathe(
+        &[
+            sharp(0.09, -0.42),
+            sharp(0.16, -0.42),
+            sharp(0.16, -0.38),
+            sharp(0.09, -0.38),
+            smooth(0.1, -0.16),
+            smooth(0.24, -0.12),
+            smooth(0.27, 0.0),
+            smooth(0.2, 0.12),
+            smooth(0.1, 0.16),
+            sharp(0.08, 0.34),
+            sharp(0.0, 0.34),
+        ],
+        14,
+    );
+    let place = Affine3A::from_translation(Vec3::Y * 0.35) * Affine3A::from_rotation_x(FRAC_PI_2);
+    m.merge(&volute, place);
+    let mut neck = MeshBuilder::new();
+    neck.lathe(
+        &[
+            sharp(0.09, 0.4),
+            sharp(0.09, 0.9),
+            sharp(0.15, 0.9),
+            sharp(0.15, 0.95),
+            sharp(0.0, 0.95),
+        ],
+        10,
+    );
+    m.merge(&neck, Affine3A::from_translation(Vec3::X * 0.12));
+    m.block(vec3(-0.16, 0.0, -0.1), vec3(0.16, 0.14, 0.1), 0.0);
+    m
+}
+
+/// An electric motor along z, its shaft end at the origin, 0.35 m above the floor.
+fn motor() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    let mut body = MeshBuilder::new();
+    let outline = [
+        sharp(0.0, -0.02),
+        sharp(0.06, -0.02),
+        sharp(0.06, 0.06),
+        sharp(0.2, 0.08),
+        sharp(0.22, 0.12),
+        sharp(0.22, 0.62),
+        smooth(0.2, 0.68),
+        sharp(0.0, 0.7),
+    ];
+    // Cooling fins.
+    body.lathe_shaped(&outline, 32, |angle, y| {
+        let finned = f32::from(u8::from((0.12..0.63).contains(&y)));
+        1.0 - 0.09 * finned * f32::from(u8::from((angle / TAU * 32.0).round() as i32 % 2 == 0))
+    });
+    let place = Affine3A::from_translation(Vec3::Y * 0.35) * Affine3A::from_rotation_x(FRAC_PI_2);
+    m.merge(&body, place);
+    m.block(vec3(-0.1, 0.5, 0.25), vec3(0.1, 0.68, 0.45), 0.0);
+    for x in [-0.17, 0.11] {
+        m.block(vec3(x, 0.0, 0.2), vec3(x + 0.06, 0.2, 0.55), 0.0);
+    }
+    m
+}
+
+/// A machining centre, 2.6 m wide along x, 1.8 m deep; its door faces -z.
+fn mill() -> MeshBuilder {
+    let mut m = boxes(
+        &[
+            ([-1.3, 0.0, -0.8], [1.3, 0.75, 0.9]),
+            ([-1.3, 0.75, -0.1], [-0.95, 2.1, 0.9]),
+            ([0.75, 0.75, -0.8], [1.3, 2.1, 0.9]),
+            ([-0.95, 0.75, 0.5], [0.75, 2.1, 0.9]),
+            ([-1.3, 2.1, -0.8], [1.3, 2.35, 0.9]),
+        ],
+        0.03,
+    );
+    // Spindle head above a table with a vice.
+    m.block(vec3(-0.3, 1.5, 0.0), vec3(0.1, 2.1, 0.45), 0.0);
+    let mut spindle = MeshBuilder::new();
+    spindle.lathe(
+        &[
+            sharp(0.0, 1.1),
+            sharp(0.03, 1.1),
+            sharp(0.05, 1.3),
+            sharp(0.12, 1.3),
+            sharp(0.12, 1.5),
+        ],
+        10,
+    );
+    m.merge(&spindle, Affine3A::from_translation(vec3(-0.1, 0.0, 0.2)));
+    m.block(vec3(-0.7, 0.75, -0.4), vec3(0.5, 0.9, 0.3), 0.0);
+    m.block(vec3(-0.25, 0.9, -0.15), vec3(0.05, 1.0, 0.1), 0.0);
+    m
+}
+
+/// A hydraulic press, 1.7 m wide and 3.4 m high.
+fn press() -> MeshBuilder {
+    let mut m = boxes(
+        &[
+            ([-0.85, 0.0, -0.6], [0.85, 0.7, 0.6]),
+            ([-0.85, 0.7, -0.35], [-0.5, 2.6, 0.35]),
+            ([0.5, 0.7, -0.35], [0.85, 2.6, 0.35]),
+            ([-0.95, 2.6, -0.6], [0.95, 3.4, 0.6]),
+            ([-0.45, 1.6, -0.3], [0.45, 1.85, 0.3]),
+        ],
+        0.02,
+    );
+    let mut ram = MeshBuilder::new();
+    ram.lathe(&[sharp(0.18, 1.85), sharp(0.18, 2.6)], 12);
+    m.merge(&ram, Affine3A::IDENTITY);
+    m
+}
+
+/// A pallet of 1.2 m along x by 0.8 m.
+fn pallet() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    for i in 0..5 {
+        let z = -0.4 + 0.175 * i as f32;
+        m.block(vec3(-0.6, 0.12, z), vec3(0.6, 0.144, z + 0.1), 0.0);
+    }
+    for z in [-0.4, -0.05, 0.3] {
+        m.block(vec3(-0.6, 0.0, z), vec3(0.6, 0.12, z + 0.1), 0.0);
+    }
+    m
+}
+
+fn drum() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.lathe(
+        &[
+            sharp(0.29, 0.0),
+            sharp(0.29, 0.28),
+            smooth(0.305, 0.3),
+            sharp(0.29, 0.32),
+            sharp(0.29, 0.58),
+            smooth(0.305, 0.6),
+            sharp(0.29, 0.62),
+            sharp(0.29, 0.88),
+            sharp(0.27, 0.88),
+            sharp(0.27, 0.86),
+            sharp(0.0, 0.86),
+        ],
+        12,
+    );
+    m
+}
+
+/// Uprights of a pallet rack with their bracing, 1.1 m deep along x and 4.6 m high.
+fn upright() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    for x in [-0.55, 0.47] {
+        m.block(vec3(x, 0.0, -0.05), vec3(x + 0.08, 4.6, 0.05), 0.0);
+    }
+    for i in 0..4 {
+        let (y, flip) = (0.3 + 1.05 * i as f32, if i % 2 == 0 { 1.0 } else { -1.0 });
+        bar(
+            &mut m,
+            vec3(-0.5 * flip, y, 0.0),
+            vec3(0.5 * flip, y + 1.0, 0.0),
+            0.035,
+        );
+    }
+    m
+}
+
+/// 2 m of a roller conveyor's frame along z, 0.7 m wide, without its rollers.
+fn conveyor() -> MeshBuilder {
+    boxes(
+        &[
+            ([-0.36, 0.62, 0.0], [-0.32, 0.78, 2.0]),
+            ([0.32, 0.62, 0.0], [0.36, 0.78, 2.0]),
+            ([-0.36, 0.0, 0.2], [-0.3, 0.62, 0.26]),
+            ([0.3, 0.0, 0.2], [0.36, 0.62, 0.26]),
+            ([-0.36, 0.0, 1.74], [-0.3, 0.62, 1.8]),
+            ([0.3, 0.0, 1.74], [0.36, 0.62, 1.8]),
+        ],
+        0.0,
+    )
+}
+
+fn hook() -> MeshBuilder {
+    let mut m = block([-0.22, 0.35, -0.16], [0.22, 0.95, 0.16], 0.03);
+    let curve: Vec<(Vec3, f32)> = (0..=8)
+        .map(|i| {
+            let a = -0.5 * std::f32::consts::PI + 1.5 * std::f32::consts::PI * i as f32 / 8.0;
+            let (sin, cos) = (FRAC_PI_2 - a).sin_cos();
+            (
+                vec3(0.17 * sin, 0.12 + 0.17 * cos, 0.0),
+                0.05 - 0.003 * i as f32,
+            )
+        })
+        .rev()
+        .collect();
+    m.tube(&curve, 6);
+    m.block(vec3(-0.04, 0.25, -0.04), vec3(0.04, 0.4, 0.04), 0.0);
+    m
+}
+
+/// Adds all of them.
+pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
+    let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
+    let mut leg = MeshBuilder::new();
+    leg.block(vec3(-0.06, 0.02, -0.06), vec3(0.06, 1.2, 0.06), 0.0);
+    leg.block(vec3(-0.14, 0.0, -0.14), vec3(0.14, 0.02, 0.14), 0.0);
+    let mut signal = MeshBuilder::new();
+    signal.lathe(
+        &[sharp(0.05, 0.0), sharp(0.05, 0.14), smooth(0.0, 0.17)],
+        10,
+    );
+    let mut roller = MeshBuilder::new();
+    let mut turned = MeshBuilder::new();
+    turned.lathe(
+        &[
+            sharp(0.0, 0.0),
+            sharp(0.035, 0.0),
+            sharp(0.035, 0.64),
+            sharp(0.0, 0.64),
+        ],
+        8,
+    );
+    roller.merge(
+        &turned,
+        Affine3A::from_translation(Vec3::X * 0.32) * Affine3A::from_rotation_z(FRAC_PI_2),
+    );
+    let mut panel = MeshBuilder::new();
+    panel.surface(1, 1, |s, t| {
+        (
+            vec3(0.9 * (0.5 - s), 0.7 + 1.2 * t, -0.256),
+            glam::vec2(s, 1.0 - t),
+        )
+    });
+    let mut rope = MeshBuilder::new();
+    for (x, z) in [(-0.12, -0.05), (-0.12, 0.05), (0.12, -0.05), (0.12, 0.05)] {
+        let at = vec3(x, 0.0, z);
+        rope.tube(&[(at, 0.014), (at + Vec3::Y * 3.5, 0.014)], 5);
+    }
+    let span = NAVE_M - 1.5;
+    let mut wheel = MeshBuilder::new();
+    let mut tyre = MeshBuilder::new();
+    tyre.lathe(
+        &[
+            sharp(0.0, -0.05),
+            sharp(0.14, -0.05),
+            sharp(0.14, 0.05),
+            sharp(0.0, 0.05),
+        ],
+        12,
+    );
+    wheel.merge(&tyre, Affine3A::from_rotation_z(FRAC_PI_2));
+    // Rails and wheels of the trolley ride on the girders' tops at 0.9 m.
+    let girder = boxes(
+        &[
+            ([-span / 2.0, 0.0, -0.22], [span / 2.0, 0.9, 0.22]),
+            ([-span / 2.0, 0.9, -0.04], [span / 2.0, 0.96, 0.04]),
+        ],
+        0.0,
+    );
+    let trolley = boxes(
+        &[
+            ([-0.9, 0.2, -1.3], [0.9, 0.4, 1.3]),
+            ([-0.5, 0.4, -0.5], [0.5, 1.15, 0.5]),
+            ([0.5, 0.4, -0.3], [0.85, 0.8, 0.3]),
+            ([-0.9, 0.0, -1.15], [-0.5, 0.2, -0.85]),
+            ([0.5, 0.0, -1.15], [0.9, 0.2, -0.85]),
+            ([-0.9, 0.0, 0.85], [-0.5, 0.2, 1.15]),
+            ([0.5, 0.0, 0.85], [0.9, 0.2, 1.15]),
+        ],
+        0.0,
+    );
+    let bench = boxes(
+        &[
+            ([-1.0, 0.86, -0.4], [1.0, 0.92, 0.4]),
+            ([-0.95, 0.0, -0.35], [-0.88, 0.86, 0.35]),
+            ([0.88, 0.0, -0.35], [0.95, 0.86, 0.35]),
+            ([0.3, 0.35, -0.35], [0.88, 0.86, 0.3]),
+        ],
+        0.0,
+    );
+    Machines {
+        tank: add("tank", tank(), kit.stainless),
+        vessel: add("vessel", vessel(), kit.pipes[4]),
+        tank_leg: add("tank-leg", leg, kit.frame),
+        saddle: add(
+            "saddle",
+            block([-0.55, 0.0, -0.12], [0.55, 0.7, 0.12], 0.0),
+            kit.frame,
+        ),
+        ladder: add("ladder", ladder(), kit.crane),
+        pump: add("pump", pump(), kit.cast_iron),
+        motor: add("motor", motor(), kit.motor),
+        plinth: add(
+            "plinth",
+            block([-0.4, 0.0, -0.55], [0.4, 0.15, 1.15], 0.02),
+            kit.hazard,
+        ),
+        mill: add("mill", mill(), kit.machine),
+        mill_guard: add(
+            "mill-guard",
+            block([-0.94, 0.76, -0.79], [0.74, 2.09, -0.77], 0.0),
+            kit.guard,
+        ),
+        press: add("press", press(), kit.press),
+        cabinet: add(
+            "cabinet",
+            block([-0.5, 0.0, -0.25], [0.5, 2.0, 0.25], 0.02),
+            kit.machine,
+        ),
+        panel: add("panel", panel, kit.panel),
+        signal: std::array::from_fn(|i| add("signal", signal.clone(), kit.signals[i])),
+        conveyor: add("conveyor", conveyor(), kit.press),
+        roller: add("roller", roller, kit.zinc),
+        upright: add("rack-upright", upright(), kit.rack),
+        beam: add(
+            "shelf-beam",
+            block([-0.03, -0.06, 0.0], [0.03, 0.06, 2.9], 0.0),
+            kit.beam,
+        ),
+        pallet: add("pallet", pallet(), kit.wood),
+        crate_box: add(
+            "crate",
+            block([-0.5, 0.0, -0.38], [0.5, 0.8, 0.38], 0.015),
+            kit.wood,
+        ),
+        carton: add(
+            "carton",
+            block([-0.28, 0.0, -0.19], [0.28, 0.36, 0.19], 0.0),
+            kit.card,
+        ),
+        drum: add("drum", drum(), kit.drum),
+        bin: add(
+            "bin",
+            block([-0.18, 0.0, -0.2], [0.18, 0.26, 0.2], 0.01),
+            kit.bin,
+        ),
+        bench: add("bench", bench, kit.wood),
+        girder: add("crane-girder", girder, kit.crane),
+        end_truck: add(
+            "crane-end-truck",
+            block([-0.2, -0.1, -1.9], [0.2, 0.35, 1.9], 0.0),
+            kit.crane,
+        ),
+        trolley: add("crane-trolley", trolley, kit.hazard),
+        rope: add("crane-rope", rope, kit.rubber),
+        hook: add("crane-hook", hook(), kit.crane),
+        cart: add(
+            "cart",
+            block([-0.45, 0.12, -0.75], [0.45, 0.35, 0.75], 0.03),
+            kit.crane,
+        ),
+        wheel: add("cart-wheel", wheel, kit.rubber),
+    }
+}

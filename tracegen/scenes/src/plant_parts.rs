@@ -1,0 +1,583 @@
+//! The plant's building, pipework, cables and walkways: small meshes that are placed many times.
+//!
+//! Long parts run along +z from their origin; what stands on the floor has its origin there.
+
+use super::mesh_builder::{Frame, Knot, MeshBuilder, sharp, smooth};
+use super::plant_materials::{Kit, SERVICES};
+use super::scene_builder::SceneBuilder;
+use glam::{Affine3A, Vec3, vec3};
+use std::f32::consts::{FRAC_PI_2, TAU};
+
+/// Length of a bay, of pipes and of all else that runs through, metres.
+pub(super) const BAY_M: f32 = 6.0;
+/// Width of a nave, metres.
+pub(super) const NAVE_M: f32 = 24.0;
+/// Underside of the roof, metres.
+pub(super) const ROOF_M: f32 = 13.0;
+/// Radii of pipes, metres.
+pub(super) const RADII_M: [f32; 3] = [0.045, 0.09, 0.19];
+/// Radius of a bend's centre line in radii of its pipe.
+pub(super) const BEND: f32 = 3.0;
+
+/// Mesh numbers.
+pub(super) struct Parts {
+    pub(super) slab: usize,
+    pub(super) lane: usize,
+    pub(super) wall: usize,
+    pub(super) window: usize,
+    pub(super) deck: usize,
+    pub(super) sky_light: usize,
+    pub(super) column: usize,
+    pub(super) truss: usize,
+    pub(super) purlin: usize,
+    pub(super) runway: usize,
+    pub(super) bracket: usize,
+    pub(super) bolt: usize,
+    pub(super) lamp_shade: usize,
+    pub(super) lamp: usize,
+    /// Of bay length, by size and service.
+    pub(super) pipe: [[usize; SERVICES]; 3],
+    /// 2 m long, by size and service.
+    pub(super) spool: [[usize; SERVICES]; 3],
+    pub(super) elbow: [[usize; SERVICES]; 3],
+    pub(super) flange: [usize; 3],
+    pub(super) shoe: usize,
+    pub(super) valve: usize,
+    pub(super) gauge: usize,
+    pub(super) rack_post: usize,
+    pub(super) rack_beam: usize,
+    pub(super) tray: usize,
+    pub(super) stand: usize,
+    pub(super) cable: [usize; 3],
+    pub(super) duct: usize,
+    pub(super) diffuser: usize,
+    pub(super) sprinkler: usize,
+    pub(super) grating: usize,
+    pub(super) stringer: usize,
+    pub(super) railing: usize,
+    pub(super) leg: usize,
+    pub(super) stairs: usize,
+    pub(super) bollard: usize,
+    pub(super) sign: usize,
+    pub(super) fan_ring: usize,
+    pub(super) fan_blades: usize,
+}
+
+/// A straight prism of an outline (counter-clockwise, closed by its first point) along +z.
+fn prism(outline: &[[f32; 2]], length: f32) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    let mut knots: Vec<Knot> = outline.iter().map(|p| sharp(p[0], p[1])).collect();
+    knots.extend(knots.first().copied());
+    let frame = |z: f32| Frame {
+        origin: Vec3::Z * z,
+        right: Vec3::X,
+        up: Vec3::Y,
+        scale: 1.0,
+    };
+    m.sweep(&knots, &[frame(0.0), frame(length)]);
+    m
+}
+
+/// An outline as a prism that stands upright.
+fn upright(outline: &[[f32; 2]], height: f32) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.merge(
+        &prism(outline, height),
+        Affine3A::from_rotation_x(-FRAC_PI_2),
+    );
+    m
+}
+
+/// I-beam outline of a width, height and thickness.
+fn i_beam(w: f32, h: f32, t: f32) -> [[f32; 2]; 12] {
+    let (x, y, s) = (w / 2.0, h / 2.0, t / 2.0);
+    [
+        [-x, -y],
+        [x, -y],
+        [x, t - y],
+        [s, t - y],
+        [s, y - t],
+        [x, y - t],
+        [x, y],
+        [-x, y],
+        [-x, y - t],
+        [-s, y - t],
+        [-s, t - y],
+        [-x, t - y],
+    ]
+}
+
+fn block(low: [f32; 3], high: [f32; 3]) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.block(Vec3::from(low), Vec3::from(high), 0.0);
+    m
+}
+
+/// A box between two points, `width` thick both ways.
+pub(super) fn bar(m: &mut MeshBuilder, from: Vec3, to: Vec3, width: f32) {
+    let length = from.distance(to);
+    let h = width / 2.0;
+    let rotation = glam::Quat::from_rotation_arc(Vec3::Z, (to - from).normalize_or(Vec3::Z));
+    m.merge(
+        &block([-h, -h, 0.0], [h, h, length]),
+        Affine3A::from_rotation_translation(rotation, from),
+    );
+}
+
+fn pipe(radius: f32, length: f32, sides: usize) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.tube(&[(Vec3::ZERO, radius), (Vec3::Z * length, radius)], sides);
+    m
+}
+
+/// From the origin along +z, bent to +y.
+fn elbow(radius: f32, sides: usize) -> MeshBuilder {
+    let bend = BEND * radius;
+    let mut m = MeshBuilder::new();
+    let points: Vec<(Vec3, f32)> = (0..=5)
+        .map(|i| {
+            let (sin, cos) = (FRAC_PI_2 * i as f32 / 5.0).sin_cos();
+            (vec3(0.0, bend * (1.0 - cos), bend * sin), radius)
+        })
+        .collect();
+    m.tube(&points, sides);
+    m
+}
+
+/// A disc about the z axis: the joint of two pipes, or the blind end of one.
+fn flange(radius: f32, sides: usize) -> MeshBuilder {
+    let (r, h) = (1.55 * radius, 0.22 * radius + 0.012);
+    let mut m = MeshBuilder::new();
+    let disc = lathe(
+        &[sharp(0.0, -h), sharp(r, -h), sharp(r, h), sharp(0.0, h)],
+        sides,
+    );
+    m.merge(&disc, Affine3A::from_rotation_x(FRAC_PI_2));
+    m
+}
+
+/// A gate valve on a medium pipe along z, its handwheel up.
+fn valve() -> MeshBuilder {
+    let r = RADII_M[1];
+    let mut m = MeshBuilder::new();
+    let mut body = MeshBuilder::new();
+    body.lathe(
+        &[
+            sharp(r * 1.5, -0.2),
+            sharp(r * 1.5, -0.17),
+            smooth(r * 1.1, -0.14),
+            smooth(r * 1.45, 0.0),
+            smooth(r * 1.1, 0.14),
+            sharp(r * 1.5, 0.17),
+            sharp(r * 1.5, 0.2),
+        ],
+        10,
+    );
+    m.merge(&body, Affine3A::from_rotation_x(FRAC_PI_2));
+    let mut bonnet = MeshBuilder::new();
+    bonnet.lathe(
+        &[
+            sharp(0.07, 0.08),
+            sharp(0.06, 0.22),
+            sharp(0.02, 0.24),
+            sharp(0.018, 0.42),
+            sharp(0.0, 0.42),
+        ],
+        8,
+    );
+    m.merge(&bonnet, Affine3A::IDENTITY);
+    let wheel: Vec<(Vec3, f32)> = (0..=10)
+        .map(|i| {
+            let (sin, cos) = (TAU * (i % 10) as f32 / 10.0).sin_cos();
+            (vec3(0.14 * cos, 0.39, 0.14 * sin), 0.014)
+        })
+        .collect();
+    m.tube(&wheel, 4);
+    bar(&mut m, vec3(-0.14, 0.39, 0.0), vec3(0.14, 0.39, 0.0), 0.016);
+    bar(&mut m, vec3(0.0, 0.39, -0.14), vec3(0.0, 0.39, 0.14), 0.016);
+    m
+}
+
+/// A pressure gauge on a stem, its face to +z.
+fn gauge() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    let mut stem = MeshBuilder::new();
+    stem.lathe(&[sharp(0.012, 0.0), sharp(0.012, 0.16)], 6);
+    m.merge(&stem, Affine3A::IDENTITY);
+    let mut can = MeshBuilder::new();
+    can.lathe(
+        &[
+            sharp(0.0, -0.02),
+            sharp(0.06, -0.02),
+            sharp(0.06, 0.02),
+            sharp(0.0, 0.02),
+        ],
+        12,
+    );
+    let face = Affine3A::from_translation(Vec3::Y * 0.2) * Affine3A::from_rotation_x(FRAC_PI_2);
+    m.merge(&can, face);
+    m
+}
+
+/// A roof girder across a nave, its lower chord at the origin's height.
+fn truss() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    let (depth, panels) = (1.5, 8);
+    let half = NAVE_M / 2.0;
+    m.block(vec3(-half, 0.0, -0.09), vec3(half, 0.18, 0.09), 0.0);
+    m.block(
+        vec3(-half, depth, -0.09),
+        vec3(half, depth + 0.18, 0.09),
+        0.0,
+    );
+    let step = NAVE_M / panels as f32;
+    for i in 0..panels {
+        let x = -half + step * i as f32;
+        let (low, high) = (0.17, depth + 0.01);
+        let (a, b) = if i < panels / 2 {
+            (low, high)
+        } else {
+            (high, low)
+        };
+        bar(&mut m, vec3(x, b, 0.0), vec3(x + step, a, 0.0), 0.1);
+        bar(
+            &mut m,
+            vec3(x + step * 0.999, low, 0.0),
+            vec3(x + step * 0.999, high, 0.0),
+            0.08,
+        );
+    }
+    m
+}
+
+/// 2 m of railing with toe board: posts at both ends and the middle.
+fn railing() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    for z in [0.03, 1.0, 1.97] {
+        m.block(vec3(-0.02, 0.0, z - 0.02), vec3(0.02, 1.1, z + 0.02), 0.0);
+    }
+    for y in [0.55, 1.1] {
+        m.tube(&[(vec3(0.0, y, 0.0), 0.024), (vec3(0.0, y, 2.0), 0.024)], 6);
+    }
+    m.block(vec3(-0.006, 0.02, 0.0), vec3(0.006, 0.14, 2.0), 0.0);
+    m
+}
+
+/// Stairs up +z to a height of 3.5 m, 1 m wide.
+fn stairs() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    let (steps, rise, run) = (17, 3.5 / 17.0, 0.25);
+    for i in 0..steps {
+        let (y, z) = (rise * (i + 1) as f32, run * i as f32);
+        m.block(vec3(-0.48, y - 0.04, z), vec3(0.48, y, z + 0.27), 0.0);
+    }
+    let top = vec3(0.0, 3.4, run * steps as f32);
+    for x in [-0.5, 0.5] {
+        bar(&mut m, vec3(x, 0.06, 0.0), top + Vec3::X * x, 0.08);
+        bar(&mut m, vec3(x, 1.0, 0.0), top + vec3(x, 1.0, 0.0), 0.045);
+        for t in [0.02, 0.35, 0.68, 0.98] {
+            let foot = vec3(x, 0.06, 0.0).lerp(top + Vec3::X * x, t);
+            bar(&mut m, foot, foot + Vec3::Y * 0.97, 0.04);
+        }
+    }
+    m
+}
+
+/// Cable of bay length that sags and wanders.
+fn cable(number: usize) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    let phase = number as f32 * 1.7;
+    let points: Vec<(Vec3, f32)> = (0..=8)
+        .map(|i| {
+            let t = i as f32 / 8.0;
+            // Ends meet the next bay's cable.
+            let x = 0.02 * ((TAU * t + phase).sin() - phase.sin());
+            (vec3(x, 0.0, BAY_M * t), 0.016)
+        })
+        .collect();
+    m.tube(&points, 5);
+    m
+}
+
+fn fan_blades() -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    for i in 0..6 {
+        let turn = Affine3A::from_rotation_z(TAU * i as f32 / 6.0);
+        let mut blade = MeshBuilder::new();
+        blade.block(vec3(0.08, -0.11, -0.01), vec3(0.68, 0.11, 0.01), 0.0);
+        m.merge(&blade, turn * Affine3A::from_rotation_x(0.5));
+    }
+    let mut hub = MeshBuilder::new();
+    hub.lathe(
+        &[
+            sharp(0.0, -0.08),
+            sharp(0.11, -0.08),
+            sharp(0.11, 0.06),
+            smooth(0.0, 0.1),
+        ],
+        10,
+    );
+    m.merge(&hub, Affine3A::from_rotation_x(FRAC_PI_2));
+    m
+}
+
+fn fan_ring() -> MeshBuilder {
+    let mut ring = MeshBuilder::new();
+    ring.lathe(
+        &[
+            sharp(0.74, -0.15),
+            sharp(0.82, -0.15),
+            sharp(0.82, 0.15),
+            sharp(0.74, 0.15),
+            sharp(0.74, -0.15),
+        ],
+        18,
+    );
+    let mut m = MeshBuilder::new();
+    m.merge(&ring, Affine3A::from_rotation_x(FRAC_PI_2));
+    bar(&mut m, vec3(-0.8, 0.0, 0.12), vec3(0.8, 0.0, 0.12), 0.05);
+    m
+}
+
+fn lathe(profile: &[Knot], segments: usize) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.lathe(profile, segments);
+    m
+}
+
+/// Adds all parts.
+pub(super) fn parts(scene: &mut SceneBuilder, kit: &Kit) -> Parts {
+    let mut panel = |name: &str, corner: Vec3, right: Vec3, up: Vec3, material| {
+        let mut m = MeshBuilder::new();
+        m.panel(corner, right, up, 1, 1);
+        scene.mesh(name, m, material)
+    };
+    let b = BAY_M;
+    let slab = panel(
+        "floor-slab",
+        vec3(0.0, 0.0, b),
+        Vec3::X * b,
+        Vec3::Z * -b,
+        kit.floor,
+    );
+    let lane = panel(
+        "lane",
+        vec3(-0.06, 0.0, b),
+        Vec3::X * 0.12,
+        Vec3::Z * -b,
+        kit.lane,
+    );
+    // Walls face +x and are half as high as the hall, so that bands of windows fit between.
+    let wall = panel(
+        "wall",
+        vec3(0.0, 0.0, b),
+        Vec3::Z * -b,
+        Vec3::Y * 5.0,
+        kit.wall,
+    );
+    let window = panel(
+        "window",
+        vec3(0.0, 0.0, b),
+        Vec3::Z * -b,
+        Vec3::Y * 1.5,
+        kit.sky_light,
+    );
+    // Seen from below.
+    let deck = panel("roof-deck", Vec3::ZERO, Vec3::X * b, Vec3::Z * b, kit.roof);
+    let light = vec3(0.3, -0.05, 0.9);
+    let sky_light = panel(
+        "sky-light",
+        light,
+        Vec3::X * 1.2,
+        Vec3::Z * (b - 1.8),
+        kit.sky_light,
+    );
+
+    let h_outline = i_beam(0.4, 0.4, 0.03);
+    let mut column = upright(&h_outline, ROOF_M);
+    column.block(vec3(-0.35, 0.0, -0.35), vec3(0.35, 0.03, 0.35), 0.0);
+    let purlin = prism(
+        &[[-0.03, 0.0], [0.03, 0.0], [0.03, 0.2], [-0.03, 0.2]],
+        BAY_M,
+    );
+    let mut runway = prism(&i_beam(0.3, 0.6, 0.025), BAY_M);
+    runway.block(vec3(-0.035, 0.3, 0.0), vec3(0.035, 0.36, BAY_M), 0.0);
+    let mut bracket = MeshBuilder::new();
+    bracket.block(vec3(0.0, 0.0, -0.15), vec3(0.75, 0.12, 0.15), 0.0);
+    bar(
+        &mut bracket,
+        vec3(0.02, -0.6, 0.0),
+        vec3(0.65, 0.05, 0.0),
+        0.12,
+    );
+    let bolt = lathe(
+        &[
+            sharp(0.024, 0.0),
+            sharp(0.024, 0.03),
+            sharp(0.012, 0.03),
+            sharp(0.012, 0.07),
+            sharp(0.0, 0.07),
+        ],
+        6,
+    );
+    let shade = lathe(
+        &[
+            sharp(0.32, 0.0),
+            smooth(0.3, 0.1),
+            smooth(0.12, 0.26),
+            sharp(0.1, 0.45),
+            sharp(0.012, 0.45),
+            sharp(0.012, 1.1),
+        ],
+        12,
+    );
+    let mut lamp = lathe(&[sharp(0.0, 0.02), sharp(0.29, 0.06)], 12);
+    lamp.orient(|_| Vec3::NEG_Y);
+
+    let sides = [6, 8, 12];
+    let sizes = ["s", "m", "l"];
+    let services = ["water", "air", "gas", "fire", "steam", "acid"];
+    let mut each = |what: &str, mesh: &dyn Fn(usize) -> MeshBuilder| {
+        std::array::from_fn(|size| {
+            std::array::from_fn(|service| {
+                let name = format!("{what}-{}-{}", sizes[size], services[service]);
+                scene.mesh(&name, mesh(size), kit.pipes[service])
+            })
+        })
+    };
+    let pipes = each("pipe", &|size| pipe(RADII_M[size], BAY_M, sides[size]));
+    let spool = each("spool", &|size| pipe(RADII_M[size], 2.0, sides[size]));
+    let elbow = each("elbow", &|size| elbow(RADII_M[size], sides[size]));
+    let flange = std::array::from_fn(|size| {
+        let name = format!("flange-{}", sizes[size]);
+        scene.mesh(&name, flange(RADII_M[size], sides[size] + 2), kit.cast_iron)
+    });
+    let mut post = upright(&i_beam(0.22, 0.22, 0.02), 6.3);
+    post.block(vec3(-0.2, 0.0, -0.2), vec3(0.2, 0.02, 0.2), 0.0);
+    let mut cross = MeshBuilder::new();
+    cross.merge(
+        &prism(&i_beam(0.14, 0.2, 0.02), 2.4),
+        Affine3A::from_rotation_y(FRAC_PI_2),
+    );
+    let mut tray = MeshBuilder::new();
+    tray.block(vec3(-0.3, -0.01, 0.0), vec3(0.3, 0.0, BAY_M), 0.0);
+    for x in [-0.3, 0.29] {
+        tray.block(vec3(x, 0.0, 0.0), vec3(x + 0.01, 0.1, BAY_M), 0.0);
+    }
+    // Stands from the floor, 4.4 m below, past three trays to the duct.
+    let mut stand = MeshBuilder::new();
+    for x in [-0.36, 0.32] {
+        stand.block(vec3(x, -4.4, -0.02), vec3(x + 0.04, 1.72, 0.02), 0.0);
+    }
+    for y in [0.0, 0.55, 1.1, 1.76] {
+        stand.block(
+            vec3(-0.36, y - 0.06, -0.025),
+            vec3(0.36, y - 0.01, 0.025),
+            0.0,
+        );
+    }
+    let mut duct = pipe(0.45, BAY_M, 14);
+    for z in [0.02, 2.0, 4.0] {
+        let mut ring = MeshBuilder::new();
+        ring.lathe(
+            &[
+                sharp(0.45, -0.03),
+                sharp(0.48, -0.03),
+                sharp(0.48, 0.03),
+                sharp(0.45, 0.03),
+            ],
+            14,
+        );
+        let place = Affine3A::from_translation(Vec3::Z * z) * Affine3A::from_rotation_x(FRAC_PI_2);
+        duct.merge(&ring, place);
+    }
+    let diffuser = lathe(
+        &[
+            sharp(0.0, -0.75),
+            sharp(0.35, -0.75),
+            sharp(0.2, -0.6),
+            sharp(0.2, -0.4),
+        ],
+        12,
+    );
+    let sprinkler = lathe(
+        &[
+            sharp(0.0, -0.2),
+            sharp(0.035, -0.19),
+            sharp(0.012, -0.17),
+            sharp(0.012, 0.0),
+        ],
+        6,
+    );
+    let mut grating = MeshBuilder::new();
+    grating.quad(
+        vec3(-0.6, 0.0, 2.0),
+        Vec3::X * 1.2,
+        Vec3::Z * -2.0,
+        glam::Vec2::ZERO,
+    );
+    let mut leg = upright(&i_beam(0.12, 0.12, 0.012), 3.3);
+    leg.block(vec3(-0.12, 0.0, -0.12), vec3(0.12, 0.015, 0.12), 0.0);
+    let bollard = lathe(
+        &[
+            sharp(0.1, 0.0),
+            sharp(0.1, 0.9),
+            smooth(0.07, 0.98),
+            smooth(0.0, 1.0),
+        ],
+        10,
+    );
+    let mut sign = MeshBuilder::new();
+    sign.surface(1, 1, |s, t| {
+        (vec3(s - 0.5, t, 0.0) * 0.5, glam::vec2(s, 1.0 - t))
+    });
+    let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
+    Parts {
+        slab,
+        lane,
+        wall,
+        window,
+        deck,
+        sky_light,
+        column: add("column", column, kit.frame),
+        truss: add("truss", truss(), kit.frame),
+        purlin: add("purlin", purlin, kit.zinc),
+        runway: add("runway", runway, kit.frame),
+        bracket: add("bracket", bracket, kit.frame),
+        bolt: add("bolt", bolt, kit.zinc),
+        lamp_shade: add("lamp-shade", shade, kit.zinc),
+        lamp: add("lamp", lamp, kit.lamp),
+        pipe: pipes,
+        spool,
+        elbow,
+        flange,
+        shoe: add(
+            "pipe-shoe",
+            block([-0.05, 0.0, -0.1], [0.05, 0.06, 0.1]),
+            kit.zinc,
+        ),
+        valve: add("valve", valve(), kit.valve),
+        gauge: add("gauge", gauge(), kit.dial),
+        rack_post: add("rack-post", post, kit.frame),
+        rack_beam: add("rack-beam", cross, kit.frame),
+        tray: add("tray", tray, kit.zinc),
+        stand: add("stand", stand, kit.zinc),
+        cable: std::array::from_fn(|i| add("cable", cable(i), kit.cables[i])),
+        duct: add("duct", duct, kit.zinc),
+        diffuser: add("diffuser", diffuser, kit.zinc),
+        sprinkler: add("sprinkler", sprinkler, kit.stainless),
+        grating: add("grating", grating, kit.grating),
+        stringer: add(
+            "stringer",
+            block([-0.05, -0.22, 0.0], [0.05, -0.01, 2.0]),
+            kit.frame,
+        ),
+        railing: add("railing", railing(), kit.crane),
+        leg: add("leg", leg, kit.frame),
+        stairs: add("stairs", stairs(), kit.frame),
+        bollard: add("bollard", bollard, kit.hazard),
+        sign: add("sign", sign, kit.sign),
+        fan_ring: add("fan-ring", fan_ring(), kit.frame),
+        fan_blades: add("fan-blades", fan_blades(), kit.cast_iron),
+    }
+}
