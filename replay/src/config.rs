@@ -35,6 +35,28 @@ pub enum Assign {
     Static,
 }
 
+/// Which of the fragments that draws cover are shaded.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Hsr {
+    /// All of them; needs a trace that was captured without the depth test.
+    None,
+    /// Those that pass the depth test when they are drawn: what a trace holds.
+    #[default]
+    EarlyZ,
+    /// Of each pixel the last opaque one and what is drawn over it, as tile-based deferred
+    /// renderers do.
+    Deferred,
+}
+
+impl Hsr {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// Geometry of one cache level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -157,6 +179,10 @@ pub struct RunConfig {
     pub tmu: TmuConfig,
     /// Also count by tile.
     pub tile_maps: bool,
+    /// Hidden-surface removal, `early-z` where it is left out.
+    // Left out of results, too, which so stay what they were before there was the key.
+    #[serde(skip_serializing_if = "Hsr::is_default")]
+    pub hsr: Hsr,
 }
 
 impl Default for RunConfig {
@@ -174,6 +200,7 @@ impl Default for RunConfig {
             layout: LayoutConfig::default(),
             tmu: TmuConfig::default(),
             tile_maps: false,
+            hsr: Hsr::EarlyZ,
         }
     }
 }

@@ -16,4 +16,5 @@ pub mod result;
 pub mod sgrt;
 pub mod size;
 pub mod stream;
+pub mod techniques;
 mod tmu;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the bottom up. A room may use rooms below it; those on one floor may use each other.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
     &["files", "palette", "registry", "result", "size"],
     &["cache", "config", "order"],
     &["paper", "tmu"],
@@ -12,6 +12,7 @@ const FLOORS: [&[&str]; 9] = [
     &["engine"],
     &["sgrt"],
     &["experiment"],
+    &["techniques"],
     &["report"],
     &["cli"],
 ];

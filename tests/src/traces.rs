@@ -70,6 +70,7 @@ fn meta(frames: u32) -> TraceMeta {
                 ..FrameViews::default()
             })
             .collect(),
+        surfaces: None,
     }
 }
 

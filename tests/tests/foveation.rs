@@ -80,7 +80,7 @@ fn measure(scene: &str, all: bool) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let whole = shoot(folder.path(), scene, &[]);
     let (fov, lens) = (fov(), Lens::of(&fov()));
-    let visible = Mask::circle(SIZE_PX, &fov, lens.center, lens.radius);
+    let visible = Mask::of_lens(SIZE_PX, &fov, &lens);
     let degree_px = pixels_per_degree(SIZE_PX[0], &fov);
     let reference = Reference::new(whole.picture.clone(), visible, degree_px).expect("one size");
     let row = |name: &str, options: &[&str]| -> (PictureError, f64) {

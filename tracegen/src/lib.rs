@@ -3,4 +3,5 @@
 
 pub mod cli;
 mod picture;
+pub mod study;
 pub mod verify;

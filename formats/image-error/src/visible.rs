@@ -3,7 +3,7 @@
 use crate::flip::{FlipMap, Prepared};
 use crate::psnr::psnr_of_squares;
 use crate::{Picture, mean, quantile, ssim};
-use formats::view::FovTangents;
+use formats::view::{FovTangents, Lens};
 use serde::Serialize;
 
 /// Which pixels of a picture count.
@@ -22,16 +22,10 @@ impl Mask {
         Self::of(size_px, |_| true)
     }
 
-    /// The pixels whose centres lie in a circle of the eye's tangent plane (x right, y up, from the
-    /// view direction).
+    /// The pixels that a lens shows of an eye's picture: those whose centres it shows.
     #[must_use]
-    pub fn circle(size_px: [u32; 2], fov: &FovTangents, center: [f32; 2], radius: f32) -> Self {
-        let [width, height] = size_px.map(|size| size as f32);
-        Self::of(size_px, |[x, y]| {
-            let right = (x as f32 + 0.5) / width * (fov.left + fov.right) - fov.left;
-            let up = fov.up - (y as f32 + 0.5) / height * (fov.up + fov.down);
-            (right - center[0]).hypot(up - center[1]) <= radius
-        })
+    pub fn of_lens(size_px: [u32; 2], fov: &FovTangents, lens: &Lens) -> Self {
+        Self::of(size_px, |pixel| lens.pixel_visible(fov, size_px, pixel))
     }
 
     fn of(size_px: [u32; 2], counts: impl Fn([u32; 2]) -> bool) -> Self {
@@ -201,6 +195,10 @@ mod tests {
         down: 1.0,
     };
 
+    fn circle(size_px: [u32; 2], center: [f32; 2], radius: f32) -> Mask {
+        Mask::of_lens(size_px, &FOV, &Lens { center, radius })
+    }
+
     #[test]
     fn without_a_mask_the_figures_are_those_of_the_whole_picture() {
         let a = scene_like([60, 44]);
@@ -216,7 +214,7 @@ mod tests {
     #[test]
     fn what_the_lens_hides_counts_nowhere() {
         let a = scene_like([64, 64]);
-        let mask = Mask::circle([64, 64], &FOV, [0.0, 0.0], 0.8);
+        let mask = circle([64, 64], [0.0, 0.0], 0.8);
         let mut b = a.clone();
         for (pixel, inside) in b.pixels.iter_mut().zip(&mask.inside) {
             if !inside {
@@ -231,7 +229,7 @@ mod tests {
     #[test]
     fn an_error_inside_weighs_by_the_pixels_inside() {
         let grey = Picture::filled([64, 64], [100; 3]);
-        let mask = Mask::circle([64, 64], &FOV, [0.0, 0.0], 0.5);
+        let mask = circle([64, 64], [0.0, 0.0], 0.5);
         let all = mask.inside.iter().filter(|i| **i).count();
         let mut test = grey.clone();
         // Both halves of the picture are off by one code and by two.
@@ -250,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_circle_has_the_area_of_its_radius_and_lies_where_it_should() {
-        let mask = Mask::circle([400, 200], &FOV, [0.25, 0.5], 0.4);
+        let mask = circle([400, 200], [0.25, 0.5], 0.4);
         let inside: Vec<usize> = (0..mask.inside.len()).filter(|i| mask.inside[*i]).collect();
         // Pixels of 2/400 by 2/200 tangents.
         let area = inside.len() as f64 * (2.0 / 400.0) * (2.0 / 200.0);

@@ -89,6 +89,52 @@ pub struct TraceMeta {
     pub hmd: Hmd,
     /// Eye matrices by frame.
     pub frames: Vec<FrameViews>,
+    /// What the recorded fragments say of what is seen; older traces do not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surfaces: Option<Surfaces>,
+}
+
+/// Which fragments were recorded, and which of them hide what lies behind.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Surfaces {
+    /// Only fragments that passed the depth test when they were drawn.
+    pub depth_tested: bool,
+    /// First and number of draws in a row whose fragments may turn out transparent when they are
+    /// shaded: alpha-masked and blended ones. Ascending and apart.
+    pub not_opaque: Vec<[u32; 2]>,
+}
+
+impl Surfaces {
+    /// Ranges of the draws that are not opaque, from a flag by draw.
+    pub fn ranges(opaque: impl IntoIterator<Item = bool>) -> Vec<[u32; 2]> {
+        let mut ranges: Vec<[u32; 2]> = Vec::new();
+        for (draw, opaque) in (0..).zip(opaque) {
+            match ranges.last_mut() {
+                _ if opaque => (),
+                Some([first, count]) if *first + *count == draw => *count += 1,
+                _ => ranges.push([draw, 1]),
+            }
+        }
+        ranges
+    }
+
+    /// Checks the ranges against the number of draws.
+    pub(crate) fn check(&self, draws: usize) -> Result<(), Broken> {
+        let mut next = 0;
+        for [first, count] in &self.not_opaque {
+            let end = u64::from(*first) + u64::from(*count);
+            let fits = u64::from(*first) >= next && *count > 0 && end <= draws as u64;
+            ensure(fits, || {
+                Broken::new(
+                    "surfaces.not_opaque",
+                    format!("ranges of draws below {draws}, ascending and apart"),
+                    format_args!("{:?}", self.not_opaque),
+                )
+            })?;
+            next = end;
+        }
+        Ok(())
+    }
 }
 
 impl TraceMeta {

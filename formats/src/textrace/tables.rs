@@ -105,6 +105,9 @@ fn has_layers(tables: &Tables) -> bool {
 fn check(tables: &Tables) -> std::result::Result<(), (ChunkTag, Broken)> {
     let located = |chunk: ChunkTag| move |broken: Broken| (chunk, broken);
     tables.meta.check().map_err(located(META))?;
+    if let Some(surfaces) = &tables.meta.surfaces {
+        surfaces.check(tables.draws.len()).map_err(located(META))?;
+    }
     for (index, texture) in tables.textures.iter().enumerate() {
         check_texture(index, texture).map_err(located(TEXTURES))?;
     }

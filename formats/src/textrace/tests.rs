@@ -70,6 +70,10 @@ pub(crate) fn tables() -> Tables {
                 frame: 0,
                 eyes: [eye; 2],
             }],
+            surfaces: Some(Surfaces {
+                depth_tested: true,
+                not_opaque: vec![[2, 1]],
+            }),
         },
         textures: vec![texture("a.png", 1024), texture("b.png", 64)],
         samplers: vec![Sampler::TRILINEAR_REPEAT, Sampler::SHADOW],
@@ -226,5 +230,26 @@ proptest! {
             trace.decode_tile(1, 4, &mut out).unwrap();
             prop_assert_eq!(&out, &Tile::default());
         }
+    }
+}
+
+#[test]
+fn draws_that_are_not_opaque_are_ranges_of_the_table() {
+    let flags = [true, false, false, true, false];
+    assert_eq!(Surfaces::ranges(flags), [[1, 2], [4, 1]]);
+    assert_eq!(Surfaces::ranges([true; 3]), [[0; 2]; 0]);
+    for not_opaque in [
+        vec![[2, 2]],
+        vec![[1, 0]],
+        vec![[1, 1], [0, 1]],
+        vec![[0, 2], [1, 1]],
+    ] {
+        let mut tables = tables();
+        tables.meta.surfaces = Some(Surfaces {
+            depth_tested: true,
+            not_opaque,
+        });
+        let error = TextraceWriter::in_memory(&tables).expect_err("refused");
+        assert!(error.to_string().contains("surfaces.not_opaque"), "{error}");
     }
 }

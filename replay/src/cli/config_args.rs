@@ -1,7 +1,7 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
 use crate::config::{
-    Assign, BlockOrder, FilterOverride, LodFormula, Mode, Order, Replacement, RunConfig,
+    Assign, BlockOrder, FilterOverride, Hsr, LodFormula, Mode, Order, Replacement, RunConfig,
     TextureOrder,
 };
 use crate::size::{format_bytes, parse_bytes};
@@ -85,6 +85,10 @@ pub struct ConfigArgs {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
+    /// Hidden-surface removal
+    #[arg(long)]
+    hsr: Option<Hsr>,
+
     /// Filter in place of the recorded one: trilinear, bilinear, nearest
     #[arg(long, value_parser = named::<FilterOverride>, help_heading = "Sampling")]
     filter: Option<FilterOverride>,
@@ -152,8 +156,16 @@ impl ConfigArgs {
     /// # Errors
     /// The file cannot be read, has an unknown key, or the result is impossible.
     pub fn resolve(&self) -> Result<RunConfig> {
+        self.resolve_over(RunConfig::default())
+    }
+
+    /// The configuration: `defaults`, or `--config` where it is given, then the flags.
+    ///
+    /// # Errors
+    /// As [`Self::resolve`].
+    pub fn resolve_over(&self, defaults: RunConfig) -> Result<RunConfig> {
         let mut config = match &self.config {
-            None => RunConfig::default(),
+            None => defaults,
             Some(path) => toml::from_str(&read_toml(path)?)
                 .map_err(|e| anyhow!("{}: {}", path.display(), e.to_string().trim()))?,
         };
@@ -187,6 +199,7 @@ impl ConfigArgs {
         set(&mut config.cores, self.cores);
         set(&mut config.assign, self.assign);
         set(&mut config.seed, self.seed);
+        set(&mut config.hsr, self.hsr);
         set(&mut config.sampling.filter, self.filter);
         set(&mut config.sampling.lod, self.lod);
         set(&mut config.sampling.lod_bias, self.lod_bias);

@@ -4,7 +4,7 @@ use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
 use crate::order;
-use crate::stream::for_quads;
+use crate::stream::{for_quads, shaded};
 use anyhow::{Context, Result, bail};
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
@@ -159,9 +159,10 @@ fn accesses(
         },
         line_bytes: config.line_bytes,
     };
+    let source = shaded(trace, config.hsr)?;
     let order = config.order.build(config.seed);
     for item in order::plan(&*order, &tables.passes).iter().flatten() {
-        for_quads(trace, item, |quad| -> Result<()> {
+        for_quads(&source, item, |quad| -> Result<()> {
             let origin = Origin {
                 pass: quad.at.pass,
                 tile: quad.at.tile,

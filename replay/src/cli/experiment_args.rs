@@ -173,7 +173,11 @@ pub fn write_page(report: &PaperReport, pictures: &[EmbeddedPicture], path: &Pat
     write_atomically(path, html.as_bytes())
 }
 
-fn parse_orders(text: &str) -> Result<Vec<Order>> {
+/// Orders by name, comma-separated, or `all`.
+///
+/// # Errors
+/// A name that no order has.
+pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
     if text == "all" {
         let others = Order::all().filter(|o| !z2::ORDERS.contains(o));
         return Ok(z2::ORDERS.into_iter().chain(others).collect());

@@ -12,8 +12,9 @@ mod reproject;
 mod run;
 mod subjects;
 mod sweep;
+mod techniques;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 mod tiles;
 pub mod validate;
 
@@ -34,6 +35,7 @@ Examples:
   replay info atrium.textrace
   replay run atrium.textrace --order z2-sta --l1 8KiB --l2 128KiB
   replay report atrium.textrace -o report.html --image atrium=atrium.png
+  replay techniques out/plant --html out/techniques.html
   replay convert atrium.textrace --to din --order morton -o accesses.din
   replay reproject chess.raytrace --html chess.html";
 
@@ -67,6 +69,8 @@ enum Command {
     Sweep(sweep::Args),
     /// Write the experiment as one self-contained page, with JSON and CSV beside it.
     Report(Box<report::Args>),
+    /// Hold techniques of stereo rendering against each other: time, image error, caches.
+    Techniques(Box<techniques::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
     #[command(flatten)]
@@ -88,6 +92,7 @@ pub fn main() -> ExitCode {
             Command::Paper(args) => paper::run(&args),
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),
+            Command::Techniques(args) => techniques::run(&args),
             Command::Reproject(args) => reproject::run(*args),
             Command::Documents(documents) => documents.run::<Cli>(),
         },

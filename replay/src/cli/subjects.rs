@@ -2,6 +2,7 @@
 
 use crate::experiment::{Subject, labels};
 use crate::result::TraceId;
+use crate::stream::TileSource;
 use anyhow::Result;
 use formats::textrace::Textrace;
 use std::path::PathBuf;
@@ -21,6 +22,11 @@ impl Traces {
             Ok((trace, id, stem.to_string_lossy().into_owned()))
         };
         paths.iter().map(open).collect::<Result<_>>().map(Self)
+    }
+
+    /// The traces themselves, in the order of the files.
+    pub fn sources(&self) -> impl Iterator<Item = &dyn TileSource> {
+        self.0.iter().map(|(trace, ..)| trace as &dyn TileSource)
     }
 
     /// The traces under names of their own.

@@ -14,7 +14,7 @@ use crate::cache::Levels;
 use crate::config::{CacheConfig, Mode, Order, RunConfig, TmuConfig};
 use crate::order::{self, Phase};
 use crate::result::{RunResult, TmuResult};
-use crate::stream::{Cores, Expander, LineMemory, TileSource, TraceCounts};
+use crate::stream::{Cores, Expander, LineMemory, TileSource, TraceCounts, shaded};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -234,7 +234,8 @@ impl Wave<'_> {
     /// Runs the passes, frame after frame.
     fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
         let trace_passes = &self.trace.tables().passes;
-        let expander = Expander::new(self.trace, passes[0].config())?;
+        let shaded = shaded(self.trace, passes[0].config().hsr)?;
+        let expander = Expander::new(&shaded, passes[0].config())?;
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
         frames.sort_unstable();

@@ -4,6 +4,7 @@
 //! in the paper's table, or when the command line says so; nothing is guessed from parts of names.
 
 pub mod sgrt;
+pub mod vr;
 pub mod z2;
 
 /// The entry of a scene in a paper's table of `(our short name, entry)`.

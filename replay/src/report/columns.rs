@@ -16,6 +16,8 @@ pub enum Value {
     Text(String),
     /// A name, and how tables write it.
     Named(&'static str, &'static str),
+    /// Yes or no.
+    Flag(bool),
     /// A count.
     Whole(u64),
     /// A measure.
@@ -31,6 +33,12 @@ impl From<String> for Value {
 impl From<&str> for Value {
     fn from(text: &str) -> Self {
         Self::Text(text.to_owned())
+    }
+}
+
+impl From<bool> for Value {
+    fn from(flag: bool) -> Self {
+        Self::Flag(flag)
     }
 }
 
@@ -59,7 +67,7 @@ impl Value {
         match self {
             Self::Whole(n) => Some(*n as f64),
             Self::Real(x) => Some(*x),
-            Self::None | Self::Text(_) | Self::Named(..) => None,
+            Self::None | Self::Text(_) | Self::Named(..) | Self::Flag(_) => None,
         }
     }
 
@@ -70,6 +78,7 @@ impl Value {
             Self::None => String::new(),
             Self::Text(text) => text.clone(),
             Self::Named(name, _) => (*name).to_owned(),
+            Self::Flag(flag) => flag.to_string(),
             Self::Whole(n) => n.to_string(),
             Self::Real(x) => x.to_string(),
         }
@@ -82,6 +91,7 @@ impl Serialize for Value {
             Self::None => serializer.serialize_none(),
             Self::Text(text) => serializer.serialize_str(text),
             Self::Named(name, _) => serializer.serialize_str(name),
+            Self::Flag(flag) => serializer.serialize_bool(*flag),
             Self::Whole(n) => serializer.serialize_u64(*n),
             Self::Real(x) => serializer.serialize_f64(*x),
         }
@@ -119,6 +129,7 @@ impl Show {
             (Self::Millions(decimals), Some(x)) => fixed(x * 1e-6, decimals),
             _ => match value {
                 Value::Named(_, title) => (*title).to_owned(),
+                Value::Flag(flag) => if *flag { "yes" } else { "" }.to_owned(),
                 _ => value.exact(),
             },
         }

@@ -10,5 +10,6 @@ pub mod run;
 pub mod sgrt;
 pub mod sweep;
 pub mod table;
+pub mod techniques;
 pub mod theme;
 pub mod z2;

@@ -2,8 +2,9 @@
 
 use super::plots::data_uri;
 use anyhow::Context;
-use image::ImageReader;
 use image::codecs::jpeg::JpegEncoder;
+use image::{ImageReader, RgbImage};
+use image_error::Picture;
 use std::path::Path;
 
 /// A picture of both eyes, re-encoded small enough for a page.
@@ -32,12 +33,23 @@ impl EmbeddedPicture {
             .decode()
             .with_context(|| format!("{}: not a picture", path.display()))?
             .to_rgb8();
+        Self::encode(label, picture).with_context(|| path.display().to_string())
+    }
+
+    /// A picture that was computed.
+    ///
+    /// # Errors
+    /// It is empty.
+    pub fn of(label: &str, picture: &Picture) -> anyhow::Result<Self> {
+        let [width, height] = picture.size_px;
+        let bytes = picture.pixels.iter().flatten().copied().collect();
+        let picture = RgbImage::from_raw(width, height, bytes);
+        Self::encode(label, picture.unwrap_or_default()).with_context(|| label.to_owned())
+    }
+
+    fn encode(label: &str, picture: RgbImage) -> anyhow::Result<Self> {
         let (width, height) = picture.dimensions();
-        anyhow::ensure!(
-            width > 0 && height > 0,
-            "{}: the picture is empty",
-            path.display()
-        );
+        anyhow::ensure!(width > 0 && height > 0, "the picture is empty");
         let picture = if width > WIDEST_PX {
             let scaled =
                 (u64::from(height) * u64::from(WIDEST_PX) / u64::from(width)).max(1) as u32;
@@ -53,7 +65,7 @@ impl EmbeddedPicture {
         let mut jpeg = Vec::new();
         JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY)
             .encode_image(&picture)
-            .with_context(|| format!("{}: cannot encode", path.display()))?;
+            .context("cannot encode")?;
         Ok(Self {
             label: label.to_owned(),
             size_px: [picture.width(), picture.height()],

@@ -40,6 +40,31 @@ impl Table {
         self
     }
 
+    /// The columns with these keys, in the order of `keys`; a key that no column has is left out.
+    #[must_use]
+    pub fn picked<'k>(&self, keys: impl IntoIterator<Item = &'k str>) -> Self {
+        let at = |key: &str| self.headings.iter().position(|h| h.key == key);
+        let columns: Vec<usize> = keys.into_iter().filter_map(at).collect();
+        let pick = |row: &Vec<Value>| columns.iter().map(|&c| row[c].clone()).collect();
+        Self {
+            headings: columns.iter().map(|&c| self.headings[c].clone()).collect(),
+            rows: self.rows.iter().map(pick).collect(),
+            caption: self.caption,
+            groups: 0,
+        }
+    }
+
+    /// The rows whose cell under `key` is this text.
+    #[must_use]
+    pub fn only(&self, key: &str, text: &str) -> Self {
+        let column = self.headings.iter().position(|h| h.key == key);
+        let same = |row: &&Vec<Value>| column.is_some_and(|c| row[c].exact() == text);
+        Self {
+            rows: self.rows.iter().filter(same).cloned().collect(),
+            ..self.clone()
+        }
+    }
+
     /// Leaves out the columns that have a value in no row.
     #[must_use]
     pub fn without_empty_columns(mut self) -> Self {
@@ -206,6 +231,14 @@ mod tests {
         let table = table(&[("a", 1.0, None)]).without_empty_columns();
         assert_eq!(table.cells(), [["a", "1.00"]]);
         assert_eq!(table.headings.len(), 2);
+    }
+
+    #[test]
+    fn columns_and_rows_can_be_picked() {
+        let table = table(&ROWS)
+            .only("order", "z2-sta")
+            .picked(["l1_miss_pct", "order", "none"]);
+        assert_eq!(table.cells(), [["9.81", "z2-sta"]]);
     }
 
     #[test]

@@ -184,6 +184,7 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
                     cant_deg: 0.0,
                 },
                 frames: vec![FrameViews::default()],
+                surfaces: None,
             },
             origin: [0.0; 3],
             eyes,

@@ -141,6 +141,7 @@ impl Synthetic {
                     cant_deg: 0.0,
                 },
                 frames: vec![FrameViews::default()],
+                surfaces: None,
             },
             textures: (0..self.materials * self.textures)
                 .map(|i| {

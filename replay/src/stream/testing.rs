@@ -45,6 +45,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
                 cant_deg: 0.0,
             },
             frames: vec![formats::view::FrameViews::default()],
+            surfaces: None,
         },
         textures: sizes
             .iter()

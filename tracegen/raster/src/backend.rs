@@ -71,6 +71,29 @@ pub struct Work {
     pub samplers: u64,
 }
 
+impl std::ops::Sub for Work {
+    type Output = Self;
+
+    /// What was done since `earlier`.
+    fn sub(self, earlier: Self) -> Self {
+        Self {
+            regions: self.regions - earlier.regions,
+            draws: self.draws - earlier.draws,
+            calls: self.calls - earlier.calls,
+            state_changes: self.state_changes - earlier.state_changes,
+            vertices: self.vertices - earlier.vertices,
+            triangles: self.triangles - earlier.triangles,
+            bytes_uploaded: self.bytes_uploaded - earlier.bytes_uploaded,
+            submitting: self.submitting - earlier.submitting,
+            waiting: self.waiting - earlier.waiting,
+            composing: self.composing - earlier.composing,
+            shadow_maps: self.shadow_maps - earlier.shadow_maps,
+            pipelines: self.pipelines - earlier.pipelines,
+            samplers: self.samplers - earlier.samplers,
+        }
+    }
+}
+
 /// A driver that renders a scene and hands over what its fragments sampled.
 ///
 /// A backend owns the uploaded scene. It renders one region of one layer at a time, so that the
@@ -130,6 +153,20 @@ pub trait CaptureBackend {
         view: &View<'_>,
         lens: &Lens,
     ) -> Result<Vec<Marks>, RasterError>;
+
+    /// Why the driver's multiview cannot be trusted; `None` where it can.
+    ///
+    /// # Errors
+    /// Driver errors.
+    fn multiview_defect(&mut self) -> Result<Option<String>, RasterError>;
+
+    /// Renders the left and the right layer, whole and of one size, with one list of draws for both:
+    /// in one submission where the driver's multiview can be trusted, else one by one. [`Work`]
+    /// counts one submission either way.
+    ///
+    /// # Errors
+    /// Driver errors.
+    fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError>;
 
     /// Makes the frame's pictures from its layers, all of whose regions have been rendered; those
     /// that are layers are there already.

@@ -3,7 +3,7 @@
 use super::backend::View;
 use super::error::RasterError;
 use super::groups::MaterialGroups;
-use formats::textrace::{Draw, Sample, UvGroup};
+use formats::textrace::{Draw, Sample, Surfaces, UvGroup};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Mat4, Vec3};
 use record::Region;
@@ -120,6 +120,15 @@ pub struct DrawList {
 }
 
 impl DrawList {
+    /// What a trace says of the draws: which of them hide what lies behind.
+    #[must_use]
+    pub fn surfaces(&self) -> Surfaces {
+        Surfaces {
+            depth_tested: true,
+            not_opaque: Surfaces::ranges(self.calls.iter().map(|c| c.mode == DrawMode::Opaque)),
+        }
+    }
+
     /// Orders the scene's instances: opaque and masked ones in the scene's order, then blended
     /// ones in the scene's order. Instances that show nothing are left out.
     ///
@@ -416,6 +425,7 @@ mod tests {
             (0, DrawMode::Blended, 7),
         ];
         assert_eq!(rows, expected);
+        assert_eq!(draws.surfaces().not_opaque, [[1, 2]]);
     }
 
     #[test]

@@ -87,7 +87,12 @@ impl CaptureJob<'_> {
         backend: &mut dyn CaptureBackend,
         frame: &Frame,
     ) -> Result<Vec<Judgement>, RasterError> {
-        let truth = self.truth(backend, frame)?;
+        Ok(self.judge_against(frame, &self.truth(backend, frame)?))
+    }
+
+    /// As [`Self::judge`], by what [`Self::truth`] has told of the frame's eyes.
+    #[must_use]
+    pub fn judge_against(&self, frame: &Frame, truth: &[Vec<Marks>]) -> Vec<Judgement> {
         let judge = |(eye, visible): (_, &Vec<Marks>)| {
             let of_eye = |layer: &Layer| layer.eye.is_none() || layer.eye == Some(eye);
             let mut listed: Vec<u32> = (frame.views())
@@ -99,7 +104,7 @@ impl CaptureJob<'_> {
             Judgement::new(&listed, visible)
         };
         let eyes = self.planner.eyes().iter().copied();
-        Ok(eyes.zip(&truth).map(judge).collect())
+        eyes.zip(truth).map(judge).collect()
     }
 }
 

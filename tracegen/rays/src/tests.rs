@@ -153,6 +153,7 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
                 seed: 0,
                 hmd: display,
                 frames,
+                surfaces: None,
             },
             origin,
             eyes,

@@ -75,6 +75,7 @@ fn tables() -> Tables {
                 frame: 0,
                 eyes: [eye; 2],
             }],
+            surfaces: None,
         },
         textures: vec![Texture {
             name: "grid".into(),

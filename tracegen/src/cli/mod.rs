@@ -2,11 +2,14 @@
 
 mod cache_args;
 pub mod path_args;
+mod prepared;
 pub mod raster;
+mod raster_auto;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;
 mod technique_args;
+pub mod techniques;
 
 use clap::{Parser, Subcommand};
 use shell::{Common, Documents};
@@ -18,6 +21,7 @@ Examples:
   tracegen scenes model.gltf --json
   tracegen raster atrium -o atrium.textrace --image atrium.png
   tracegen raster sponza.gltf --camera gallery --shadows -o sponza.textrace
+  tracegen techniques atrium --path head -o atrium-techniques
   tracegen rays chess -o chess.raytrace --image chess.png";
 
 /// Renders a scene for both eyes and captures every texture sample or every ray into a trace.
@@ -36,6 +40,8 @@ enum Command {
     Scenes(scenes::ScenesArgs),
     /// Render a stereo frame and capture its texture samples into a .textrace file.
     Raster(Box<raster::RasterArgs>),
+    /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
+    Techniques(Box<techniques::TechniquesArgs>),
     /// Trace a stereo frame and capture its rays into a .raytrace file.
     Rays(Box<rays::RaysArgs>),
     #[command(flatten)]
@@ -51,6 +57,7 @@ pub fn main() -> ExitCode {
             match cli.command {
                 Command::Scenes(args) => scenes::run(args)?,
                 Command::Raster(args) => raster::run(&args)?,
+                Command::Techniques(args) => techniques::run(&args)?,
                 Command::Rays(args) => rays::run(&args)?,
                 Command::Documents(documents) => return documents.run::<Cli>(),
             }

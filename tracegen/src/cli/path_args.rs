@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 use scene::paths::{DEFAULT_FPS, HeadPath, MAX_FRAMES, Moments, PathOrigin, PathSpec};
 use std::ops::Range;
+use std::path::PathBuf;
 
 /// The head's path.
 #[derive(Args, Clone, Debug)]
@@ -34,6 +35,15 @@ pub enum Origin {
 }
 
 impl PathArgs {
+    /// The file that the path is read from.
+    #[must_use]
+    pub fn file(&self) -> Option<PathBuf> {
+        match &self.path {
+            PathSpec::Walk | PathSpec::Head => None,
+            PathSpec::Poses(file) | PathSpec::Gltf(file, _) => Some(file.clone()),
+        }
+    }
+
     /// The path and its moments; what is odd about its file goes to stderr.
     ///
     /// # Errors

@@ -5,6 +5,8 @@ use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
 use super::technique_args::TechniqueArgs;
 use crate::picture;
+use crate::study::auto::Budget;
+use crate::study::memory;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
@@ -18,7 +20,7 @@ use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
 use raster::skips::Skipped;
 use record::CaptureCounts;
-use scene::LoadOptions;
+use scene::{LoadOptions, Scene};
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -35,22 +37,22 @@ const CASCADES: u32 = 4;
 #[derive(Args, Debug)]
 pub struct RasterArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    pub(super) scene: SceneArgs,
     /// Trace to write.
     #[arg(short, long, value_name = "FILE.textrace")]
-    output: PathBuf,
+    pub(super) output: PathBuf,
     /// Picture of all views side by side.
     #[arg(long, value_name = "FILE.png")]
-    image: Option<PathBuf>,
+    pub(super) image: Option<PathBuf>,
     #[command(flatten)]
-    path: PathArgs,
+    pub(super) path: PathArgs,
     /// Frames along the path.
     #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Camera",
           value_parser = frame_count())]
-    frames: u32,
+    pub(super) frames: u32,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
-    shadows: bool,
+    pub(super) shadows: bool,
     /// Views of each frame.
     #[arg(long, value_enum, default_value_t = Views::Stereo, help_heading = "Camera")]
     views: Views,
@@ -60,15 +62,21 @@ pub struct RasterArgs {
     /// Memory for raw records; a frame that needs more is captured in parts. The driver's limit is
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
-    record_budget: u64,
+    pub(super) record_budget: u64,
     /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, draws, regions or all of
     /// them. Pictures and trace stay the same.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     no_skip: Vec<Skip>,
+    /// Choose the techniques under a budget, for each frame: `flip=ERROR` (mean FLIP inside the
+    /// lens) or `pixels=PX` for the cheapest inside it, `budget-ms=MS` for the least error whose
+    /// median frame takes no longer.
+    #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
+          conflicts_with_all = ["cull", "occlusion", "views", "no_plain", "no_skip"])]
+    auto: Option<Budget>,
     #[command(flatten)]
     techniques: TechniqueArgs,
     #[command(flatten)]
-    cache: CacheArgs,
+    pub(super) cache: CacheArgs,
     #[command(flatten)]
     threads: Threads,
 }
@@ -103,6 +111,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     args.threads.start()?;
     args.scene
         .check_outputs(&args.output, args.image.as_deref())?;
+    if let Some(budget) = args.auto {
+        return super::raster_auto::run(args, budget);
+    }
     let started = Instant::now();
     let cache = args.cache.open()?;
     let progress = Progress::new("loading the scene", 0, "");
@@ -110,11 +121,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         .scene
         .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
     let loaded = started.elapsed();
-    let cascades = if args.shadows {
-        CASCADES
-    } else {
-        setup.scene.shadow_cascades.min(CASCADES)
-    };
+    let cascades = cascades(&setup.scene, args.shadows);
     progress.stage("preparing textures and shaders", 0, "");
     let mut draws = DrawList::new(&setup.scene, cascades)?;
     let size_px = setup.hmd.eye_size_px;
@@ -126,6 +133,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         args.views.eyes(),
         args.path.fps,
     )?;
+    if let Some(first) = setup.frames.first() {
+        planner.check_views(first)?;
+    }
     let job = job(args, &setup, &draws, &planner, bounds);
     let finest = job.finest_levels(&setup.frames)?;
     let searched = started.elapsed();
@@ -158,6 +168,13 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
+    }
+    if planner.settings().multiview
+        && let Some(defect) = backend.multiview_defect()?
+    {
+        shell::warn(&format!(
+            "multiview cannot be trusted, so views are drawn one by one: {defect}"
+        ));
     }
     let mut first = Some(first);
     let mut recorder = job.recorder(&tables);
@@ -258,8 +275,17 @@ fn job<'a>(
     }
 }
 
+/// Shadow cascades of a scene, or those that `--shadows` adds.
+pub(super) fn cascades(scene: &Scene, shadows: bool) -> u32 {
+    if shadows {
+        CASCADES
+    } else {
+        scene.shadow_cascades.min(CASCADES)
+    }
+}
+
 /// Near and far end of the cascades: from the near plane to where the scene ends.
-fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
+pub(super) fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
     let farthest = (setup.camera.eye - lo)
         .abs()
         .max((setup.camera.eye - hi).abs())
@@ -268,7 +294,8 @@ fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f3
     [near, farthest.min(setup.camera.far).max(2.0 * near)]
 }
 
-fn tables(
+/// The tables of a trace of the scene's frames.
+pub(super) fn tables(
     setup: &SceneSetup,
     spec: &str,
     draws: &DrawList,
@@ -290,6 +317,7 @@ fn tables(
             seed: 0,
             hmd: setup.hmd.clone(),
             frames: setup.frames.clone(),
+            surfaces: Some(draws.surfaces()),
         },
         textures,
         samplers,
@@ -424,7 +452,7 @@ impl Summary {
                 "with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace)"
             ));
         }
-        if let Some(bytes) = peak_rss_bytes() {
+        if let Some(bytes) = memory::peak_bytes() {
             note(&format!(
                 "peak memory    {:.0} MiB",
                 bytes as f64 / f64::from(1 << 20)
@@ -438,16 +466,8 @@ fn mib(bytes: usize) -> f64 {
     bytes as f64 / f64::from(1 << 20)
 }
 
-/// Largest resident set so far, where the system tells (Linux).
-fn peak_rss_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024)
-}
-
 /// Sets what Mesa reads from the environment.
-fn prepare_environment(threads: Option<u16>) {
+pub(super) fn prepare_environment(threads: Option<u16>) {
     // SAFETY: the only other thread waits for signals; nothing reads the environment meanwhile.
     unsafe {
         // Mesa's device selection asks a display server, in vain and aloud where there is none.

@@ -146,6 +146,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
             seed: 0,
             hmd,
             frames,
+            surfaces: None,
         },
         origin,
         eyes,

@@ -160,7 +160,7 @@ impl LineChart {
 
 impl Axis {
     /// The ends of the axis over these values.
-    fn fit(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
+    pub(super) fn fit(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
         if let Some((low, high)) = self.range {
             return low..high;
         }

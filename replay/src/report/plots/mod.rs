@@ -1,6 +1,7 @@
 //! Charts as SVG text by plotters: a pure function of the numbers, byte for byte.
 
 pub mod bars;
+pub mod boxes;
 pub mod contours;
 pub mod data_uri;
 mod frame;
@@ -8,6 +9,7 @@ pub mod hbars;
 pub mod heatmap;
 pub mod lines;
 pub mod paths;
+pub mod scatter;
 #[cfg(test)]
 pub(crate) mod testing;
 

@@ -8,10 +8,14 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Its queue.
     pub queue: wgpu::Queue,
+    /// Name of the device.
+    pub adapter: String,
     /// Driver string as it names itself.
     pub driver: String,
     /// It runs on the processor.
     pub is_software: bool,
+    /// It has a multiview, which need not be sound.
+    pub has_multiview: bool,
     /// What it lacks for captures; without it only pictures can be rendered.
     pub no_capture: Option<String>,
 }
@@ -82,9 +86,10 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
             what: what.clone(),
         });
     }
+    let multiview = adapter.features() & wgpu::Features::MULTIVIEW;
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         label: None,
-        required_features: (PICTURE_FEATURES | CAPTURE_FEATURES) - missing,
+        required_features: ((PICTURE_FEATURES | CAPTURE_FEATURES) - missing) | multiview,
         required_limits: adapter.limits(),
         experimental_features: wgpu::ExperimentalFeatures::disabled(),
         memory_hints: wgpu::MemoryHints::MemoryUsage,
@@ -97,8 +102,10 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
     Ok(Gpu {
         device,
         queue,
+        adapter: info.name.clone(),
         driver,
         is_software: info.device_type == wgpu::DeviceType::Cpu,
+        has_multiview: !multiview.is_empty(),
         no_capture,
     })
 }

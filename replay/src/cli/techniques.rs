@@ -1,0 +1,403 @@
+//! `replay techniques`: what `tracegen techniques` measured and rendered, held against each other.
+
+use super::ConfigArgs;
+use super::experiment_args::{page_outputs, parse_orders};
+use super::subjects::Traces;
+use crate::config::{Mode, Order, RunConfig};
+use crate::experiment::{self, Plan, ResultRow, frame_count};
+use crate::files::{self, write_atomically};
+use crate::report::picture::EmbeddedPicture;
+use crate::report::techniques::{Scene, TechniquesReport};
+use crate::result::scene_name;
+use crate::stream::TileSource;
+use crate::techniques::{
+    CacheFigures, Difference, Folder, Measured, Measures, PictureFigures, Sharing, Timing,
+    differences, picture_figures, sharing,
+};
+use anyhow::{Context, Result};
+use rayon::prelude::*;
+use shell::{Output, Progress, is_stdout};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `replay techniques`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  replay techniques out/plant
+  replay techniques out/plant --json
+  replay techniques out/plant out/atrium out/jungle --html out/techniques.html
+  replay techniques out/plant --orders all --l1 16KiB --csv rows.csv")]
+pub struct Args {
+    /// Folders that `tracegen techniques` wrote
+    #[arg(required = true, value_name = "DIR")]
+    folders: Vec<PathBuf>,
+    #[command(flatten)]
+    machine: ConfigArgs,
+    /// Orders to compare with and without each technique, comma-separated, or `all`
+    #[arg(
+        long,
+        value_name = "ORDERS",
+        default_value = "morton,z2-lrta,z2-sta,z2-sta-merge"
+    )]
+    orders: String,
+    /// Print one JSON object (schema replay.techniques/1)
+    #[arg(long)]
+    json: bool,
+    /// Also write the rows as CSV; - writes them to standard output in place of the table
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Also write a page with plots and pictures, with JSON and CSV beside it
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    #[command(flatten)]
+    threads: shell::Threads,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// A folder that breaks a rule, an unreadable picture or trace, an output that cannot be written.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    args.threads.start()?;
+    let config = args.machine.resolve_over(RunConfig {
+        mode: Mode::Functional,
+        order: Order::Z2_STA,
+        ..RunConfig::default()
+    })?;
+    let folders = args.folders.iter().map(|path| Folder::open(path));
+    let folders = folders.collect::<Result<Vec<_>, _>>()?;
+    let prints = check_outputs(args, &folders)?;
+    let mut orders = parse_orders(&args.orders)?;
+    for order in [Order::MORTON, config.order] {
+        if !orders.contains(&order) {
+            orders.push(order);
+        }
+    }
+
+    let pictures = compare_pictures(&folders)?;
+    let traces = FolderTraces::open(&folders)?;
+    let caches = traces.replay(&config, &orders)?;
+    let scenes = labels(&folders);
+    let mut measures = Vec::new();
+    for (index, folder) in folders.iter().enumerate() {
+        let mut rows = Vec::new();
+        for (row, pictures) in pictures[index].iter().enumerate() {
+            rows.push(measured(
+                folder,
+                row,
+                &scenes[index],
+                pictures,
+                &caches[index][row],
+            )?);
+        }
+        let mut scene = Measures {
+            scene: &scenes[index],
+            rows,
+        };
+        scene.mark_dominated();
+        measures.push(scene);
+    }
+    let report = TechniquesReport {
+        scenes: &measures,
+        manifests: folders.iter().map(|f| &f.manifest).collect(),
+        config,
+        orders,
+    };
+    if let Some(path) = &args.csv {
+        write_atomically(path, report.csv().as_bytes())?;
+    }
+    if let Some(path) = &args.html {
+        let scenes = folders.iter().zip(&pictures).enumerate();
+        let scenes = scenes
+            .map(|(index, (folder, figures))| {
+                let differences = differences(folder, figures, &traces.of_rows(index, folder))?;
+                embedded(folder, differences)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let page = report.page(&scenes)?;
+        if !is_stdout(path) {
+            let json = report.json()? + "\n";
+            write_atomically(&path.with_extension("json"), json.as_bytes())?;
+            write_atomically(&path.with_extension("csv"), report.csv().as_bytes())?;
+        }
+        write_atomically(path, page.as_bytes())?;
+    }
+    if prints {
+        super::print(&if args.json {
+            report.json()?
+        } else {
+            report.text()
+        })?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Checks the outputs against all files that the folders hold; true where standard output is left.
+fn check_outputs(args: &Args, folders: &[Folder]) -> Result<bool> {
+    let mut outputs: Vec<Output> = Vec::new();
+    outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
+    outputs.extend(
+        args.html
+            .iter()
+            .flat_map(|path| page_outputs("--html", path)),
+    );
+    outputs.extend(args.json.then(|| Output::result("--json")));
+    let mut inputs: Vec<PathBuf> = args.machine.file().map(PathBuf::from).into_iter().collect();
+    for folder in folders {
+        inputs.extend(folder.files()?);
+    }
+    files::check_outputs(&outputs, inputs.iter().map(PathBuf::as_path))?;
+    let to_stdout = args
+        .csv
+        .iter()
+        .chain(&args.html)
+        .any(|path| is_stdout(path));
+    Ok(!to_stdout)
+}
+
+/// Names of the folders' scenes; those of one scene go by their folders' names, too.
+fn labels(folders: &[Folder]) -> Vec<String> {
+    let scene = |folder: &Folder| scene_name(&folder.manifest.scene).to_owned();
+    let scenes: Vec<String> = folders.iter().map(scene).collect();
+    let label = |(index, name): (usize, &String)| {
+        if scenes.iter().filter(|other| *other == name).count() == 1 {
+            name.clone()
+        } else {
+            format!("{name} ({})", folders[index].name())
+        }
+    };
+    scenes.iter().enumerate().map(label).collect()
+}
+
+fn compare_pictures(folders: &[Folder]) -> Result<Vec<Vec<PictureFigures>>> {
+    let count = |folder: &Folder| 2 * folder.manifest.frames.len() * folder.manifest.rows.len();
+    let all: usize = folders.iter().map(count).sum();
+    let progress = Progress::new("comparing", all as u64, "pictures");
+    let figures = folders.iter().map(|folder| {
+        picture_figures(folder, &|done| progress.advance(done)).map_err(anyhow::Error::from)
+    });
+    figures.collect()
+}
+
+/// What the caches say of a row: one an order, and what the eyes share.
+type RowCaches = (Vec<CacheFigures>, Option<Sharing>);
+
+/// The traces of all folders.
+struct FolderTraces {
+    traces: Traces,
+    /// Folder and row of each trace.
+    rows: Vec<(usize, usize)>,
+    /// Rows of each folder.
+    counts: Vec<usize>,
+}
+
+impl FolderTraces {
+    fn open(folders: &[Folder]) -> Result<Self> {
+        let (mut paths, mut rows) = (Vec::new(), Vec::new());
+        for (index, folder) in folders.iter().enumerate() {
+            for (row, of_row) in folder.manifest.rows.iter().enumerate() {
+                if let Some(trace) = &of_row.trace {
+                    paths.push(folder.file(trace)?);
+                    rows.push((index, row));
+                }
+            }
+        }
+        Ok(Self {
+            traces: Traces::open(&paths)?,
+            rows,
+            counts: folders.iter().map(|f| f.manifest.rows.len()).collect(),
+        })
+    }
+
+    /// Replays every trace in every order.
+    fn replay(&self, config: &RunConfig, orders: &[Order]) -> Result<Vec<Vec<RowCaches>>> {
+        let caches_bytes = [(config.l1.size_bytes, config.l2.size_bytes)];
+        let plan = Plan::paper(*config, &caches_bytes, orders, false)?;
+        let subjects = self.traces.subjects();
+        let replays = (subjects.len() * (plan.points.len() + 1)) as u64;
+        let progress = Progress::new("replaying", replays, "replays");
+        let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
+        let shared = subjects
+            .par_iter()
+            .map(|subject| {
+                let shared = sharing(subject.source, config);
+                progress.advance(1);
+                shared.with_context(|| subject.label.clone())
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let none = |count: &usize| vec![(Vec::new(), None); *count];
+        let mut caches: Vec<Vec<RowCaches>> = self.counts.iter().map(none).collect();
+        let results = outcome.rows();
+        for ((&(folder, row), of_trace), shared) in self
+            .rows
+            .iter()
+            .zip(results.chunks(plan.points.len()))
+            .zip(shared)
+        {
+            caches[folder][row] = (of_trace.iter().map(cache_figures).collect(), Some(shared));
+        }
+        Ok(caches)
+    }
+
+    /// The traces of a folder, one a row that has one.
+    fn of_rows(&self, folder: usize, of: &Folder) -> Vec<Option<&dyn TileSource>> {
+        let mut out: Vec<Option<&dyn TileSource>> = vec![None; of.manifest.rows.len()];
+        for (trace, (index, row)) in self.traces.sources().zip(&self.rows) {
+            if *index == folder {
+                out[*row] = Some(trace);
+            }
+        }
+        out
+    }
+}
+
+fn cache_figures(row: &ResultRow) -> CacheFigures {
+    let result = row.result;
+    CacheFigures {
+        order: row.point.config.order,
+        footprints: result.footprints,
+        l1_miss_pct: 100.0 * result.l1.miss_rate,
+        l2_miss_pct: 100.0 * result.l2.miss_rate,
+        external_bytes: result.external_bytes,
+        bound_bytes: row.bound_bytes(),
+        frames: frame_count(row.subject.source.tables()),
+    }
+}
+
+fn measured<'a>(
+    folder: &'a Folder,
+    row: usize,
+    scene: &'a str,
+    pictures: &PictureFigures,
+    (caches, sharing): &RowCaches,
+) -> Result<Measured<'a>> {
+    let manifest = &folder.manifest;
+    let of_row = &manifest.rows[row];
+    let timing = Timing::of(of_row);
+    Ok(Measured {
+        scene,
+        row: of_row,
+        baseline: manifest.baseline_row().context("no baseline")?,
+        timing: timing.with_context(|| format!("{}: no frame times", of_row.technique))?,
+        worst_frame: manifest.frames[pictures.worst_frame],
+        pictures: pictures.clone(),
+        caches: caches.clone(),
+        sharing: *sharing,
+        dominated: false,
+    })
+}
+
+fn embedded(folder: &Folder, differences: Vec<Difference>) -> Result<Scene> {
+    let embed = |difference: Difference| {
+        let title = &folder.manifest.rows[difference.row].title;
+        let picture = EmbeddedPicture::of(title, &difference.picture)?;
+        Ok((difference, picture))
+    };
+    Ok(Scene {
+        differences: differences.into_iter().map(embed).collect::<Result<_>>()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::techniques::testing;
+    use clap::Parser;
+    use serde_json::Value;
+    use std::fs;
+    use std::path::Path;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn run_on(folders: &[&Path], page: &Path) -> Result<ExitCode> {
+        let mut line = vec!["techniques".to_owned(), "--csv".to_owned()];
+        line.push(page.with_extension("rows").display().to_string());
+        line.extend(["--html".to_owned(), page.display().to_string()]);
+        line.extend(folders.iter().map(|f| f.display().to_string()));
+        run(&Line::try_parse_from(line).unwrap().args)
+    }
+
+    #[test]
+    fn a_folder_becomes_rows_a_page_and_the_same_bytes_again() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("plant");
+        testing::folder(&folder);
+        let page = root.path().join("out/page.html");
+        run_on(&[&folder], &page).unwrap();
+        let read = |extension: &str| fs::read_to_string(page.with_extension(extension)).unwrap();
+        let first = ["html", "json", "csv", "rows"].map(read);
+        run_on(&[&folder], &page).unwrap();
+        assert_eq!(first, ["html", "json", "csv", "rows"].map(read));
+        assert_eq!(first[2], first[3]);
+
+        let json: Value = serde_json::from_str(&first[1]).unwrap();
+        assert_eq!(json["schema"], "replay.techniques/1");
+        let rows = json["rows"].as_array().unwrap();
+        let names: Vec<&Value> = rows.iter().map(|r| &r["technique"]).collect();
+        assert_eq!(names, ["per-eye", "superfrustum", "grey"]);
+        for (row, ratio) in rows.iter().zip([1.0, 0.5, 0.8]) {
+            assert!((row["frame_time_ratio"].as_f64().unwrap() - ratio).abs() < 1e-9);
+            assert!(row["external_bytes"].as_u64().unwrap() > 0);
+            assert_eq!(row["false_negatives"], 0);
+            assert_eq!(row["false_positives"], 9);
+        }
+        assert_eq!(rows[1]["cull_tests_ratio"], 0.5);
+        assert_eq!(rows[1]["flip_mean"], 0.0);
+        assert!(rows[2]["flip_mean"].as_f64().unwrap() > 0.0);
+        // The grey corner costs more time than the superfrustum and errs.
+        let dominated: Vec<&Value> = rows.iter().map(|r| &r["dominated"]).collect();
+        assert_eq!(dominated, [true, false, true]);
+        // The published saving of frustum tests stands beside ours.
+        assert_eq!(json["published"][0]["published_pct"], "up to 50");
+        assert_eq!(json["published"][0]["ours_pct"], 50.0);
+        for text in [
+            "a processor's",
+            "plant: run time against error",
+            "4.00 pixels per degree",
+            "Tile orders with and without",
+            "data:image/jpeg",
+        ] {
+            assert!(first[0].contains(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_output_that_a_folder_holds_is_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("plant");
+        testing::folder(&folder);
+        let manifest = folder.join("manifest.json");
+        let before = fs::read(&manifest).unwrap();
+        let page = folder.join("manifest.html");
+        let error = run_on(&[&folder], &page).unwrap_err().to_string();
+        assert!(error.contains("manifest.json"), "{error}");
+        assert_eq!(fs::read(&manifest).unwrap(), before);
+    }
+
+    #[test]
+    fn a_trace_that_is_damaged_is_named() {
+        let root = tempfile::tempdir().unwrap();
+        testing::folder(root.path());
+        let trace = root.path().join("traces/grey.textrace");
+        fs::write(&trace, b"PLXTRACE").unwrap();
+        let page = root.path().join("page.html");
+        let error = format!("{:#}", run_on(&[root.path()], &page).unwrap_err());
+        assert!(error.contains("grey.textrace"), "{error}");
+    }
+
+    #[test]
+    fn folders_of_one_scene_go_by_their_names() {
+        let root = tempfile::tempdir().unwrap();
+        let paths = ["one", "two"].map(|name| root.path().join(name));
+        for path in &paths {
+            testing::folder(path);
+        }
+        let folders = paths.each_ref().map(|path| Folder::open(path).unwrap());
+        assert_eq!(labels(&folders), ["plant (one)", "plant (two)"]);
+        assert_eq!(labels(&folders[..1]), ["plant"]);
+    }
+}

@@ -1,0 +1,366 @@
+//! Named points of two costs, with the front of those that no other beats. Every point's name
+//! stands near it, where it covers neither another name nor another point.
+
+use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::lines::Axis;
+use super::{PlotError, SeriesStyle};
+use crate::report::theme;
+use plotters::prelude::{Circle, Color, PathElement};
+use plotters::style::text_anchor::HPos;
+
+/// A chart of named points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ScatterChart {
+    /// Heading.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Names of both kinds of point, dominated ones second.
+    pub kinds: [String; 2],
+    /// The points.
+    pub points: Vec<NamedPoint>,
+}
+
+/// A named point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedPoint {
+    /// Name and colour.
+    pub style: SeriesStyle,
+    /// Where it is.
+    pub at: (f64, f64),
+    /// Another point is as good in both and better in one: drawn hollow.
+    pub dominated: bool,
+}
+
+const TOP_PX: u32 = 72;
+const LEFT_PX: u32 = 58;
+const RIGHT_PX: u32 = 120;
+const PLOT_PX: (f64, f64) = (720.0, 400.0);
+const NAME_HEIGHT_PX: f64 = 14.0;
+/// Names no further than this from their point need no line to it.
+const NEAR_PX: f64 = 16.0;
+const FARTHEST_PX: f64 = 230.0;
+
+impl ScatterChart {
+    /// The chart as SVG.
+    ///
+    /// # Errors
+    /// A point that is not finite.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        let finite = |p: &&NamedPoint| !(p.at.0.is_finite() && p.at.1.is_finite());
+        if let Some(bad) = self.points.iter().find(finite) {
+            return Err(PlotError {
+                title: self.title.clone(),
+                problem: format!("point `{}` at {:?}", bad.style.name, bad.at),
+            });
+        }
+        let x = self.x.fit(self.points.iter().map(|p| p.at.0));
+        let mut y = self.y.fit(self.points.iter().map(|p| p.at.1));
+        if y.start == 0.0 {
+            // Points at zero are drawn whole.
+            y.start = -0.03 * y.end;
+        }
+        let frame = Frame {
+            title: &self.title,
+            value_label: &self.y.label,
+            legend: vec![
+                LegendEntry {
+                    name: &self.kinds[0],
+                    color: theme::INK,
+                    symbol: Symbol::Dot,
+                },
+                LegendEntry {
+                    name: &self.kinds[1],
+                    color: theme::INK,
+                    symbol: Symbol::Ring,
+                },
+            ],
+            plot_px: PLOT_PX,
+            around_px: [TOP_PX, RIGHT_PX, AXIS_PX, LEFT_PX],
+        };
+        frame.draw(|root, mut builder| {
+            let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
+            themed(&mut chart.configure_mesh())
+                .disable_x_mesh()
+                .x_desc(&self.x.label)
+                .x_label_formatter(&tick_format(&x))
+                .y_label_formatter(&tick_format(&y))
+                .draw()?;
+            let mut front: Vec<(f64, f64)> = self
+                .points
+                .iter()
+                .filter(|p| !p.dominated)
+                .map(|p| p.at)
+                .collect();
+            front.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // Steps: a point covers all that is right of and above it.
+            let corner = |pair: &[(f64, f64)]| [pair[0], (pair[1].0, pair[0].1)];
+            let mut steps: Vec<(f64, f64)> = front.windows(2).flat_map(corner).collect();
+            steps.extend(front.last());
+            let line = PathElement::new(steps, theme::AXIS.stroke_width(1));
+            chart.plotting_area().draw(&line)?;
+            let dots: Vec<(f64, f64)> = self
+                .points
+                .iter()
+                .map(|p| chart.backend_coord(&p.at))
+                .map(|(x, y)| (f64::from(x), f64::from(y)))
+                .collect();
+            let widths: Vec<f64> = self
+                .points
+                .iter()
+                .map(|p| theme::text_width_px(&p.style.name, theme::TICK_PX))
+                .collect();
+            let room = Rect {
+                left: f64::from(LEFT_PX) + 4.0,
+                top: f64::from(TOP_PX),
+                right: f64::from(LEFT_PX + RIGHT_PX) + PLOT_PX.0 - 2.0,
+                bottom: f64::from(TOP_PX) + PLOT_PX.1 - 2.0,
+            };
+            // Leaders lie under dots and names.
+            let names = place(&dots, &widths, room);
+            for (dot, name) in dots.iter().zip(&names) {
+                let to = name.nearest(*dot);
+                if distance(*dot, to) > NEAR_PX {
+                    let line = [*dot, to].map(|(x, y)| (x as i32, y as i32));
+                    root.draw(&PathElement::new(line, theme::GRID.stroke_width(1)))?;
+                }
+            }
+            for (point, (x, y)) in self.points.iter().zip(&dots) {
+                let color = point.style.color;
+                let style = if point.dominated {
+                    color.stroke_width(2)
+                } else {
+                    color.filled()
+                };
+                root.draw(&Circle::new((*x as i32, *y as i32), DOT_PX, style))?;
+            }
+            for (point, name) in self.points.iter().zip(&names) {
+                let ink = if point.dominated {
+                    theme::MUTED
+                } else {
+                    theme::INK
+                };
+                let text = text_style(theme::TICK_PX, ink, HPos::Left);
+                let middle = f64::midpoint(name.top, name.bottom);
+                let at = (name.left as i32, middle as i32);
+                root.draw_text(&point.style.name, &text, at)?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// A rectangle in pixels, y down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rect {
+    left: f64,
+    top: f64,
+    right: f64,
+    bottom: f64,
+}
+
+impl Rect {
+    fn contains(&self, other: &Self) -> bool {
+        other.left >= self.left
+            && other.right <= self.right
+            && other.top >= self.top
+            && other.bottom <= self.bottom
+    }
+
+    fn overlap(&self, other: &Self) -> f64 {
+        let side = |a: (f64, f64), b: (f64, f64)| (a.1.min(b.1) - a.0.max(b.0)).max(0.0);
+        side((self.left, self.right), (other.left, other.right))
+            * side((self.top, self.bottom), (other.top, other.bottom))
+    }
+
+    /// The point of the rectangle that is nearest to another.
+    fn nearest(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        (
+            x.clamp(self.left, self.right),
+            y.clamp(self.top, self.bottom),
+        )
+    }
+
+    fn around((x, y): (f64, f64), half: f64) -> Self {
+        Self {
+            left: x - half,
+            top: y - half,
+            right: x + half,
+            bottom: y + half,
+        }
+    }
+}
+
+fn distance(a: (f64, f64), b: (f64, f64)) -> f64 {
+    (a.0 - b.0).hypot(a.1 - b.1)
+}
+
+/// Whether two segments cross.
+fn cross(a: [(f64, f64); 2], b: [(f64, f64); 2]) -> bool {
+    let side = |line: [(f64, f64); 2], p: (f64, f64)| {
+        (line[1].0 - line[0].0) * (p.1 - line[0].1) - (line[1].1 - line[0].1) * (p.0 - line[0].0)
+    };
+    side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0
+}
+
+/// A rectangle for the name of each dot: of the places around it, the nearest one that covers
+/// nothing placed before, no dot, and whose line to the dot crosses none.
+fn place(dots: &[(f64, f64)], widths: &[f64], room: Rect) -> Vec<Rect> {
+    let mut placed: Vec<Rect> = Vec::new();
+    let mut leaders: Vec<[(f64, f64); 2]> = Vec::new();
+    for (index, (&dot, &width)) in dots.iter().zip(widths).enumerate() {
+        let cost = |place: &Rect| {
+            let names: f64 = placed.iter().map(|other| place.overlap(other)).sum();
+            let marks: f64 = dots
+                .iter()
+                .map(|dot| place.overlap(&Rect::around(*dot, f64::from(DOT_PX) + 1.0)))
+                .sum();
+            let leader = [dot, place.nearest(dot)];
+            let away = distance(leader[0], leader[1]);
+            let crossed = leaders
+                .iter()
+                .filter(|other| cross(**other, leader))
+                .count();
+            let through = if away > NEAR_PX {
+                // A line through another name reads as that name's.
+                let steps = (away / 4.0) as usize;
+                let on = |t: usize| {
+                    let t = t as f64 / steps.max(1) as f64;
+                    let lerp = |a: f64, b: f64| a + t * (b - a);
+                    Rect::around(
+                        (
+                            lerp(leader[0].0, leader[1].0),
+                            lerp(leader[0].1, leader[1].1),
+                        ),
+                        1.0,
+                    )
+                };
+                (0..=steps)
+                    .filter(|t| placed.iter().any(|name| name.overlap(&on(*t)) > 0.0))
+                    .count()
+            } else {
+                0
+            };
+            // Beside a dot, its own height reads best.
+            let aside = (f64::midpoint(place.top, place.bottom) - dot.1).abs();
+            away + 0.5 * aside
+                + 40.0 * (names + marks)
+                + 30.0 * crossed as f64
+                + 30.0 * through as f64
+        };
+        let mut best: Option<(f64, Rect)> = None;
+        let mut radius = f64::from(DOT_PX) + 4.0;
+        while radius <= FARTHEST_PX {
+            // Beyond the best there is nothing better.
+            if best.is_some_and(|(cost, _)| cost < radius) {
+                break;
+            }
+            for step in 0..24 {
+                // Right first, then upwards and down in turn.
+                let turn = f64::from((step + 1) / 2) * if step % 2 == 1 { -1.0 } else { 1.0 };
+                let angle = turn * std::f64::consts::TAU / 24.0;
+                let (x, y) = (dot.0 + radius * angle.cos(), dot.1 + radius * angle.sin());
+                let left = x - width * (0.5 - 0.5 * angle.cos());
+                let candidate = Rect {
+                    left,
+                    top: y - NAME_HEIGHT_PX / 2.0,
+                    right: left + width,
+                    bottom: y + NAME_HEIGHT_PX / 2.0,
+                };
+                if !room.contains(&candidate) {
+                    continue;
+                }
+                let cost = cost(&candidate);
+                if best.is_none_or(|(least, _)| cost < least) {
+                    best = Some((cost, candidate));
+                }
+            }
+            radius += 6.0;
+        }
+        // Where nothing fits the name stands right of its dot.
+        let beside = Rect {
+            left: dot.0 + 8.0,
+            top: dot.1 - NAME_HEIGHT_PX / 2.0,
+            right: dot.0 + 8.0 + width,
+            bottom: dot.1 + NAME_HEIGHT_PX / 2.0,
+        };
+        let name = best.map_or(beside, |(_, name)| name);
+        leaders.push([dot, name.nearest(dot)]);
+        placed.push(name);
+        debug_assert_eq!(placed.len(), index + 1);
+    }
+    placed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROOM: Rect = Rect {
+        left: 0.0,
+        top: 0.0,
+        right: 800.0,
+        bottom: 400.0,
+    };
+
+    #[test]
+    fn names_of_crowded_points_cover_neither_each_other_nor_a_point() {
+        // Ten techniques without error and of much the same time, as lossless ones are.
+        let dots: Vec<(f64, f64)> = (0..10)
+            .map(|i| (300.0 + 9.0 * f64::from(i), 390.0))
+            .collect();
+        let widths = [90.0; 10];
+        let names = place(&dots, &widths, ROOM);
+        for (i, name) in names.iter().enumerate() {
+            assert!(ROOM.contains(name), "{name:?}");
+            for other in &names[..i] {
+                assert_eq!(name.overlap(other), 0.0, "{name:?} {other:?}");
+            }
+            for dot in &dots {
+                assert_eq!(
+                    name.overlap(&Rect::around(*dot, 4.0)),
+                    0.0,
+                    "{name:?} {dot:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_alone_has_its_name_right_beside_it() {
+        let names = place(&[(100.0, 100.0)], &[50.0], ROOM);
+        assert!(
+            names[0].left > 104.0 && names[0].left < 112.0,
+            "{:?}",
+            names[0]
+        );
+        assert!((f64::midpoint(names[0].top, names[0].bottom) - 100.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn the_same_points_give_the_same_bytes() {
+        let point = |name: &str, at, dominated| NamedPoint {
+            style: SeriesStyle::nth(name, 0),
+            at,
+            dominated,
+        };
+        let chart = ScatterChart {
+            title: "Time against error".into(),
+            x: Axis::linear("time"),
+            y: Axis::linear("error"),
+            kinds: ["best".into(), "dominated".into()],
+            points: vec![
+                point("a", (1.0, 0.0), false),
+                point("b", (0.8, 0.1), false),
+                point("c", (1.1, 0.2), true),
+            ],
+        };
+        let svg = chart.svg().unwrap();
+        assert_eq!(svg, chart.svg().unwrap());
+        for text in ["\na\n", "\nb\n", "\nc\n", "dominated"] {
+            assert!(svg.contains(text), "{text}");
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! The figures of a technique, a line each.
+
+use crate::config::Order;
+use crate::report::columns::{Column, Show};
+use crate::techniques::{CacheFigures, Count, Measured, OrderGain};
+
+/// A column of techniques.
+pub type Figure<'a> = Column<'a, &'a Measured<'a>>;
+
+/// Keys of the table for a terminal, where it has them.
+pub const SHORT: [&str; 16] = [
+    "scene",
+    "technique",
+    "frame_time_ratio",
+    "frame_time_ratio_q1",
+    "frame_time_ratio_q3",
+    "beyond_90hz_pct",
+    "cull_tests_ratio",
+    "false_negatives",
+    "false_positives",
+    "draws_ratio",
+    "fragments_ratio",
+    "flip_mean",
+    "flip_worst",
+    "flicker",
+    "external_mb_per_frame",
+    "dominated",
+];
+
+/// Mean of a count over the frames.
+fn mean<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
+    Figure::real(key, name, "a frame", 0, move |m| {
+        Some(m.total(of)? as f64 / m.row.frames.len().max(1) as f64)
+    })
+}
+
+fn ratio<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
+    Figure::real(key, name, "\u{d7} baseline", 3, move |m| {
+        m.over_baseline(of)
+    })
+}
+
+/// Every figure of these techniques: what the captures name themselves (stages, predictions) has
+/// columns as they name it. `order` is the order of the cache figures.
+#[must_use]
+#[rustfmt::skip]
+pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
+    let mut columns = vec![
+        Figure::text("scene", "scene", |m| m.scene),
+        Figure::text("technique", "technique", |m| m.row.technique.as_str()),
+        Figure::text("title", "name", |m| m.row.title.as_str()),
+        Figure::text("parts", "combines", |m| m.row.parts.join(" + ")),
+        Figure::text("lossless", "lossless", |m| m.row.lossless)
+            .about("no pixel that the user can see is meant to change"),
+        Figure::text("dominated", "dominated", |m| m.dominated)
+            .about("another technique takes no more time, errs no more, and is better at one of both"),
+
+        Figure::real("frame_time_ratio", "time", "\u{d7} baseline", 3, |m| m.timing.ratio.median)
+            .about("median over all frames and repeats of the frame time over the baseline's that was measured beside it"),
+        Figure::real("frame_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q1),
+        Figure::real("frame_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q3),
+        Figure::real("frame_time_ratio_p1", "1 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p1),
+        Figure::real("frame_time_ratio_p99", "99 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p99),
+        Figure::real("frame_ms", "frame", "ms", 2, |m| m.timing.frame_ms.median)
+            .about("median frame time without capture"),
+        Figure::real("frame_ms_p1", "1 %", "ms", 2, |m| m.timing.frame_ms.p1),
+        Figure::real("frame_ms_p99", "99 %", "ms", 2, |m| m.timing.frame_ms.p99),
+        Figure::real("beyond_90hz_pct", "late at 90 Hz", "%", 1, |m| m.timing.beyond_pct[0])
+            .about("frames beyond 11.1 ms, times scaled so that the baseline's median takes 11.1 ms"),
+        Figure::real("beyond_72hz_pct", "late at 72 Hz", "%", 1, |m| m.timing.beyond_pct[1])
+            .about("frames beyond 13.9 ms, times scaled so that the baseline's median takes 11.1 ms"),
+        Figure::real("cull_ms", "culling", "ms", 3, |m| m.timing.cull_ms)
+            .about("median time of culling a frame"),
+    ];
+    let mut stages: Vec<&str> = Vec::new();
+    for (stage, _) in rows.iter().flat_map(|m| &m.timing.stages_ms) {
+        if !stages.contains(&stage.as_str()) {
+            stages.push(stage);
+        }
+    }
+    columns.extend(stages.into_iter().map(str::to_owned).map(|stage| {
+        let heading = (format!("stages_ms.{stage}"), stage.clone());
+        Figure::real(heading.0, heading.1, "ms", 3, move |m| {
+            let found = m.timing.stages_ms.iter().find(|(name, _)| *name == stage);
+            found.map(|(_, ms)| *ms)
+        })
+        .about("median time of the stage")
+    }));
+    columns.extend([
+        Figure::new("cull_tests", "tests", "all frames", Show::Whole, |m| m.total(|f| Some(f.cull_tests)))
+            .about("bounds tested against a frustum"),
+        ratio("cull_tests_ratio", "tests", |f| Some(f.cull_tests)),
+        Figure::new("false_negatives", "missed", "draws", Show::Whole, |m| m.total(|f| f.false_negatives))
+            .about("draws left out of which a fragment can be seen, all frames"),
+        Figure::new("false_positives", "needless", "draws", Show::Whole, |m| m.total(|f| f.false_positives))
+            .about("draws kept of which nothing can be seen, all frames"),
+        mean("draws", "draws", |f| Some(f.draws)),
+        ratio("draws_ratio", "draws", |f| Some(f.draws)),
+        mean("draw_calls", "calls", |f| Some(f.draw_calls)),
+        mean("state_changes", "state changes", |f| Some(f.state_changes)),
+        mean("vertices", "vertices", |f| Some(f.vertices)),
+        mean("triangles", "triangles", |f| Some(f.triangles)),
+        mean("quads", "quads", |f| f.quads),
+        mean("fragments", "fragments", |f| f.fragments),
+        ratio("fragments_ratio", "fragments", |f| f.fragments),
+        mean("bytes_uploaded", "uploaded", |f| Some(f.bytes_uploaded)),
+        Figure::new("peak_memory_bytes", "memory", "MB", Show::Millions(0), |m| m.row.peak_memory_bytes)
+            .about("most memory that the capturer held"),
+
+        Figure::real("flip_mean", "FLIP", "", 5, |m| m.pictures.flip_mean)
+            .about("mean FLIP where the user can see"),
+        Figure::real("flip_p99", "FLIP 99 %", "", 5, |m| m.pictures.flip_p99)
+            .about("mean of the pictures' 99th percentiles of FLIP"),
+        Figure::real("flip_worst", "worst", "FLIP", 5, |m| m.pictures.flip_worst)
+            .about("mean FLIP of the worst picture"),
+        Figure::new("worst_frame", "frame", "worst", Show::Whole, |m| u64::from(m.worst_frame)),
+        Figure::real("psnr_db", "PSNR", "dB", 1, |m| m.pictures.psnr_db)
+            .about("mean peak signal-to-noise ratio; 100 stands for no difference"),
+        Figure::real("psnr_worst_db", "worst", "dB", 1, |m| m.pictures.psnr_worst_db),
+        Figure::real("ssim", "SSIM", "", 4, |m| m.pictures.ssim)
+            .about("mean structural similarity"),
+        Figure::real("ssim_worst", "worst", "SSIM", 4, |m| m.pictures.ssim_worst),
+        Figure::real("flicker", "flicker", "", 5, |m| m.pictures.flicker)
+            .about("mean difference, 0 to 1, between the change from frame to frame and the baseline's"),
+        Figure::real("identical_pct", "identical", "% of pictures", 1, |m| m.pictures.identical_pct)
+            .about("pictures whose visible pixels are the baseline's to the bit"),
+    ]);
+    let mut predictions: Vec<&str> = Vec::new();
+    for (key, _) in rows.iter().flat_map(|m| &m.row.frames).flat_map(|f| &f.predicted) {
+        if !predictions.contains(&key.as_str()) {
+            predictions.push(key);
+        }
+    }
+    columns.extend(predictions.into_iter().map(str::to_owned).map(|key| {
+        let heading = (format!("predicted.{key}"), format!("predicted {}", key.replace('_', " ")));
+        Figure::real(heading.0, heading.1, "", 3, move |m| m.predicted(&key))
+            .about("mean of what the technique said beforehand")
+    }));
+    columns.extend([
+        Figure::new("footprints", "footprints", "", Show::Whole, move |m| Some(m.caches_in(order)?.footprints))
+            .about("bilinear footprints of the trace"),
+        Figure::real("l1_miss_pct", "L1 miss", "%", 2, move |m| Some(m.caches_in(order)?.l1_miss_pct)),
+        Figure::real("l2_miss_pct", "L2 miss", "%", 2, move |m| Some(m.caches_in(order)?.l2_miss_pct)),
+        Figure::new("external_bytes", "external", "bytes", Show::Whole, move |m| Some(m.caches_in(order)?.external_bytes))
+            .about("line misses of the L2 times the line size, all frames of the trace"),
+        Figure::real("external_mb_per_frame", "external", "MB/frame", 3, move |m| m.caches_in(order).map(CacheFigures::external_mb_per_frame))
+            .about("external texture traffic"),
+    ]);
+    columns
+}
+
+/// A column of what an order gains with a technique.
+pub type GainFigure<'a> = Column<'a, OrderGain<'a>>;
+
+/// The table of orders with and without each technique. `gain` is the order whose saving over
+/// `against` is told.
+#[must_use]
+#[rustfmt::skip]
+pub fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -> Vec<GainFigure<'a>> {
+    let mut columns = vec![
+        GainFigure::text("scene", "scene", |g| g.measured.scene),
+        GainFigure::text("technique", "technique", |g| g.measured.row.technique.as_str()),
+    ];
+    columns.extend(orders.iter().map(|&order| {
+        let key = format!("external_mb_per_frame.{}", order.name());
+        GainFigure::real(key, order.title(), "MB/frame", 3, move |g| {
+            g.measured.caches_in(order).map(CacheFigures::external_mb_per_frame)
+        })
+    }));
+    let saved = format!("{} saves", gain.title());
+    let of = format!("of {}", against.title());
+    columns.extend([
+        GainFigure::real("saved_pct", saved, "%", 1, |g| g.own.saved_pct),
+        GainFigure::real("saved_without_pct", "without", "%", 1, |g| g.baseline.saved_pct)
+            .about("what the order saves on the baseline's trace"),
+        GainFigure::real("shared_pct", "shared", "% of lines", 1, |g| g.own.shared_pct)
+            .about("lines that both eyes touch, of those that either does"),
+        GainFigure::real("headroom_pct", "above bound", "%", 1, |g| g.own.headroom_pct)
+            .about("traffic above that of an infinite cache: no order saves more"),
+        GainFigure::text("reason", "why", OrderGain::reason),
+    ]);
+    if let Some(column) = columns.iter_mut().find(|c| c.heading.key == "saved_pct") {
+        column.heading.about = "external traffic that the order saves";
+        column.heading.name = format!("{} {of}", column.heading.name).into();
+    }
+    columns
+}

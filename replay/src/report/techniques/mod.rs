@@ -1,0 +1,196 @@
+//! Techniques of stereo rendering on some scenes: table, JSON, CSV and page.
+
+mod columns;
+mod page;
+mod plots;
+mod published;
+
+pub use page::Scene;
+
+use super::columns::Records;
+use super::table::Table;
+use crate::config::{Order, RunConfig};
+use crate::result::TOOL;
+use crate::techniques::manifest::{Auto, Manifest};
+use crate::techniques::{Measured, Measures, OrderGain};
+use columns::{columns, order_columns};
+use formats::view::Lens;
+use published::{ClaimRow, claim_columns, claims};
+use serde::Serialize;
+
+/// Schema of the JSON object.
+pub const SCHEMA: &str = "replay.techniques/1";
+
+/// What is measured of some scenes.
+pub struct TechniquesReport<'a> {
+    /// The scenes.
+    pub scenes: &'a [Measures<'a>],
+    /// Their manifests.
+    pub manifests: Vec<&'a Manifest>,
+    /// Caches, sampling and layout; its order is the one of the table.
+    pub config: RunConfig,
+    /// Orders that the traces were replayed in.
+    pub orders: Vec<Order>,
+}
+
+/// The JSON object.
+#[derive(Serialize)]
+struct Document<'r, 'a> {
+    schema: &'a str,
+    tool: &'a str,
+    config: RunConfig,
+    scenes: Vec<SceneFacts<'a>>,
+    rows: Records<'r, 'a, &'a Measured<'a>>,
+    orders: Records<'r, 'a, OrderGain<'a>>,
+    published: Records<'r, 'static, ClaimRow<'a>>,
+}
+
+/// What the figures of a scene belong to.
+#[derive(Serialize)]
+struct SceneFacts<'a> {
+    scene: &'a str,
+    path: Option<&'a str>,
+    frames: &'a [u32],
+    scene_triangles: u64,
+    instances: u64,
+    size_px: [u32; 2],
+    hmd: &'a str,
+    lens: [Lens; 2],
+    pixels_per_degree: f32,
+    adapter: &'a str,
+    driver: &'a str,
+    software_driver: bool,
+    measured_by: &'a str,
+    baseline: &'a str,
+    auto: Option<&'a Auto>,
+}
+
+impl<'a> TechniquesReport<'a> {
+    /// The order whose gain is told, and the one that it is over.
+    #[must_use]
+    pub fn gain_orders(&self) -> (Order, Order) {
+        let own = self.config.order;
+        let other = if own == Order::MORTON {
+            Order::Z2_STA
+        } else {
+            own
+        };
+        (other, Order::MORTON)
+    }
+
+    fn rows(&self) -> Vec<&'a Measured<'a>> {
+        self.scenes.iter().flat_map(|scene| &scene.rows).collect()
+    }
+
+    fn gains(&self) -> Vec<OrderGain<'a>> {
+        let (order, against) = self.gain_orders();
+        let scenes = self.scenes.iter();
+        scenes.flat_map(|s| s.order_gains(order, against)).collect()
+    }
+
+    /// Every figure of every technique.
+    #[must_use]
+    pub fn table(&self) -> Table {
+        let rows = self.rows();
+        let columns = columns(&rows, self.config.order);
+        Table::new(&columns, &rows).grouped_by(1)
+    }
+
+    /// The figures that fit a terminal.
+    #[must_use]
+    pub fn short_table(&self) -> Table {
+        let one = self.scenes.len() == 1;
+        let columns = columns::SHORT
+            .into_iter()
+            .filter(|key| !(one && *key == "scene"));
+        let table = self.table().picked(columns);
+        table.grouped_by(usize::from(!one))
+    }
+
+    /// What an order gains with and without each technique.
+    #[must_use]
+    pub fn order_table(&self) -> Table {
+        let (order, against) = self.gain_orders();
+        let columns = order_columns(&self.orders, order, against);
+        Table::new(&columns, &self.gains()).grouped_by(1)
+    }
+
+    /// Published savings beside ours.
+    #[must_use]
+    pub fn claim_table(&self) -> Table {
+        Table::new(&claim_columns(), &claims(self.scenes)).without_empty_columns()
+    }
+
+    /// The tables for a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = self.short_table().text();
+        let orders = self.order_table();
+        if !orders.rows.is_empty() {
+            text += "\n";
+            text += &orders.text();
+        }
+        let software = self.manifests.iter().find(|m| m.software_driver);
+        if let Some(manifest) = software {
+            text += &format!(
+                "\nframe times are a processor's: rendered by {}\n",
+                formats::text::printable(&manifest.adapter)
+            );
+        }
+        text
+    }
+
+    /// Every figure in full precision.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        self.table().csv()
+    }
+
+    /// As one JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        let rows = self.rows();
+        let (order, against) = self.gain_orders();
+        let gains = self.gains();
+        let claims = claims(self.scenes);
+        let order_columns = order_columns(&self.orders, order, against);
+        let columns = columns(&rows, self.config.order);
+        let facts = |(scene, m): (&'a Measures<'a>, &&'a Manifest)| SceneFacts {
+            scene: scene.scene,
+            path: m.path.as_deref(),
+            frames: &m.frames,
+            scene_triangles: m.scene_triangles,
+            instances: m.instances,
+            size_px: m.size_px,
+            hmd: &m.hmd.name,
+            lens: m.lens,
+            pixels_per_degree: m.pixels_per_degree,
+            adapter: &m.adapter,
+            driver: &m.driver,
+            software_driver: m.software_driver,
+            measured_by: &m.tool,
+            baseline: &m.baseline,
+            auto: m.auto.as_ref(),
+        };
+        serde_json::to_string_pretty(&Document {
+            schema: SCHEMA,
+            tool: TOOL,
+            config: self.config,
+            scenes: self.scenes.iter().zip(&self.manifests).map(facts).collect(),
+            rows: Records {
+                columns: &columns,
+                rows: &rows,
+            },
+            orders: Records {
+                columns: &order_columns,
+                rows: &gains,
+            },
+            published: Records {
+                columns: &claim_columns(),
+                rows: &claims,
+            },
+        })
+    }
+}

@@ -1,0 +1,243 @@
+//! `tracegen techniques`: the folder of a study, going on after an interruption, the search under a
+//! budget, and what is refused.
+
+use parallax_tests::{program, refuse, run_ok};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A small study of a small scene.
+fn study(folder: &Path, only: &str) -> Command {
+    let mut command = program("tracegen");
+    command
+        .args(["techniques", "atrium-plain", "--quiet", "--path", "head"])
+        .args([
+            "--size",
+            "64x72",
+            "--path-frames",
+            "6",
+            "--frames",
+            "3",
+            "--repeats",
+            "2",
+        ])
+        .args(["--only", only])
+        .arg("-o")
+        .arg(folder);
+    command
+}
+
+fn json(path: &Path) -> Value {
+    let bytes = fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    serde_json::from_slice(&bytes).expect("JSON")
+}
+
+fn manifest(folder: &Path) -> Value {
+    json(&folder.join("manifest.json"))
+}
+
+/// Takes away what differs from run to run: times, and how much memory was held.
+fn without_measurements(value: &mut Value) {
+    match value {
+        Value::Object(map) => {
+            map.retain(|key, _| !(key.ends_with("_s") || key == "peak_memory_bytes"));
+            map.values_mut().for_each(without_measurements);
+        }
+        Value::Array(list) => list.iter_mut().for_each(without_measurements),
+        _ => {}
+    }
+}
+
+/// Every file below a folder but for JSON, by its path in the folder.
+fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            let entries = fs::read_dir(&path).expect("a folder");
+            open.extend(entries.map(|entry| entry.expect("an entry").path()));
+        } else if path.extension().is_none_or(|extension| extension != "json") {
+            let name = path
+                .strip_prefix(folder)
+                .expect("inside")
+                .display()
+                .to_string();
+            found.push((name, fs::read(&path).expect("a file")));
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn a_study_tells_of_every_technique_what_it_draws_shows_and_takes() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let folder = root.path().join("study");
+    run_ok(&mut study(&folder, "superfrustum,round-robin"));
+    let manifest = manifest(&folder);
+    assert_eq!(manifest["schema"], "tracegen.techniques/1");
+    assert_eq!(manifest["frames"], serde_json::json!([0, 1, 4]));
+    let rows = manifest["rows"].as_array().expect("rows");
+    let names: Vec<&Value> = rows.iter().map(|row| &row["technique"]).collect();
+    assert_eq!(names, ["per-eye", "superfrustum", "round-robin"]);
+    let image = |row: &Value, frame: usize, eye: usize| {
+        let name = row["frames"][frame]["images"][eye]
+            .as_str()
+            .expect("a name");
+        fs::read(folder.join(name)).expect("a picture")
+    };
+    for row in rows {
+        for (number, frame) in row["frames"].as_array().expect("frames").iter().enumerate() {
+            let count = |key: &str| frame[key].as_u64().unwrap_or_else(|| panic!("{key}"));
+            for key in ["draws", "draw_calls", "state_changes", "vertices", "quads"] {
+                assert!(count(key) > 0, "{key}: {frame}");
+            }
+            assert!(count("fragments") > count("quads"), "{frame}");
+            assert!(count("cull_tests") > 0, "{frame}");
+            for key in ["frame_s", "baseline_s"] {
+                let times = frame[key].as_array().expect("times");
+                assert_eq!(times.len(), 2);
+                assert!(times.iter().all(|time| time.as_f64() > Some(0.0)));
+            }
+            if row["lossless"] == true {
+                assert_eq!(frame["false_negatives"], 0, "{frame}");
+                for eye in 0..2 {
+                    assert!(image(row, number, eye) == image(&rows[0], number, eye));
+                }
+            }
+        }
+        let trace = folder.join(row["trace"].as_str().expect("a trace"));
+        run_ok(program("replay").arg("validate").arg(trace));
+    }
+    let tests = |row: &Value| row["frames"][0]["cull_tests"].as_u64();
+    assert!(
+        tests(&rows[1]) < tests(&rows[0]),
+        "one volume is tested less often than two"
+    );
+}
+
+#[test]
+fn a_study_that_was_killed_goes_on_where_it_was_and_ends_with_the_same() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let [whole, killed] = ["whole", "killed"].map(|name| root.path().join(name));
+    let only = "superfrustum,conical,round-robin";
+    run_ok(&mut study(&whole, only));
+    let mut child = study(&killed, only)
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let first = killed.join("rows/per-eye.json");
+    let start = Instant::now();
+    while !first.exists() && start.elapsed() < Duration::from_secs(300) {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+    assert!(
+        !killed.join("manifest.json").exists(),
+        "it was killed too late to show anything"
+    );
+    let kept = fs::read(&first).expect("the first row");
+    run_ok(&mut study(&killed, only));
+    assert!(
+        fs::read(&first).expect("the first row") == kept,
+        "a finished row is not measured again"
+    );
+    let [mut a, mut b] = [&whole, &killed].map(|folder| manifest(folder));
+    without_measurements(&mut a);
+    without_measurements(&mut b);
+    assert_eq!(a, b);
+    assert!(files(&whole) == files(&killed));
+}
+
+#[test]
+fn the_search_keeps_its_budget_on_frames_it_did_not_see_and_is_as_cheap_as_any_technique_alone() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    run_ok(study(root.path(), "none").args(["--auto", "flip=0.01"]));
+    let manifest = manifest(root.path());
+    let auto = &manifest["auto"];
+    assert_eq!(auto["budget"], "flip=0.01");
+    assert!(auto["worst_error"].as_f64().expect("an error") <= 0.01);
+    let searched = auto["search_frames"].as_array().expect("frames").len();
+    let held = auto["held_frames"].as_array().expect("frames").len();
+    assert_eq!(searched + held, 6);
+    assert!(held >= 3);
+    let cost = |key: &str| {
+        auto[key]["verdict"]["frame_time_ratio"]
+            .as_f64()
+            .expect("a ratio")
+    };
+    assert!(cost("chosen") <= cost("best_single"), "{auto}");
+    let rows = manifest["rows"].as_array().expect("rows");
+    assert_eq!(rows[rows.len() - 1]["technique"], "auto-flip-0.01");
+    assert_eq!(rows[rows.len() - 1]["settings"], auto["chosen"]["settings"]);
+}
+
+#[test]
+fn a_budget_that_nothing_meets_is_told() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let mut command = study(root.path(), "none");
+    refuse(
+        command.args(["--auto", "budget-ms=0.0001"]),
+        &["nothing meets --auto budget-ms=0.0001", "ms a frame"],
+    );
+}
+
+#[test]
+fn what_cannot_be_is_refused_with_the_reason() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let folder = root.path().join("study");
+    let refused = |arguments: &[&str], expected: &[&str]| {
+        let mut command = program("tracegen");
+        command.args(["techniques", "atrium-plain", "--size", "32x32", "-o"]);
+        refuse(command.arg(&folder).args(arguments), expected);
+        assert!(!folder.exists(), "{arguments:?}");
+    };
+    refused(
+        &["--only", "conical,octree"],
+        &["--only", "'octree'", "superfrustum"],
+    );
+    refused(
+        &["--only", "conical+superfrustum"],
+        &["conical and superfrustum exclude each other"],
+    );
+    refused(&["--frames", "0"], &["--frames", "0"]);
+    refused(
+        &["--frames", "9", "--path-frames", "8"],
+        &["at most 8", "found 9"],
+    );
+    refused(&["--repeats", "0"], &["--repeats"]);
+    refused(
+        &["--adapter", "no such device"],
+        &["'no such device'", "llvmpipe"],
+    );
+    refused(&["--auto", "flip=nan"], &["flip=ERROR", "'flip=nan'"]);
+    refused(&["--auto", "ssim=1"], &["flip=ERROR", "'ssim=1'"]);
+    let path = root.path().join("path.csv");
+    fs::write(
+        &path,
+        "time_s,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,nan,0,0,0,0,0,1\n",
+    )
+    .expect("a file");
+    refused(
+        &["--path", path.to_str().expect("UTF-8")],
+        &["path.csv", "nan"],
+    );
+}
+
+#[test]
+fn a_study_replaces_no_other_files() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let file = root.path().join("file");
+    fs::write(&file, "kept").expect("a file");
+    for (output, expected) in [
+        (file.as_path(), "found a file"),
+        (root.path(), "found other files"),
+    ] {
+        refuse(&mut study(output, "none"), &["--output", expected]);
+    }
+    refuse(&mut study(Path::new("-"), "none"), &["expected a folder"]);
+    assert_eq!(fs::read(&file).expect("the file"), b"kept");
+}

@@ -1,0 +1,282 @@
+//! `tracegen techniques`.
+
+use super::cache_args::CacheArgs;
+use super::path_args::PathArgs;
+use super::prepared::{Prepared, prepare};
+use super::raster;
+use super::scene_args::SceneArgs;
+use crate::study::auto::{AutoRecord, Budget, choose};
+use crate::study::folder::{self, Folder, RowRecord, Subject};
+use crate::study::frames;
+use crate::study::measure::{Bench, Extent};
+use crate::study::rows::Row;
+use ::raster::lavapipe::device;
+use anyhow::{Context, ensure};
+use clap::Args;
+use formats::view::Lens;
+use scene::LoadOptions;
+use shell::{Progress, Threads, note};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use xxhash_rust::xxh3::xxh3_64;
+
+/// Eye size where neither `--size` nor `--hmd` is given: half the default display's.
+const SIZE_PX: [u32; 2] = [480, 540];
+/// Memory for raw records.
+const RECORD_BUDGET: u64 = 128 << 20;
+
+/// Arguments of `tracegen techniques`.
+#[derive(Args, Debug)]
+pub struct TechniquesArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Folder to write: a manifest, pictures and traces. What an earlier run of the same study has
+    /// finished there is kept.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Techniques, alone or joined by `+`, separated by commas; the baseline is always measured
+    /// [default: all, and combinations].
+    #[arg(long, value_name = "LIST")]
+    only: Option<String>,
+    /// Frames to measure: pairs of consecutive ones, spread over the path.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = super::path_args::frame_count())]
+    frames: u32,
+    #[command(flatten)]
+    path: PathArgs,
+    /// Frames of the path.
+    #[arg(long, value_name = "N", default_value_t = 72, help_heading = "Camera",
+          value_parser = super::path_args::frame_count())]
+    path_frames: u32,
+    /// Measured frames that go into each technique's trace.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    trace_frames: u32,
+    /// Times that each frame is timed, the baseline's beside it.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeats: u32,
+    /// Light the scene through 4 shadow cascades of 2048x2048.
+    #[arg(long)]
+    shadows: bool,
+    /// Device to render on: a part of its name [default: Mesa's software driver]. One that cannot
+    /// capture is timed, without traces and counts of fragments.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Also search for the best combination under a budget, and measure it: `flip=ERROR` (mean FLIP
+    /// inside the lens) or `pixels=PX` for the cheapest whose error stays inside in every frame of
+    /// the path, `budget-ms=MS` for the least error whose median frame takes no longer on this
+    /// device.
+    #[arg(long, value_name = "BUDGET")]
+    auto: Option<Budget>,
+    #[command(flatten)]
+    cache: CacheArgs,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// Runs `tracegen techniques`.
+///
+/// # Errors
+/// Unreadable input, no driver, or a folder that cannot be written.
+pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
+    raster::prepare_environment(args.threads.count);
+    args.threads.start()?;
+    let mut rows = match &args.only {
+        Some(list) => Row::parse_list(list).context("--only")?,
+        None => Row::all(),
+    };
+    let inputs = args.inputs();
+    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    folder::check(&args.output, &inputs)?;
+    ensure!(
+        args.frames <= args.path_frames,
+        "--frames: expected at most {}, the frames of the path, found {}",
+        args.path_frames,
+        args.frames
+    );
+    let gpu = device::open(args.adapter.as_deref())?;
+    let progress = Progress::new("loading the scene", 0, "");
+    let setup = args.scene.setup(
+        Some(SIZE_PX),
+        &args.path,
+        0..args.path_frames,
+        &LoadOptions::ALL,
+    )?;
+    let extent = args.extent();
+    progress.stage("preparing textures and shaders", 0, "");
+    let (adapter, captures) = (gpu.adapter.clone(), gpu.no_capture.is_none());
+    if let Some(what) = &gpu.no_capture {
+        shell::warn(&format!(
+            "{adapter} lacks {what}: no traces, no counts of fragments"
+        ));
+    }
+    let cascades = raster::cascades(&setup.scene, args.shadows);
+    let mut subject = Subject {
+        tool: super::tool(),
+        scene: args.scene.scene.clone(),
+        scene_triangles: setup.scene.triangle_count(),
+        instances: setup.scene.instances.len() as u64,
+        camera: setup.camera.name.clone(),
+        path: args.path.path.to_string(),
+        path_frames: args.path_frames,
+        frames: extent.frames(),
+        fps: args.path.fps,
+        size_px: setup.hmd.eye_size_px,
+        hmd: setup.hmd.clone(),
+        lens: setup.hmd.fov.map(|fov| Lens::of(&fov)),
+        pixels_per_degree: image_error::pixels_per_degree(
+            setup.hmd.eye_size_px[0],
+            &setup.hmd.fov[0],
+        ),
+        adapter,
+        driver: gpu.driver.clone(),
+        software_driver: gpu.is_software,
+        baseline: Row::baseline().name,
+        repeats: args.repeats,
+        trace_frames: extent.trace_frames.clone(),
+        shadow_cascades: cascades,
+        input_checksum: checksum(&inputs)?,
+    };
+    if !captures {
+        subject.trace_frames.clear();
+    }
+    let sizes = [cascades.into(), RECORD_BUDGET];
+    let prepared = prepare(
+        setup,
+        args.path.fps,
+        &args.scene.scene,
+        gpu,
+        sizes,
+        args.cache,
+    )?;
+    let Prepared { world, mut backend } = prepared;
+    let mut impossible = Vec::new();
+    for row in &rows {
+        if let Err(error) = world.check(&row.settings) {
+            if args.only.is_some() {
+                return Err(error.context(row.name.clone()));
+            }
+            shell::warn(&format!("{} is left out: {error}", row.name));
+            impossible.push(row.name.clone());
+        }
+    }
+    rows.retain(|row| !impossible.contains(&row.name));
+    let folder = Folder::create(&args.output, &subject)?;
+    let mut bench = Bench {
+        world: &world,
+        backend: &mut backend,
+        captures,
+        extent: &extent,
+        truth: HashMap::new(),
+        folder: &folder,
+        progress: &progress,
+    };
+    let mut records = measure(&mut bench, &rows)?;
+    let auto = args
+        .auto
+        .map(|budget| measure_auto(&mut bench, budget))
+        .transpose()?;
+    drop(progress);
+    let auto = auto.map(|(record, row)| {
+        records.push(row);
+        record
+    });
+    let manifest = folder.finish(&subject, &records, auto.as_ref())?;
+    if records
+        .iter()
+        .flat_map(|row| &row.frames)
+        .all(|frame| frame.fragments == Some(0))
+    {
+        shell::warn("no frame shows anything of the scene: choose another --camera");
+    }
+    let mut text = format!("{}: {} rows", manifest.display(), records.len());
+    if let Some(auto) = &auto {
+        text += &format!("\n--auto {}: {}", auto.budget, auto.reason);
+    }
+    shell::print(&text)
+}
+
+/// Measures the rows that are not there already, in their order.
+fn measure(bench: &mut Bench<'_>, rows: &[Row]) -> anyhow::Result<Vec<RowRecord>> {
+    let mut records: Vec<_> = (rows.iter())
+        .map(|row| bench.folder.finished(&row.name, &row.settings))
+        .collect();
+    let open = records.iter().filter(|record| record.is_none()).count();
+    if open < rows.len() {
+        note(&format!(
+            "{} of {} rows were there already",
+            rows.len() - open,
+            rows.len()
+        ));
+    }
+    bench
+        .progress
+        .stage("measuring", open as u64 * bench.extent.steps(), "frames");
+    for (row, record) in rows.iter().zip(&mut records) {
+        if record.is_none() {
+            let planner = bench.world.planner(&row.settings)?;
+            let measured = bench
+                .measure(row, |_| &planner)
+                .with_context(|| row.name.clone())?;
+            bench.folder.keep(&measured)?;
+            *record = Some(measured);
+        }
+    }
+    Ok(records.into_iter().flatten().collect())
+}
+
+/// Chooses under a budget and measures what was chosen, unless that is there already.
+fn measure_auto(bench: &mut Bench<'_>, budget: Budget) -> anyhow::Result<(AutoRecord, RowRecord)> {
+    let name = format!("auto-{}", budget.to_string().replace('=', "-"));
+    if let Some(kept) = bench.folder.kept(&name, &budget) {
+        return Ok(kept);
+    }
+    let choice = choose(bench.world, bench.backend, budget, bench.progress)?;
+    let (held, planners) = (&choice.held, choice.planners(bench.world)?);
+    let chosen = &held.chain[0];
+    let row = Row {
+        title: format!("Chosen for {budget}: {}", chosen.title),
+        name: name.clone(),
+        ..chosen.clone()
+    };
+    let steps = bench.extent.steps();
+    bench
+        .progress
+        .stage("measuring what was chosen", steps, "frames");
+    let measured = bench.measure(&row, |frame| &planners[held.of_frame[frame as usize]])?;
+    let kept = (choice.record, measured);
+    bench.folder.write_kept(&name, &budget, &kept)?;
+    Ok(kept)
+}
+
+impl TechniquesArgs {
+    /// Files that the study reads.
+    fn inputs(&self) -> Vec<PathBuf> {
+        let scene = Path::new(&self.scene.scene);
+        // The names of built-in scenes have no extension and name no file.
+        let scene = scene.extension().map(|_| scene.to_owned());
+        scene.into_iter().chain(self.path.file()).collect()
+    }
+
+    fn extent(&self) -> Extent {
+        let runs = frames::runs(self.frames, self.path_frames);
+        let trace_frames = runs
+            .concat()
+            .into_iter()
+            .take(self.trace_frames as usize)
+            .collect();
+        Extent {
+            runs,
+            trace_frames,
+            repeats: self.repeats,
+        }
+    }
+}
+
+/// Checksum of files' bytes, one after the other.
+fn checksum(files: &[&Path]) -> anyhow::Result<String> {
+    let mut sums = Vec::new();
+    for file in files {
+        let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
+        sums.extend(xxh3_64(&bytes).to_le_bytes());
+    }
+    Ok(format!("{:016x}", xxh3_64(&sums)))
+}

@@ -1,0 +1,187 @@
+//! From a budget to what every frame of a path is rendered with.
+
+use super::{AutoRecord, Bench, Budget, Held, hold, search};
+use crate::study::measure::{Extent, median_s};
+use crate::study::rows::{Part, Row};
+use crate::study::world::World;
+use anyhow::bail;
+use raster::lavapipe::Lavapipe;
+use shell::Progress;
+use std::collections::HashMap;
+use std::time::Duration;
+use techniques::{Planner, SettingsError};
+use visibility::Occlusion;
+
+/// Frames of a path that the search sees.
+const SEARCH_FRAMES: u32 = 3;
+/// Times of each of them.
+const SEARCH_REPEATS: u32 = 2;
+
+/// What was chosen, and what each frame of the path is rendered with.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// What was chosen and why.
+    pub record: AutoRecord,
+    /// By frame.
+    pub held: Held,
+}
+
+impl Choice {
+    /// Planners of the combinations that the frames are rendered with; frame `i` has
+    /// `[held.of_frame[i]]`.
+    ///
+    /// # Errors
+    /// None that the search has not met.
+    pub fn planners(&self, world: &World) -> Result<Vec<Planner>, SettingsError> {
+        let rows = self.held.chain.iter();
+        rows.map(|row| world.planner(&row.settings)).collect()
+    }
+}
+
+/// Searches for the best combination of techniques under a budget on a few frames of the path, and
+/// holds it on all of them: where a frame would break an error budget, it falls back to a safer
+/// combination; where the path's median frame breaks a time budget, that is an error.
+///
+/// # Errors
+/// A budget that nothing meets, and driver errors.
+pub fn choose(
+    world: &World,
+    backend: &mut Lavapipe,
+    budget: Budget,
+    progress: &Progress,
+) -> anyhow::Result<Choice> {
+    let path_frames = world.views.len() as u32;
+    let search_frames = search_frames(path_frames);
+    let options = options(budget);
+    progress.stage(
+        "searching",
+        options.len() as u64 + 1,
+        "techniques alone, and combinations",
+    );
+    let mut bench = Bench {
+        world,
+        backend,
+        budget,
+        extent: Extent {
+            runs: search_frames.iter().map(|frame| vec![*frame]).collect(),
+            trace_frames: Vec::new(),
+            repeats: SEARCH_REPEATS,
+        },
+        references: HashMap::new(),
+        planners: Vec::new(),
+        progress,
+    };
+    let found = match search(&mut bench, &options, budget)? {
+        Ok(found) => found,
+        Err(infeasible) => {
+            let closest = infeasible.closest;
+            bail!(
+                "nothing meets --auto {budget}: the fastest found, {}, takes {:.1} ms a frame on this device",
+                closest.row.name,
+                closest.verdict.frame_s * 1e3
+            );
+        }
+    };
+    let chosen = &found.chosen.row;
+    progress.stage("holding the budget", path_frames.into(), "frames");
+    let held = match budget.error_limit() {
+        Some(limit) => {
+            let tried = &found.tried;
+            // Of the chosen combination; a safer one that takes its place in a frame starts anew.
+            let mut memory = Occlusion::default();
+            hold(chosen, tried, path_frames, limit, |row, frame| {
+                if row.settings == chosen.settings {
+                    progress.advance(1);
+                    return bench.error(row, frame, &mut memory);
+                }
+                bench.error(row, frame, &mut Occlusion::default())
+            })?
+        }
+        None => {
+            let planner = world.planner(&chosen.settings)?;
+            let mut times: Vec<Duration> = Vec::new();
+            let mut memory = Occlusion::default();
+            for frame in 0..path_frames {
+                let shot = world.shoot(bench.backend, &planner, frame, &mut memory)?;
+                times.push(shot.total);
+                progress.advance(1);
+            }
+            check_median(budget, chosen, median_s(&times))?;
+            Held::everywhere(chosen.clone(), path_frames as usize)
+        }
+    };
+    Ok(Choice {
+        record: AutoRecord::new(budget, &found, &held, search_frames),
+        held,
+    })
+}
+
+fn check_median(budget: Budget, chosen: &Row, median_s: f64) -> anyhow::Result<()> {
+    if let Budget::BudgetMs(limit_ms) = budget
+        && median_s * 1e3 > limit_ms
+    {
+        bail!(
+            "--auto {budget} is not kept on the whole path: {}, which kept it on the frames of the search, takes {:.1} ms in the median",
+            chosen.name,
+            median_s * 1e3
+        );
+    }
+    Ok(())
+}
+
+/// Frames in the middle of equal parts of the path, alternately even and odd: some techniques tell
+/// them apart.
+fn search_frames(path_frames: u32) -> Vec<u32> {
+    let count = SEARCH_FRAMES.min(path_frames);
+    let middle = |part: u32| {
+        let middle = u64::from(path_frames) * (2 * u64::from(part) + 1) / (2 * u64::from(count));
+        let even = middle as u32 & !1;
+        (even + part % 2).min(path_frames - 1)
+    };
+    let mut frames: Vec<u32> = (0..count).map(middle).collect();
+    frames.dedup();
+    frames
+}
+
+/// What may be used under a budget.
+fn options(budget: Budget) -> Vec<Part> {
+    let baseline = Row::baseline();
+    (Part::options().into_iter())
+        .filter(|part| !baseline.parts.contains(part))
+        .filter(|part| match budget {
+            Budget::Pixels(_) => part.lossless || part.is_shift(),
+            Budget::Flip(_) | Budget::BudgetMs(_) => true,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_search_sees_a_few_frames_of_either_parity_and_leaves_the_others() {
+        assert_eq!(search_frames(72), [12, 37, 60]);
+        assert_eq!(search_frames(1), [0]);
+        for path in 1..50 {
+            let frames = search_frames(path);
+            assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
+            assert!(frames.iter().all(|frame| *frame < path), "{frames:?}");
+        }
+    }
+
+    #[test]
+    fn only_shifts_may_be_used_where_shifts_are_bounded() {
+        let lossy = |part: &&Part| !part.lossless && !part.is_shift();
+        assert_eq!(options(Budget::Pixels(1.0)).iter().filter(lossy).count(), 0);
+        assert!(options(Budget::Flip(0.01)).iter().filter(lossy).count() > 0);
+    }
+
+    #[test]
+    fn a_path_whose_median_frame_is_too_slow_is_told() {
+        let row = Row::baseline();
+        check_median(Budget::BudgetMs(11.0), &row, 0.010_9).unwrap();
+        let error = check_median(Budget::BudgetMs(11.0), &row, 0.012).unwrap_err();
+        assert!(error.to_string().contains("12.0 ms"), "{error}");
+    }
+}

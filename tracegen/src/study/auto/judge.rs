@@ -1,0 +1,135 @@
+//! Measures combinations on a device.
+
+use super::budget::Budget;
+use super::search::{Judge, Verdict};
+use crate::study::measure::{Extent, median_s, time};
+use crate::study::rows::Row;
+use crate::study::world::World;
+use anyhow::Context;
+use image_error::{Mask, Picture, Reference};
+use raster::lavapipe::Lavapipe;
+use shell::Progress;
+use std::collections::HashMap;
+use std::sync::Arc;
+use techniques::{Planner, Settings};
+use visibility::Occlusion;
+
+/// Renders combinations and the baseline beside them.
+pub struct Bench<'a> {
+    /// Scene and path.
+    pub world: &'a World,
+    /// The device.
+    pub backend: &'a mut Lavapipe,
+    /// What errors are measured in.
+    pub budget: Budget,
+    /// Frames and repeats of the search.
+    pub extent: Extent,
+    /// The baseline's pictures of the frames of the search, as far as they were asked for.
+    pub references: HashMap<u32, Vec<Reference>>,
+    /// Planners made so far.
+    pub planners: Vec<Arc<Planner>>,
+    /// How far it is.
+    pub progress: &'a Progress,
+}
+
+impl Bench<'_> {
+    /// The error of a combination in a frame, in the budget's unit, after the frame before it.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn error(&mut self, row: &Row, frame: u32, memory: &mut Occlusion) -> anyhow::Result<f64> {
+        let planner = self.planner(&row.settings)?;
+        let shot = (self.world).shoot(self.backend, &planner, frame, memory)?;
+        if let Budget::Pixels(_) = self.budget {
+            let shift = shot.frame.plan.predicted.disparity_px;
+            return Ok(shift.map_or(0.0, f64::from));
+        }
+        let pictures = self.world.pictures(self.backend, &shot)?;
+        let references = match self.references.remove(&frame) {
+            Some(known) => known,
+            None => self.references(frame)?,
+        };
+        let mut worst = 0.0_f64;
+        for (picture, reference) in pictures.iter().zip(&references) {
+            let picture = of_rgba(self.world.hmd.eye_size_px, picture);
+            let error = reference.error(&picture).context("comparing pictures")?;
+            worst = worst.max(error.flip_mean);
+        }
+        // Those of the whole path would take too much memory.
+        if self.extent.frames().contains(&frame) {
+            self.references.insert(frame, references);
+        }
+        Ok(worst)
+    }
+
+    /// The planner of some settings: what it has worked out is kept.
+    fn planner(&mut self, settings: &Settings) -> anyhow::Result<Arc<Planner>> {
+        if let Some(known) = self.planners.iter().find(|p| p.settings() == settings) {
+            return Ok(Arc::clone(known));
+        }
+        let planner = Arc::new(self.world.planner(settings)?);
+        self.planners.push(Arc::clone(&planner));
+        Ok(planner)
+    }
+
+    /// The baseline's pictures of a frame, left and right.
+    fn references(&mut self, frame: u32) -> anyhow::Result<Vec<Reference>> {
+        let (world, baseline) = (self.world, self.planner(&Settings::default())?);
+        let shot = world.shoot(self.backend, &baseline, frame, &mut Occlusion::default())?;
+        let pictures = world.pictures(self.backend, &shot)?;
+        let size_px = world.hmd.eye_size_px;
+        (pictures.iter().zip(world.hmd.fov).zip(world.lens))
+            .map(|((picture, fov), lens)| {
+                let mask = Mask::of_lens(size_px, &fov, &lens);
+                let ppd = image_error::pixels_per_degree(size_px[0], &fov);
+                Reference::new(of_rgba(size_px, picture), mask, ppd).context("comparing pictures")
+            })
+            .collect()
+    }
+}
+
+impl Judge for Bench<'_> {
+    type Error = anyhow::Error;
+
+    fn can(&self, row: &Row) -> bool {
+        self.world.check(&row.settings).is_ok()
+    }
+
+    fn judge(&mut self, row: &Row) -> anyhow::Result<Verdict> {
+        let extent = self.extent.clone();
+        let planner = self.planner(&row.settings)?;
+        let mut error = 0.0_f64;
+        let mut memory = Occlusion::default();
+        for (frame, measured) in extent.rendered(row.settings.occlusion) {
+            if measured {
+                error = error.max(self.error(row, frame, &mut memory)?);
+            } else {
+                self.world
+                    .shoot(self.backend, &planner, frame, &mut memory)?;
+            }
+        }
+        let times = time(self.world, self.backend, &extent, |_| &*planner, || ())?;
+        let mut ratios = Vec::new();
+        let mut frame = Vec::new();
+        for times in &times {
+            let pairs = times.frame.iter().zip(&times.baseline);
+            ratios.extend(pairs.map(|(own, beside)| own.as_secs_f64() / beside.as_secs_f64()));
+            frame.extend(times.frame.iter().copied());
+        }
+        ratios.sort_by(f64::total_cmp);
+        self.progress.advance(1);
+        Ok(Verdict {
+            frame_time_ratio: ratios[(ratios.len() - 1) / 2],
+            frame_s: median_s(&frame),
+            error,
+        })
+    }
+}
+
+/// A picture without its alpha.
+fn of_rgba(size_px: [u32; 2], rgba: &[u8]) -> Picture {
+    Picture {
+        size_px,
+        pixels: rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect(),
+    }
+}

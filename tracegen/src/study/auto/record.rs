@@ -1,0 +1,119 @@
+//! What the manifest says of a search.
+
+use super::budget::Budget;
+use super::guard::Held;
+use super::search::{Found, Tried, Verdict};
+use serde::{Deserialize, Serialize};
+use techniques::Settings;
+
+/// A search and what it chose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AutoRecord {
+    /// As asked for.
+    pub budget: String,
+    /// The chosen combination.
+    pub chosen: Chosen,
+    /// Why, in words.
+    pub reason: String,
+    /// Frames that the search saw.
+    pub search_frames: Vec<u32>,
+    /// Frames on which the promise was held and that the search did not see.
+    pub held_frames: Vec<u32>,
+    /// Frames that are rendered with a safer combination, and with which.
+    pub fallbacks: Vec<Fallback>,
+    /// The worst frame's error over the whole path, in the budget's unit.
+    pub worst_error: Option<f64>,
+    /// The best single technique that keeps the budget.
+    pub best_single: Chosen,
+    /// Everything that the search tried.
+    pub tried: Vec<Chosen>,
+}
+
+/// A combination and what the search measured of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Chosen {
+    /// Name.
+    pub technique: String,
+    /// What it is captured with.
+    pub settings: Settings,
+    /// What it costs and shows on the frames of the search.
+    pub verdict: Verdict,
+}
+
+/// A frame that the chosen combination was too coarse for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fallback {
+    /// Its number.
+    pub frame: u32,
+    /// What it is rendered with.
+    pub technique: String,
+}
+
+impl From<&Tried> for Chosen {
+    fn from(tried: &Tried) -> Self {
+        Self {
+            technique: tried.row.name.clone(),
+            settings: tried.row.settings.clone(),
+            verdict: tried.verdict,
+        }
+    }
+}
+
+impl AutoRecord {
+    /// The record of a search over `search_frames` whose promise is held by `held`.
+    #[must_use]
+    pub fn new(budget: Budget, found: &Found, held: &Held, search_frames: Vec<u32>) -> Self {
+        let path = 0..held.of_frame.len() as u32;
+        let held_frames = path
+            .filter(|frame| !search_frames.contains(frame))
+            .collect();
+        let fallbacks = (held.fallen_back().into_iter())
+            .map(|frame| Fallback {
+                frame,
+                technique: held.row(frame).name.clone(),
+            })
+            .collect();
+        Self {
+            budget: budget.to_string(),
+            chosen: (&found.chosen).into(),
+            reason: reason(budget, found, held),
+            search_frames,
+            held_frames,
+            fallbacks,
+            worst_error: held.errors.iter().copied().reduce(f64::max),
+            best_single: (&found.best_single).into(),
+            tried: found.tried.iter().map(Chosen::from).collect(),
+        }
+    }
+}
+
+fn reason(budget: Budget, found: &Found, held: &Held) -> String {
+    let (chosen, single) = (&found.chosen, &found.best_single);
+    let mut text = format!(
+        "of {} tried, {} takes {:.2} of the baseline's frame time ({:.1} ms) at an error of {:.4}",
+        found.tried.len(),
+        chosen.row.name,
+        chosen.verdict.frame_time_ratio,
+        chosen.verdict.frame_s * 1e3,
+        chosen.verdict.error,
+    );
+    text += &match budget {
+        Budget::Flip(limit) => format!(", FLIP; the search kept 0.8 of the budget {limit}"),
+        Budget::Pixels(limit) => format!(" px; every shift is at most {limit} px by construction"),
+        Budget::BudgetMs(limit) => {
+            format!(", FLIP: the least that fits {limit} ms on this device, not scaled")
+        }
+    };
+    text += &format!(
+        "; the best single technique, {}, takes {:.2}",
+        single.row.name, single.verdict.frame_time_ratio
+    );
+    let fallen = held.fallen_back().len();
+    if let Some(worst) = held.errors.iter().copied().reduce(f64::max) {
+        text += &format!(
+            "; on all {} frames of the path the error is at most {worst:.4}, with a safer combination in {fallen} of them",
+            held.errors.len()
+        );
+    }
+    text
+}

@@ -1,0 +1,241 @@
+//! The search: each option alone, then the best with one more, as long as that pays.
+
+use super::Budget;
+use crate::study::rows::{Part, Row, Setting};
+use serde::{Deserialize, Serialize};
+
+/// What a combination costs and shows on the frames of the search.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Frame time over the baseline's beside it, median.
+    pub frame_time_ratio: f64,
+    /// Median frame time.
+    pub frame_s: f64,
+    /// The worst frame's error, in the budget's unit.
+    pub error: f64,
+}
+
+/// Whoever renders.
+pub trait Judge {
+    /// Its errors.
+    type Error;
+
+    /// Whether a combination can be rendered at all.
+    fn can(&self, row: &Row) -> bool;
+
+    /// Measures a combination that can be rendered.
+    ///
+    /// # Errors
+    /// Its own.
+    fn judge(&mut self, row: &Row) -> Result<Verdict, Self::Error>;
+}
+
+/// A combination that was tried.
+#[derive(Clone, Debug)]
+pub struct Tried {
+    /// The combination.
+    pub row: Row,
+    /// What it costs and shows.
+    pub verdict: Verdict,
+}
+
+/// What the search found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The best combination.
+    pub chosen: Tried,
+    /// The best single technique that keeps the budget; the baseline where none is cheaper.
+    pub best_single: Tried,
+    /// Everything tried, in its order.
+    pub tried: Vec<Tried>,
+}
+
+/// Nothing keeps the budget.
+#[derive(Clone, Debug)]
+pub struct Infeasible {
+    /// What comes closest.
+    pub closest: Tried,
+}
+
+/// A combination must save this share of the frame time to take the place of a simpler one: less
+/// is noise.
+const LEAST_GAIN: f64 = 0.01;
+/// An option that alone costs more than this over the baseline is not tried with others.
+const WORST_ALONE: f64 = 1.10;
+
+/// The best combination of `options` under a budget: alone, then the cheapest with one more option
+/// (or another one of the same kind) as long as that saves time. Where time is bounded, errors are
+/// added only as long as the time is not kept.
+///
+/// # Errors
+/// The judge's; the inner result tells where nothing keeps the budget.
+pub fn search<J: Judge>(
+    judge: &mut J,
+    options: &[Part],
+    budget: Budget,
+) -> Result<Result<Found, Infeasible>, J::Error> {
+    let mut search = Search {
+        judge,
+        tried: Vec::new(),
+    };
+    let baseline = search.try_row(Row::baseline())?;
+    let mut alone = Vec::new();
+    for option in options {
+        if let Some(row) = search.with(&baseline.row, std::slice::from_ref(option)) {
+            alone.push(search.try_row(row)?);
+        }
+    }
+    let fits_error = |tried: &Tried| match budget.search_limit() {
+        Some(limit) => tried.row.lossless || tried.verdict.error <= limit,
+        None => true,
+    };
+    alone.retain(fits_error);
+    alone.sort_by(|a, b| {
+        let ratio = |t: &Tried| t.verdict.frame_time_ratio;
+        ratio(a)
+            .total_cmp(&ratio(b))
+            .then_with(|| a.row.name.cmp(&b.row.name))
+    });
+    let mut best_single = baseline.clone();
+    if let Some(first) = alone.first()
+        && saves(first, &baseline)
+    {
+        best_single = first.clone();
+    }
+    alone.retain(|tried| tried.verdict.frame_time_ratio <= WORST_ALONE);
+    let chosen = match budget {
+        Budget::Flip(_) | Budget::Pixels(_) => {
+            search.descend(best_single.clone(), &alone, fits_error)?
+        }
+        Budget::BudgetMs(limit_ms) => {
+            let limit_s = limit_ms / 1e3;
+            let fits = |tried: &Tried| tried.verdict.frame_s <= limit_s;
+            let (free, lossy): (Vec<Tried>, Vec<Tried>) =
+                alone.into_iter().partition(|tried| tried.row.lossless);
+            let mut chosen = search.descend(baseline, &free, |_| true)?;
+            if !fits(&chosen) {
+                chosen = search.least_error(chosen, &lossy, fits)?;
+            }
+            if !fits(&chosen) {
+                return Ok(Err(Infeasible { closest: chosen }));
+            }
+            let lossless = chosen.row.lossless || !fits(&best_single);
+            if !lossless && best_single.verdict.error < chosen.verdict.error {
+                chosen = best_single.clone();
+            }
+            chosen
+        }
+    };
+    Ok(Ok(Found {
+        chosen,
+        best_single,
+        tried: search.tried,
+    }))
+}
+
+struct Search<'a, J> {
+    judge: &'a mut J,
+    tried: Vec<Tried>,
+}
+
+impl<J: Judge> Search<'_, J> {
+    fn try_row(&mut self, row: Row) -> Result<Tried, J::Error> {
+        if let Some(known) = self.tried.iter().find(|t| t.row.settings == row.settings) {
+            return Ok(known.clone());
+        }
+        let verdict = self.judge.judge(&row)?;
+        let tried = Tried { row, verdict };
+        self.tried.push(tried.clone());
+        Ok(tried)
+    }
+
+    /// Takes each option (cheapest alone first) that makes the best so far cheaper, until none does.
+    fn descend(
+        &mut self,
+        mut best: Tried,
+        options: &[Tried],
+        fits: impl Fn(&Tried) -> bool,
+    ) -> Result<Tried, J::Error> {
+        loop {
+            let mut improved = false;
+            for option in options {
+                let Some(row) = self.with(&best.row, &option.row.parts) else {
+                    continue;
+                };
+                let candidate = self.try_row(row)?;
+                if fits(&candidate) && saves(&candidate, &best) {
+                    best = candidate;
+                    improved = true;
+                }
+            }
+            if !improved {
+                return Ok(best);
+            }
+        }
+    }
+
+    /// Adds the option that keeps the time with the least error, or, where none does, the one that
+    /// comes closest, and goes on from there.
+    fn least_error(
+        &mut self,
+        mut best: Tried,
+        options: &[Tried],
+        fits: impl Fn(&Tried) -> bool,
+    ) -> Result<Tried, J::Error> {
+        let mut open: Vec<Setting> = Vec::new();
+        for option in options {
+            let setting = option.row.parts[0].setting();
+            if !open.contains(&setting) {
+                open.push(setting);
+            }
+        }
+        while !open.is_empty() {
+            let mut candidates: Vec<(Setting, Tried)> = Vec::new();
+            for option in options {
+                let setting = option.row.parts[0].setting();
+                if !open.contains(&setting) {
+                    continue;
+                }
+                if let Some(row) = self.with(&best.row, &option.row.parts) {
+                    candidates.push((setting, self.try_row(row)?));
+                }
+            }
+            let kept = candidates
+                .iter()
+                .map(|(_, tried)| tried)
+                .filter(|t| fits(t));
+            let error = |t: &&Tried| t.verdict.error;
+            if let Some(kept) = kept.min_by(|a, b| error(a).total_cmp(&error(b))) {
+                return Ok(kept.clone());
+            }
+            let time = |(_, t): &(Setting, Tried)| t.verdict.frame_s;
+            let fastest = candidates
+                .into_iter()
+                .min_by(|a, b| time(a).total_cmp(&time(b)));
+            let Some((taken, fastest)) = fastest.filter(|(_, fastest)| saves(fastest, &best))
+            else {
+                return Ok(best);
+            };
+            open.retain(|setting| *setting != taken);
+            best = fastest;
+        }
+        Ok(best)
+    }
+
+    /// `row` with more parts, in the place of those that they exclude; none where nothing changes or
+    /// it cannot be rendered.
+    fn with(&self, row: &Row, parts: &[Part]) -> Option<Row> {
+        let replaced = |part: &&Part| parts.iter().any(|new| new.setting() == part.setting());
+        let kept = row.parts.iter().filter(|part| !replaced(part));
+        // The baseline is what is there without any part.
+        let baseline = Row::baseline().parts;
+        let kept = kept.filter(|part| !baseline.contains(part)).cloned();
+        let all: Vec<Part> = kept.chain(parts.iter().cloned()).collect();
+        let new = Row::of(all).ok()?;
+        (new.settings != row.settings && self.judge.can(&new)).then_some(new)
+    }
+}
+
+fn saves(a: &Tried, b: &Tried) -> bool {
+    a.verdict.frame_time_ratio < b.verdict.frame_time_ratio * (1.0 - LEAST_GAIN)
+}

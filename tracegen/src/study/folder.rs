@@ -1,0 +1,421 @@
+//! The folder of a study, schema `tracegen.techniques/1` (see docs/techniques-folder.md).
+//!
+//! A row that is complete is a file of its own, so a study that was ended goes on where it was.
+
+use super::auto::AutoRecord;
+use anyhow::{Context, ensure};
+use formats::container::AtomicFile;
+use formats::view::{Hmd, Lens};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use techniques::Settings;
+use techniques::layer::Predicted;
+use xxhash_rust::xxh3::xxh3_64;
+
+const SCHEMA: &str = "tracegen.techniques/1";
+
+/// What a study looks at and how: the manifest without its rows. Rows are kept as long as it stays.
+#[derive(Clone, Debug, Serialize)]
+pub struct Subject {
+    /// Program and version.
+    pub tool: String,
+    /// Scene as given.
+    pub scene: String,
+    /// Triangles, instances counted.
+    pub scene_triangles: u64,
+    /// Instances.
+    pub instances: u64,
+    /// Name of the camera.
+    pub camera: String,
+    /// The head's path as given.
+    pub path: String,
+    /// Frames of that path.
+    pub path_frames: u32,
+    /// Numbers of the measured frames, ascending.
+    pub frames: Vec<u32>,
+    /// Frames a second along the path.
+    pub fps: f32,
+    /// Width and height of an eye's picture.
+    pub size_px: [u32; 2],
+    /// The display.
+    pub hmd: Hmd,
+    /// What the user sees of the left and right eye's picture.
+    pub lens: [Lens; 2],
+    /// At the centre of an eye's picture.
+    pub pixels_per_degree: f32,
+    /// Device that renders.
+    pub adapter: String,
+    /// Its driver.
+    pub driver: String,
+    /// The device is the processor: times are a processor's.
+    pub software_driver: bool,
+    /// Technique that the others are held against.
+    pub baseline: String,
+    /// Times of each frame that are measured.
+    pub repeats: u32,
+    /// Frames of each row's trace.
+    pub trace_frames: Vec<u32>,
+    /// Shadow cascades.
+    pub shadow_cascades: u32,
+    /// Checksum of the files that scene and path are read from.
+    pub input_checksum: String,
+}
+
+/// A measured row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RowRecord {
+    /// Name, see [`super::rows`].
+    pub technique: String,
+    /// Name for people.
+    pub title: String,
+    /// What it was captured with.
+    pub settings: Settings,
+    /// Techniques that it consists of.
+    pub parts: Vec<String>,
+    /// No pixel that the user can see is to change.
+    pub lossless: bool,
+    /// One a measured frame.
+    pub frames: Vec<FrameRecord>,
+    /// Most memory that the process held meanwhile, where the system tells.
+    pub peak_memory_bytes: Option<u64>,
+    /// Texture trace, relative to the folder.
+    pub trace: Option<String>,
+    /// Frames of the trace.
+    pub trace_frames: Vec<u32>,
+}
+
+/// A frame of a row. Names with `_s` are times, which differ from run to run; nothing else does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrameRecord {
+    /// Number.
+    pub frame: u32,
+    /// Boxes tested against volumes.
+    pub cull_tests: u64,
+    /// Time of culling, the median of the repeats.
+    pub cull_s: f64,
+    /// Draws that an eye's lens shows and that were left out, both eyes.
+    pub false_negatives: Option<u64>,
+    /// Draws that were drawn for an eye and that its lens does not show, both eyes.
+    pub false_positives: Option<u64>,
+    /// Draws submitted.
+    pub draws: u64,
+    /// Calls that submitted them.
+    pub draw_calls: u64,
+    /// Pipelines, materials and meshes set.
+    pub state_changes: u64,
+    /// Vertices of the draws' meshes.
+    pub vertices: u64,
+    /// Triangles of the draws.
+    pub triangles: u64,
+    /// Covered 2x2 quads.
+    pub quads: Option<u64>,
+    /// Shaded fragments.
+    pub fragments: Option<u64>,
+    /// Bytes written to the device for views and lists of draws.
+    pub bytes_uploaded: u64,
+    /// Times of the frame without capture, one a repeat.
+    pub frame_s: Vec<f64>,
+    /// Times of the baseline's frame, each measured beside the repeat.
+    pub baseline_s: Vec<f64>,
+    /// Processor time by stage, the median of the repeats.
+    pub stages_s: BTreeMap<String, f64>,
+    /// Left and right picture, relative to the folder.
+    pub images: [String; 2],
+    /// What the techniques promise.
+    pub predicted: Predicted,
+}
+
+#[derive(Serialize)]
+struct Manifest<'a> {
+    schema: &'static str,
+    #[serde(flatten)]
+    subject: &'a Subject,
+    rows: &'a [RowRecord],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    auto: Option<&'a AutoRecord>,
+}
+
+/// A finished row on its own, with what it belongs to.
+#[derive(Serialize, Deserialize)]
+struct Kept<T> {
+    key: String,
+    row: T,
+}
+
+/// The folder of a study.
+#[derive(Debug)]
+pub struct Folder {
+    root: PathBuf,
+    /// Of the subject.
+    key: u64,
+}
+
+/// Checks that `root` is a folder for a study, or may become one, before minutes of work.
+///
+/// # Errors
+/// A file in its place, a folder of something else, or one that holds an input.
+pub fn check(root: &Path, inputs: &[&Path]) -> anyhow::Result<()> {
+    ensure!(
+        !root.as_os_str().is_empty() && !formats::container::is_stdout(root),
+        "--output: expected a folder, found '{}'",
+        root.display()
+    );
+    if !root.exists() {
+        return Ok(());
+    }
+    let named = || format!("--output {}", root.display());
+    ensure!(
+        root.is_dir(),
+        "{}: expected a folder, found a file",
+        named()
+    );
+    let whole = root.canonicalize().with_context(named)?;
+    for input in inputs {
+        let inside = input
+            .canonicalize()
+            .is_ok_and(|input| input.starts_with(&whole));
+        ensure!(!inside, "{}: holds the input {}", named(), input.display());
+    }
+    let mut entries = fs::read_dir(root).with_context(named)?;
+    ensure!(
+        entries.next().is_none()
+            || root.join("manifest.json").exists()
+            || root.join("rows").is_dir(),
+        "{}: expected an empty folder or that of an earlier study, found other files",
+        named()
+    );
+    Ok(())
+}
+
+impl Folder {
+    /// Makes the folder of a study.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn create(root: &Path, subject: &Subject) -> anyhow::Result<Self> {
+        for folder in ["rows", "images", "traces"] {
+            let path = root.join(folder);
+            fs::create_dir_all(&path).with_context(|| cannot_write(&path))?;
+        }
+        Ok(Self {
+            root: root.to_owned(),
+            key: xxh3_64(&serde_json::to_vec(subject)?),
+        })
+    }
+
+    /// The trace of a row: its path in the folder, and the file.
+    #[must_use]
+    pub fn trace(&self, row: &str) -> (String, PathBuf) {
+        let name = format!("traces/{row}.textrace");
+        let path = self.root.join(&name);
+        (name, path)
+    }
+
+    /// Writes both eyes' pictures of a frame (sRGB RGBA8); tells their paths in the folder.
+    ///
+    /// # Errors
+    /// They cannot be written.
+    pub fn write_images(
+        &self,
+        row: &str,
+        frame: u32,
+        pictures: &[Vec<u8>],
+        size_px: [u32; 2],
+    ) -> anyhow::Result<[String; 2]> {
+        let folder = self.root.join("images").join(row);
+        fs::create_dir_all(&folder).with_context(|| cannot_write(&folder))?;
+        let names = ["left", "right"].map(|eye| format!("images/{row}/{frame:04}-{eye}.png"));
+        for (name, picture) in names.iter().zip(pictures) {
+            let path = self.root.join(name);
+            crate::picture::prepare_side_by_side(&path, std::slice::from_ref(picture), size_px)
+                .and_then(|file| Ok(file.persist()?))
+                .with_context(|| cannot_write(&path))?;
+        }
+        Ok(names)
+    }
+
+    /// A finished row of this study, if it is there with all its files.
+    #[must_use]
+    pub fn finished(&self, name: &str, settings: &Settings) -> Option<RowRecord> {
+        let row: RowRecord = self.kept(name, settings)?;
+        let images = row.frames.iter().flat_map(|frame| &frame.images);
+        let mut files = images.chain(&row.trace);
+        files
+            .all(|file| self.root.join(file).is_file())
+            .then_some(row)
+    }
+
+    /// Keeps a finished row.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn keep(&self, row: &RowRecord) -> anyhow::Result<()> {
+        self.write_kept(&row.technique, &row.settings, row)
+    }
+
+    /// What an earlier run of this study kept under a name and a question.
+    #[must_use]
+    pub fn kept<T: for<'de> Deserialize<'de>>(
+        &self,
+        name: &str,
+        question: &impl Serialize,
+    ) -> Option<T> {
+        let bytes = fs::read(self.row_path(name)).ok()?;
+        let kept: Kept<T> = serde_json::from_slice(&bytes).ok()?;
+        (kept.key == self.row_key(question)).then_some(kept.row)
+    }
+
+    /// Keeps the answer to a question under a name.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write_kept(
+        &self,
+        name: &str,
+        question: &impl Serialize,
+        row: &impl Serialize,
+    ) -> anyhow::Result<()> {
+        let kept = Kept {
+            key: self.row_key(question),
+            row,
+        };
+        write_json(&self.row_path(name), &kept)
+    }
+
+    /// Writes the manifest: the study is complete.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(
+        &self,
+        subject: &Subject,
+        rows: &[RowRecord],
+        auto: Option<&AutoRecord>,
+    ) -> anyhow::Result<PathBuf> {
+        let path = self.root.join("manifest.json");
+        let schema = SCHEMA;
+        write_json(
+            &path,
+            &Manifest {
+                schema,
+                subject,
+                rows,
+                auto,
+            },
+        )?;
+        Ok(path)
+    }
+
+    fn row_path(&self, name: &str) -> PathBuf {
+        self.root.join("rows").join(format!("{name}.json"))
+    }
+
+    /// What a row's content hangs on: the study and its own settings.
+    fn row_key(&self, question: &impl Serialize) -> String {
+        let text = serde_json::to_string(question).unwrap_or_default();
+        format!(
+            "{:016x}",
+            xxh3_64(format!("{:016x}{text}", self.key).as_bytes())
+        )
+    }
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(value)? + "\n";
+    AtomicFile::write_whole(path, text.as_bytes()).with_context(|| cannot_write(path))
+}
+
+fn cannot_write(path: &Path) -> String {
+    format!("cannot write {}", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn subject(frames: &[u32]) -> Subject {
+        Subject {
+            tool: "test".into(),
+            scene: "test".into(),
+            scene_triangles: 1,
+            instances: 1,
+            camera: "test".into(),
+            path: "walk".into(),
+            path_frames: 72,
+            frames: frames.to_vec(),
+            fps: 72.0,
+            size_px: [4, 4],
+            hmd: Hmd::default(),
+            lens: [Lens {
+                center: [0.0; 2],
+                radius: 1.0,
+            }; 2],
+            pixels_per_degree: 7.0,
+            adapter: "test".into(),
+            driver: "test".into(),
+            software_driver: true,
+            baseline: "per-eye".into(),
+            repeats: 1,
+            trace_frames: Vec::new(),
+            shadow_cascades: 0,
+            input_checksum: String::new(),
+        }
+    }
+
+    fn row(trace: Option<&str>) -> RowRecord {
+        RowRecord {
+            technique: "conical".into(),
+            title: "Conical culling".into(),
+            settings: Settings::default(),
+            parts: vec!["conical".into()],
+            lossless: true,
+            frames: Vec::new(),
+            peak_memory_bytes: None,
+            trace: trace.map(str::to_owned),
+            trace_frames: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_row_is_reused_by_the_same_study_with_the_same_settings_and_all_files_there() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = Folder::create(root.path(), &subject(&[0])).unwrap();
+        let settings = Settings::default();
+        assert_eq!(folder.finished("conical", &settings), None);
+        let kept = row(None);
+        folder.keep(&kept).unwrap();
+        assert_eq!(folder.finished("conical", &settings), Some(kept));
+        let other = Folder::create(root.path(), &subject(&[0, 1])).unwrap();
+        assert_eq!(other.finished("conical", &settings), None);
+        let masked = Settings {
+            hidden_area_mask: true,
+            ..Settings::default()
+        };
+        assert_eq!(folder.finished("conical", &masked), None);
+        let (name, path) = folder.trace("conical");
+        folder.keep(&row(Some(&name))).unwrap();
+        assert_eq!(folder.finished("conical", &settings), None);
+        fs::write(path, "").unwrap();
+        assert!(folder.finished("conical", &settings).is_some());
+        fs::write(folder.row_path("conical"), "{\"key\":").unwrap();
+        assert_eq!(folder.finished("conical", &settings), None);
+    }
+
+    #[test]
+    fn a_folder_of_something_else_is_left_alone() {
+        let root = tempfile::tempdir().unwrap();
+        let refused = |path: &Path, inputs: &[&Path]| check(path, inputs).unwrap_err().to_string();
+        check(root.path(), &[]).unwrap();
+        check(&root.path().join("new"), &[]).unwrap();
+        let file = root.path().join("file.obj");
+        fs::write(&file, "").unwrap();
+        assert!(refused(&file, &[]).contains("found a file"));
+        assert!(refused(root.path(), &[]).contains("found other files"));
+        assert!(refused(root.path(), &[&file]).contains("holds the input"));
+        assert!(refused(Path::new("-"), &[]).contains("expected a folder"));
+        Folder::create(root.path(), &subject(&[0])).unwrap();
+        check(root.path(), &[]).unwrap();
+    }
+}

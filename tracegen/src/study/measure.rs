@@ -1,0 +1,297 @@
+//! Measures one row: what its frames are, then how long they take beside the baseline's.
+
+use super::folder::{Folder, FrameRecord, RowRecord};
+use super::memory;
+use super::rows::Row;
+use super::world::{Shot, Tracer, World};
+use formats::textrace::TextraceWriter;
+use raster::backend::Marks;
+use raster::lavapipe::Lavapipe;
+use raster::truth::Wrong;
+use shell::Progress;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
+use std::time::Duration;
+use techniques::{Planner, Settings};
+use visibility::Occlusion;
+
+/// What is measured of every row.
+#[derive(Clone, Debug)]
+pub struct Extent {
+    /// The measured frames, as runs of consecutive ones.
+    pub runs: Vec<Vec<u32>>,
+    /// Those of them that go into the trace, ascending.
+    pub trace_frames: Vec<u32>,
+    /// Times of each frame.
+    pub repeats: u32,
+}
+
+impl Extent {
+    /// The measured frames, ascending.
+    #[must_use]
+    pub fn frames(&self) -> Vec<u32> {
+        self.runs.concat()
+    }
+
+    /// Steps of progress of one row.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.frames().len() as u64 * (1 + u64::from(self.repeats))
+    }
+
+    /// Every frame that is rendered, and whether it is measured: where techniques remember frames,
+    /// the one before comes before a run.
+    pub fn rendered(&self, remembers: bool) -> impl Iterator<Item = (u32, bool)> + '_ {
+        self.runs.iter().flat_map(move |run| {
+            let before = run[0]
+                .checked_sub(1)
+                .filter(|_| remembers)
+                .map(|frame| (frame, false));
+            before
+                .into_iter()
+                .chain(run.iter().map(|frame| (*frame, true)))
+        })
+    }
+}
+
+/// Measures rows on a device.
+pub struct Bench<'a> {
+    /// Scene and path.
+    pub world: &'a World,
+    /// The device.
+    pub backend: &'a mut Lavapipe,
+    /// It can capture.
+    pub captures: bool,
+    /// What is measured.
+    pub extent: &'a Extent,
+    /// What the eyes see in truth, by frame, as far as it was asked for.
+    pub truth: HashMap<u32, Vec<Vec<Marks>>>,
+    /// Where it goes.
+    pub folder: &'a Folder,
+    /// How far it is.
+    pub progress: &'a Progress,
+}
+
+/// Times of one frame, by repeat.
+#[derive(Debug, Default)]
+pub struct Times {
+    /// With the settings that are measured.
+    pub frame: Vec<Duration>,
+    /// The baseline's, each beside the other's.
+    pub baseline: Vec<Duration>,
+    /// By stage, with the settings that are measured.
+    pub stages: BTreeMap<&'static str, Vec<Duration>>,
+}
+
+impl Bench<'_> {
+    /// Measures a row, whose frames may each have a planner of their own.
+    ///
+    /// # Errors
+    /// Driver errors, and errors of writing.
+    pub fn measure<'s>(
+        &mut self,
+        row: &Row,
+        planner: impl Fn(u32) -> &'s Planner,
+    ) -> anyhow::Result<RowRecord> {
+        let can_forget = memory::forget_peak();
+        let (mut frames, trace) = self.take(row, &planner)?;
+        let advance = || self.progress.advance(1);
+        let times = time(self.world, self.backend, self.extent, planner, advance)?;
+        for (frame, times) in frames.iter_mut().zip(times) {
+            let seconds = |times: &[Duration]| times.iter().map(Duration::as_secs_f64).collect();
+            frame.frame_s = seconds(&times.frame);
+            frame.baseline_s = seconds(&times.baseline);
+            frame.stages_s = (times.stages.iter())
+                .map(|(stage, times)| ((*stage).to_owned(), median_s(times)))
+                .collect();
+            frame.cull_s = frame.stages_s[CULL];
+        }
+        Ok(RowRecord {
+            technique: row.name.clone(),
+            title: row.title.clone(),
+            settings: row.settings.clone(),
+            parts: row.parts.iter().map(|part| part.name.to_owned()).collect(),
+            lossless: row.lossless,
+            frames,
+            peak_memory_bytes: can_forget.then(memory::peak_bytes).flatten(),
+            trace_frames: trace
+                .iter()
+                .flat_map(|_| self.extent.trace_frames.clone())
+                .collect(),
+            trace,
+        })
+    }
+
+    /// Everything about a row's frames but their times: counts, pictures, the trace. Also makes the
+    /// driver compile every shader that they need.
+    fn take<'s>(
+        &mut self,
+        row: &Row,
+        planner: &impl Fn(u32) -> &'s Planner,
+    ) -> anyhow::Result<(Vec<FrameRecord>, Option<String>)> {
+        let (world, extent) = (self.world, self.extent);
+        let (kept, left_out): (Vec<u32>, Vec<u32>) =
+            (extent.frames().into_iter()).partition(|frame| extent.trace_frames.contains(frame));
+        let tables = [&kept, &left_out].map(|frames| world.trace_tables(planner, frames));
+        let (trace_name, trace_path) = self.folder.trace(&row.name);
+        let mut traced = match kept.is_empty() || !self.captures {
+            true => None,
+            false => Some(Tracer::new(
+                &tables[0],
+                TextraceWriter::create(&trace_path, &tables[0])?,
+            )),
+        };
+        // Frames that are not kept are captured, too: for what they sample.
+        let mut counted = match left_out.is_empty() || !self.captures {
+            true => None,
+            false => Some(Tracer::new(
+                &tables[1],
+                TextraceWriter::in_memory(&tables[1])?,
+            )),
+        };
+        let mut frames = Vec::new();
+        let mut memory = Occlusion::default();
+        for (number, measured) in extent.rendered(row.settings.occlusion) {
+            let shot = world.shoot(self.backend, planner(number), number, &mut memory)?;
+            if !measured {
+                continue;
+            }
+            let pictures = world.pictures(self.backend, &shot)?;
+            let size_px = world.hmd.eye_size_px;
+            let images = self
+                .folder
+                .write_images(&row.name, number, &pictures, size_px)?;
+            let job = world.job(planner(number));
+            let counts = if kept.contains(&number) {
+                traced
+                    .as_mut()
+                    .map(|t| t.capture(&job, self.backend, &shot.frame))
+            } else {
+                counted
+                    .as_mut()
+                    .map(|t| t.capture(&job, self.backend, &shot.frame))
+            }
+            .transpose()?;
+            let wrong = self.wrong(number, &shot)?;
+            let work = &shot.work;
+            frames.push(FrameRecord {
+                frame: number,
+                cull_tests: shot.frame.cull_tests + shot.frame.occlusion_tests,
+                cull_s: 0.0,
+                false_negatives: wrong.map(|wrong| wrong.negatives),
+                false_positives: wrong.map(|wrong| wrong.positives),
+                draws: work.draws,
+                draw_calls: work.calls,
+                state_changes: work.state_changes,
+                vertices: work.vertices,
+                triangles: work.triangles,
+                quads: counts.map(|counts| counts.quads),
+                fragments: counts.map(|counts| counts.fragments),
+                bytes_uploaded: work.bytes_uploaded,
+                frame_s: Vec::new(),
+                baseline_s: Vec::new(),
+                stages_s: BTreeMap::new(),
+                images,
+                predicted: shot.frame.plan.predicted,
+            });
+            self.progress.advance(1);
+        }
+        let trace = match traced {
+            Some(traced) => {
+                traced.into_writer().finish()?;
+                Some(trace_name)
+            }
+            None => None,
+        };
+        Ok((frames, trace))
+    }
+
+    /// What the lists of a frame get wrong of what the lenses show, both eyes; none where the device
+    /// cannot tell.
+    fn wrong(&mut self, number: u32, shot: &Shot) -> anyhow::Result<Option<Wrong>> {
+        if !self.captures {
+            return Ok(None);
+        }
+        let planner = self.world.planner(&Settings::default())?;
+        let job = self.world.job(&planner);
+        let truth = match self.truth.entry(number) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(open) => open.insert(job.truth(self.backend, &shot.frame)?),
+        };
+        let mut wrong = Wrong::default();
+        for judgement in job.judge_against(&shot.frame, truth) {
+            wrong += judgement.lens;
+        }
+        Ok(Some(wrong))
+    }
+}
+
+/// Times frames with a row's planners and with the baseline's, which take turns, several times over: one entry
+/// a measured frame.
+///
+/// # Errors
+/// Driver errors.
+pub fn time<'s>(
+    world: &World,
+    backend: &mut Lavapipe,
+    extent: &Extent,
+    planner: impl Fn(u32) -> &'s Planner,
+    mut advance: impl FnMut(),
+) -> anyhow::Result<Vec<Times>> {
+    let baseline = world.planner(&Settings::default())?;
+    let mut times: Vec<Times> = extent.frames().iter().map(|_| Times::default()).collect();
+    let remembers = (extent.frames().into_iter()).any(|frame| planner(frame).settings().occlusion);
+    for repeat in 0..extent.repeats {
+        let mut measured = times.iter_mut();
+        let mut memory = Occlusion::default();
+        for (number, is_measured) in extent.rendered(remembers) {
+            // Whoever comes second finds warmer caches: they take turns at that as well.
+            let [row, beside] = if repeat % 2 == 0 {
+                let beside = world.shoot(backend, &baseline, number, &mut Occlusion::default())?;
+                [
+                    world.shoot(backend, planner(number), number, &mut memory)?,
+                    beside,
+                ]
+            } else {
+                let row = world.shoot(backend, planner(number), number, &mut memory)?;
+                [
+                    row,
+                    world.shoot(backend, &baseline, number, &mut Occlusion::default())?,
+                ]
+            };
+            if !is_measured {
+                continue;
+            }
+            if let Some(times) = measured.next() {
+                times.add(&row, &beside);
+            }
+            advance();
+        }
+    }
+    Ok(times)
+}
+
+const CULL: &str = "cull";
+
+impl Times {
+    fn add(&mut self, row: &Shot, baseline: &Shot) {
+        self.frame.push(row.total);
+        self.baseline.push(baseline.total);
+        for (stage, time) in [
+            (CULL, row.frame.cull_time),
+            ("submit", row.work.submitting),
+            ("render", row.work.waiting),
+            ("compose", row.compose),
+        ] {
+            self.stages.entry(stage).or_default().push(time);
+        }
+    }
+}
+
+/// The median in seconds, the lower one of an even number.
+pub fn median_s(times: &[Duration]) -> f64 {
+    let mut sorted = times.to_vec();
+    sorted.sort();
+    let middle = sorted.get(sorted.len().saturating_sub(1) / 2);
+    middle.copied().unwrap_or_default().as_secs_f64()
+}

@@ -1,0 +1,384 @@
+//! The techniques by name, and the rows of a study: each technique alone, and combinations.
+
+use techniques::settings::{Foveation, FoveationKind, Rates};
+use techniques::{Gaze, Settings};
+use visibility::Culling;
+
+/// One technique: what it changes of the baseline.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Name as in `--only`, manifests and results.
+    pub name: String,
+    /// Name for people.
+    pub title: String,
+    /// No pixel that the user can see is to change.
+    pub lossless: bool,
+    change: Change,
+}
+
+#[derive(Clone, Debug)]
+enum Change {
+    Culling(Culling),
+    Switch(Setting, fn(&mut Settings)),
+}
+
+/// The setting that a part changes: of two parts with the same one, only one can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// How draws are found.
+    Culling,
+    /// Whether hidden ones are left out.
+    Occlusion,
+    /// Whether what the lens hides is drawn.
+    Mask,
+    /// How the periphery is coarsened.
+    Foveation,
+}
+
+impl PartialEq for Part {
+    /// Names are unique.
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Part {
+    /// Every technique, the baseline first: a line a technique.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let baseline = Culling::default();
+        let others = Culling::all().filter(|culling| *culling != baseline);
+        let mut parts = vec![Self::culling(baseline)];
+        parts.extend(others.map(Self::culling));
+        // Name, title, whether no visible pixel changes, what it excludes, how it is set.
+        parts.extend([
+            Self::new(
+                "occlusion",
+                "Occlusion culling",
+                true,
+                Setting::Occlusion,
+                |s| {
+                    s.occlusion = true;
+                },
+            ),
+            Self::new(
+                "hidden-area-mask",
+                "Hidden-area mask",
+                true,
+                Setting::Mask,
+                |s| {
+                    s.hidden_area_mask = true;
+                },
+            ),
+            Self::new(
+                "foveation-rings",
+                "Foveation by rings",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::Rings, Rates::default()));
+                },
+            ),
+            Self::new(
+                "multi-resolution",
+                "Multi-resolution",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default()));
+                },
+            ),
+            Self::new(
+                "radial-density",
+                "Radial density mask",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default()));
+                },
+            ),
+        ]);
+        parts
+    }
+
+    /// Every technique with the settings that are worth a search.
+    #[must_use]
+    pub fn options() -> Vec<Self> {
+        let mut parts = Self::all();
+        parts.extend([
+            Self::new(
+                "foveation-rings-wide",
+                "Foveation by rings, 1.5 times as wide",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::Rings, wide()));
+                },
+            ),
+            Self::new(
+                "radial-density-wide",
+                "Radial density mask, 1.5 times as wide",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::RadialDensity, wide()));
+                },
+            ),
+        ]);
+        parts
+    }
+
+    fn new(
+        name: &str,
+        title: &str,
+        lossless: bool,
+        setting: Setting,
+        change: fn(&mut Settings),
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            title: title.to_owned(),
+            lossless,
+            change: Change::Switch(setting, change),
+        }
+    }
+
+    fn culling(culling: Culling) -> Self {
+        Self {
+            name: culling.name().to_owned(),
+            title: culling.title().to_owned(),
+            lossless: culling.is_lossless(),
+            change: Change::Culling(culling),
+        }
+    }
+
+    /// Its error is a shift of what is seen, in pixels, and bounded for every frame.
+    #[must_use]
+    pub fn is_shift(&self) -> bool {
+        match self.change {
+            Change::Culling(_) | Change::Switch(..) => false,
+        }
+    }
+
+    /// The setting that it changes.
+    #[must_use]
+    pub fn setting(&self) -> Setting {
+        match self.change {
+            Change::Culling(_) => Setting::Culling,
+            Change::Switch(setting, _) => setting,
+        }
+    }
+
+    fn apply(&self, settings: &mut Settings) {
+        match self.change {
+            Change::Culling(culling) => settings.culling = culling,
+            Change::Switch(_, change) => change(settings),
+        }
+    }
+}
+
+/// Straight ahead.
+fn foveation(kind: FoveationKind, rates: Rates) -> Foveation {
+    Foveation {
+        kind,
+        gaze: Gaze::default(),
+        rates,
+    }
+}
+
+/// The usual rates, each beginning 1.5 times as far out.
+fn wide() -> Rates {
+    Rates {
+        edges_deg: Rates::default().edges_deg.map(|edge| 1.5 * edge),
+    }
+}
+
+/// Combinations that a study measures beside the techniques alone: title and parts.
+const COMBINATIONS: &[(&str, &str)] = &[
+    ("Culling and occlusion", "superfrustum+occlusion"),
+    (
+        "All that lose nothing",
+        "superfrustum+occlusion+hidden-area-mask",
+    ),
+    (
+        "Everything",
+        "superfrustum+occlusion+hidden-area-mask+foveation-rings",
+    ),
+];
+
+/// A technique or a combination of some, measured as one.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The parts' names joined by `+`.
+    pub name: String,
+    /// Name for people.
+    pub title: String,
+    /// What it consists of.
+    pub parts: Vec<Part>,
+    /// All of its parts are.
+    pub lossless: bool,
+    /// What it is captured with.
+    pub settings: Settings,
+}
+
+/// A row that cannot be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RowError {
+    /// No technique of that name.
+    #[error("unknown technique '{name}': expected some of {known}, alone or joined by '+'")]
+    Unknown {
+        /// As asked.
+        name: String,
+        /// Names of all techniques.
+        known: String,
+    },
+    /// Two techniques in one another's place.
+    #[error("'{row}': {first} and {second} exclude each other")]
+    Contradiction {
+        /// As asked.
+        row: String,
+        /// One of them.
+        first: String,
+        /// The other.
+        second: String,
+    },
+}
+
+impl Row {
+    /// The technique that all others are held against.
+    ///
+    /// # Panics
+    /// Never: the baseline is a technique.
+    #[must_use]
+    pub fn baseline() -> Self {
+        Self::parse(Culling::default().name()).expect("the baseline is a technique")
+    }
+
+    /// Every row of a study without a choice, the baseline first.
+    ///
+    /// # Panics
+    /// Never: the tests parse every row.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let alone = Part::all().into_iter().map(|part| part.name);
+        let combined = COMBINATIONS.iter().map(|(_, name)| (*name).to_owned());
+        alone
+            .chain(combined)
+            .map(|name| Self::parse(&name).expect("rows of the table are techniques"))
+            .collect()
+    }
+
+    /// The row of some parts, the baseline where there are none.
+    ///
+    /// # Errors
+    /// Two of them exclude each other.
+    pub fn of(parts: Vec<Part>) -> Result<Self, RowError> {
+        if parts.is_empty() {
+            return Ok(Self::baseline());
+        }
+        let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+        let name = names.join("+");
+        let mut settings = Settings::default();
+        for (number, part) in parts.iter().enumerate() {
+            let same = |other: &&Part| other.setting() == part.setting();
+            if let Some(other) = parts[..number].iter().find(same) {
+                return Err(RowError::Contradiction {
+                    row: name,
+                    first: other.name.clone(),
+                    second: part.name.clone(),
+                });
+            }
+            part.apply(&mut settings);
+        }
+        let titles: Vec<&str> = parts.iter().map(|part| part.title.as_str()).collect();
+        let listed = COMBINATIONS.iter().find(|(_, known)| *known == name);
+        Ok(Self {
+            title: listed.map_or_else(|| titles.join(", "), |(title, _)| (*title).to_owned()),
+            name,
+            lossless: parts.iter().all(|part| part.lossless),
+            parts,
+            settings,
+        })
+    }
+
+    /// A row by its name: techniques joined by `+`.
+    ///
+    /// # Errors
+    /// An unknown technique, or two that exclude each other.
+    pub fn parse(name: &str) -> Result<Self, RowError> {
+        let all = Part::all();
+        let part = |word: &str| {
+            let found = all.iter().find(|part| part.name == word);
+            found.cloned().ok_or_else(|| RowError::Unknown {
+                name: word.to_owned(),
+                known: known(),
+            })
+        };
+        Self::of(name.split('+').map(part).collect::<Result<_, _>>()?)
+    }
+
+    /// The rows of a list of names separated by commas, with the baseline before them.
+    ///
+    /// # Errors
+    /// See [`Self::parse`].
+    pub fn parse_list(list: &str) -> Result<Vec<Self>, RowError> {
+        let mut rows = vec![Self::baseline()];
+        for name in list.split(',').map(str::trim) {
+            let row = Self::parse(name)?;
+            if rows.iter().all(|known| known.name != row.name) {
+                rows.push(row);
+            }
+        }
+        Ok(rows)
+    }
+}
+
+fn known() -> String {
+    let names: Vec<String> = Part::all().into_iter().map(|part| part.name).collect();
+    names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_has_a_name_of_its_own_and_is_found_by_it() {
+        let rows = Row::all();
+        assert_eq!(rows[0].name, "per-eye");
+        assert_eq!(rows[0].settings, Settings::default());
+        for (number, row) in rows.iter().enumerate() {
+            let found = Row::parse(&row.name).unwrap();
+            assert_eq!((&found.settings, &found.title), (&row.settings, &row.title));
+            assert!(rows[..number].iter().all(|other| other.name != row.name));
+            assert!(
+                rows[..number].iter().all(|r| r.settings != row.settings),
+                "{}",
+                row.name
+            );
+        }
+    }
+
+    #[test]
+    fn a_list_names_rows_once_and_always_has_the_baseline() {
+        let rows = Row::parse_list("conical, superfrustum,conical").unwrap();
+        let names: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
+        assert_eq!(names, ["per-eye", "conical", "superfrustum"]);
+    }
+
+    #[test]
+    fn unknown_and_contradictory_techniques_are_told() {
+        let error = |list: &str| Row::parse_list(list).unwrap_err().to_string();
+        let text = error("conical,octree");
+        assert!(
+            text.contains("'octree'") && text.contains("superfrustum"),
+            "{text}"
+        );
+        assert!(error("").contains("unknown technique ''"));
+        let text = error("conical+superfrustum");
+        assert!(
+            text.contains("conical and superfrustum exclude each other"),
+            "{text}"
+        );
+    }
+}
