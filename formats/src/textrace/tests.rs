@@ -249,7 +249,7 @@ fn draws_that_are_not_opaque_are_ranges_of_the_table() {
             depth_tested: true,
             not_opaque,
         });
-        let error = TextraceWriter::in_memory(&tables).err().expect("refused");
+        let error = TextraceWriter::in_memory(&tables).expect_err("refused");
         assert!(error.to_string().contains("surfaces.not_opaque"), "{error}");
     }
 }

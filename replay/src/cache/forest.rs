@@ -6,8 +6,8 @@
 //! of some sets of a cache with fewer sets, so a line that was used last in its set was so with
 //! more sets, too, and the search ends there, with nothing to move (Hill & Smith 1989).
 
-/// Marks a place in a stack that holds nothing.
-const EMPTY: u32 = super::EMPTY;
+use super::EMPTY;
+use super::lru::to_front;
 
 /// The stacks of one number of sets.
 #[derive(Clone, Debug)]
@@ -19,35 +19,13 @@ struct Stacks {
 }
 
 impl Stacks {
-    #[inline(always)]
-    fn first(&self, line: u32) -> usize {
-        (line & self.set_mask) as usize * self.depth
-    }
-
     /// Moves the line to the front of its stack: how deep it was; the stack's depth if it was not
     /// there.
     #[inline(always)]
-    fn access(&mut self, line: u32) -> usize {
-        let first = self.first(line);
-        match self.depth {
-            4 => to_front(&mut self.lines[first..first + 4], line),
-            depth => to_front(&mut self.lines[first..first + depth], line),
-        }
+    fn access(&mut self, line: u32) -> u8 {
+        let first = (line & self.set_mask) as usize * self.depth;
+        to_front(&mut self.lines[first..first + self.depth], line) as u8
     }
-}
-
-/// Shifts the stack back until the line is found or falls off the end.
-#[inline(always)]
-fn to_front(stack: &mut [u32], line: u32) -> usize {
-    let mut carried = line;
-    for (depth, place) in stack.iter_mut().enumerate() {
-        let found = std::mem::replace(place, carried);
-        if found == line {
-            return depth;
-        }
-        carried = found;
-    }
-    stack.len()
 }
 
 /// LRU caches of several numbers of sets and ways that see the same lines.
@@ -73,33 +51,43 @@ impl Forest {
         }
     }
 
-    /// How many of `lines`, from the first on, were each the last one used in its set, whatever
-    /// the number of sets: hits that change nothing.
+    /// Accesses lines from the first on until one lies `ways` deep or deeper for any number of sets:
+    /// its index and, in `depths`, what [`Self::access`] says of it; their number if there is none.
     #[inline(always)]
-    #[must_use]
-    pub fn repeats(&self, lines: &[u32]) -> usize {
-        let Some(coarsest) = self.trees.first() else {
+    pub fn access_all(&mut self, lines: &[u32], ways: u32, depths: &mut [u8]) -> usize {
+        let ([coarsest, finer @ ..], [depth, depths @ ..]) = (&mut *self.trees, depths) else {
             return lines.len();
         };
-        let mut index = 0;
-        while index < lines.len() && coarsest.lines[coarsest.first(lines[index])] == lines[index] {
-            index += 1;
+        for (index, &line) in lines.iter().enumerate() {
+            *depth = coarsest.access(line);
+            if *depth == 0 {
+                continue;
+            }
+            let finer = deepest(finer, line, depths);
+            if u32::from(finer.max(*depth)) >= ways {
+                return index;
+            }
         }
-        index
+        lines.len()
     }
 
     /// Accesses a line. `depths` gets, for each number of sets, how deep the line lay in its
     /// stack: a cache of more ways than that had it.
     #[inline(always)]
     pub fn access(&mut self, line: u32, depths: &mut [u8]) {
-        let mut used_last = false;
-        for (stacks, depth) in self.trees.iter_mut().zip(depths) {
-            if used_last {
-                *depth = 0;
-                continue;
-            }
-            *depth = stacks.access(line) as u8;
-            used_last = *depth == 0;
-        }
+        deepest(&mut self.trees, line, depths);
     }
+}
+
+/// Accesses a line in trees of ever more sets: the largest depth.
+#[inline(always)]
+fn deepest(trees: &mut [Stacks], line: u32, depths: &mut [u8]) -> u8 {
+    let mut deepest = 0;
+    let mut used_last = false;
+    for (stacks, depth) in trees.iter_mut().zip(depths) {
+        *depth = if used_last { 0 } else { stacks.access(line) };
+        used_last = *depth == 0;
+        deepest = deepest.max(*depth);
+    }
+    deepest
 }

@@ -101,45 +101,86 @@ impl<W: Ways, L: Line> Lru<W, L> {
         &mut self.tags[first..first + ways]
     }
 
-    /// Looks up, and on a miss fills at once: shifts the tags back until the line is found or
-    /// falls off the end. True for a hit.
+    /// Looks up, and on a miss fills at once. True for a hit.
     #[inline(always)]
     pub fn access(&mut self, line: L) -> bool {
         let set = self.set(line);
-        let mut carried = set[0];
-        if carried == line {
+        let ways = set.len();
+        to_front(set, line) < ways
+    }
+}
+
+/// Shifts the tags back until the line is found or falls off the end, and puts it in front: how deep
+/// it lay; the number of ways if it was not there.
+#[inline(always)]
+pub(super) fn to_front<L: Line>(set: &mut [L], line: L) -> usize {
+    if let Ok(four) = <&mut [L; 4]>::try_from(&mut *set) {
+        let [first, second, third, fourth] = *four;
+        if first == line {
+            return 0;
+        }
+        // No branches: behind the first, where a line lies is a coin toss to the processor.
+        let found = [second, third, fourth].map(|tag| tag == line);
+        let third_kept = if found[0] { third } else { second };
+        let fourth_kept = if found[0] | found[1] { fourth } else { third };
+        *four = [line, first, third_kept, fourth_kept];
+        let third_or_deeper = if found[2] { 3 } else { 4 };
+        let second_or_deeper = if found[1] { 2 } else { third_or_deeper };
+        return if found[0] { 1 } else { second_or_deeper };
+    }
+    let mut carried = line;
+    for (depth, tag) in set.iter_mut().enumerate() {
+        let found = std::mem::replace(tag, carried);
+        if found == line {
+            return depth;
+        }
+        carried = found;
+    }
+    set.len()
+}
+
+/// Moves the line to the front if it is there.
+#[inline(always)]
+fn look_up(set: &mut [u32], line: u32) -> bool {
+    if let Ok(four) = <&mut [u32; 4]>::try_from(&mut *set) {
+        let [first, second, third, fourth] = *four;
+        if first == line {
             return true;
         }
-        set[0] = line;
-        for tag in &mut set[1..] {
-            let found = *tag;
-            *tag = carried;
-            if found == line {
-                return true;
-            }
-            carried = found;
+        let found = [second, third, fourth].map(|tag| tag == line);
+        if !(found[0] | found[1] | found[2]) {
+            return false;
         }
-        false
+        let third_kept = if found[0] { third } else { second };
+        let fourth_kept = if found[2] { third } else { fourth };
+        *four = [line, first, third_kept, fourth_kept];
+        return true;
     }
+    let Some(way) = set.iter().position(|&tag| tag == line) else {
+        return false;
+    };
+    set[..=way].rotate_right(1);
+    true
 }
 
 impl<W: Ways> Cache for Lru<W> {
     #[inline(always)]
     fn lookup(&mut self, line: u32) -> bool {
-        let set = self.set(line);
-        if set[0] == line {
-            return true;
-        }
-        for way in 1..set.len() {
-            if set[way] == line {
-                for behind in (0..way).rev() {
-                    set[behind + 1] = set[behind];
-                }
-                set[0] = line;
-                return true;
+        look_up(self.set(line), line)
+    }
+
+    #[inline(always)]
+    fn lookup_all(&mut self, lines: &[u32]) -> usize {
+        // Nothing of the loop's own but the tags is in memory.
+        let (ways, mask) = (self.ways.ways(), self.set_mask);
+        let tags = self.tags.as_mut_slice();
+        for (index, &line) in lines.iter().enumerate() {
+            let first = line.set(mask) * ways;
+            if !look_up(&mut tags[first..first + ways], line) {
+                return index;
             }
         }
-        false
+        lines.len()
     }
 
     #[inline(always)]

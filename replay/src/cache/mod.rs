@@ -90,10 +90,17 @@ struct Geometry {
 /// Tag of a way that holds nothing; no line has this number.
 const EMPTY: u32 = u32::MAX;
 
-/// A cache that holds whole lines.
+/// A cache that holds whole lines. Looking up once more, in the same order, lines that have just all
+/// been found changes nothing: such repeats need no simulation.
 pub trait Cache: Send {
     /// True if the line is there; marks it used.
     fn lookup(&mut self, line: u32) -> bool;
+
+    /// Looks up lines from the first on until one is not there: its index, or their number.
+    fn lookup_all(&mut self, lines: &[u32]) -> usize {
+        let missing = lines.iter().position(|&line| !self.lookup(line));
+        missing.unwrap_or(lines.len())
+    }
 
     /// Puts in a line that is not there, in place of the set's victim.
     fn fill(&mut self, line: u32);
@@ -117,6 +124,10 @@ pub trait Cache: Send {
 impl Cache for Box<dyn Cache> {
     fn lookup(&mut self, line: u32) -> bool {
         (**self).lookup(line)
+    }
+
+    fn lookup_all(&mut self, lines: &[u32]) -> usize {
+        (**self).lookup_all(lines)
     }
 
     fn fill(&mut self, line: u32) {

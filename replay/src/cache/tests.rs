@@ -91,6 +91,24 @@ proptest! {
     }
 
     #[test]
+    fn looking_up_what_was_just_found_changes_nothing(trace in trace(), wanted in prop::collection::vec(0_u32..40, 1..5)) {
+        for policy in Replacement::all() {
+            let (mut once, mut twice) = (cache(32, 4, policy), cache(32, 4, policy));
+            for &line in &trace {
+                prop_assert_eq!(once.access(line), twice.access(line));
+            }
+            let found = once.lookup_all(&wanted);
+            prop_assert_eq!(found, wanted.iter().take_while(|&&l| twice.lookup(l)).count());
+            for _ in 0..2 {
+                prop_assert_eq!(twice.lookup_all(&wanted[..found]), found);
+            }
+            for &line in trace.iter().rev() {
+                prop_assert_eq!(once.access(line), twice.access(line));
+            }
+        }
+    }
+
+    #[test]
     fn lookup_then_fill_equals_access(trace in trace()) {
         let (mut whole, mut steps) = (cache(32, 4, Replacement::LRU), cache(32, 4, Replacement::LRU));
         for &line in &trace {
@@ -132,9 +150,13 @@ proptest! {
             .collect();
         let mut depths = vec![0; trees.len()];
         for &line in &trace {
-            let repeats = forest.repeats(&[line]) == 1;
+            let mut until = forest.clone();
             forest.access(line, &mut depths);
-            prop_assert!(!repeats || depths.iter().all(|&depth| depth == 0));
+            let deepest = depths.iter().copied().max().unwrap_or(0);
+            let mut of_last = vec![0; trees.len()];
+            let lines = [line, line, line];
+            prop_assert_eq!(until.access_all(&lines, u32::from(deepest) + 1, &mut of_last), 3);
+            prop_assert_eq!(until.clone().access_all(&[line], 0, &mut of_last), 1);
             for (sets, ways, cache) in &mut alone {
                 let tree = trees.iter().position(|tree| tree.0 == *sets).unwrap();
                 prop_assert_eq!(cache.access(line), u32::from(depths[tree]) < *ways);

@@ -69,6 +69,11 @@ impl CacheCounts {
     pub fn footprint(&mut self, cell: usize, tile: usize, misses: &FootprintMisses) {
         let (missed_l1, missed_l2) = (misses.l1_lines > 0, misses.l2_lines > 0);
         let CellMisses { l1, l2 } = &mut self.cells[cell];
+        if !missed_l1 {
+            // The L2 was not asked.
+            l1.secondary += u64::from(misses.l1_secondary);
+            return;
+        }
         l1.footprints += u64::from(missed_l1);
         l1.lines += u64::from(misses.l1_lines);
         l1.secondary += u64::from(misses.l1_secondary);

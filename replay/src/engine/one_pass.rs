@@ -232,21 +232,13 @@ impl OnePass {
     /// Accesses the lines from `index` to `end`.
     #[inline(always)]
     fn access(&mut self, core: usize, quad: &QuadLines<'_>, mut index: usize, end: usize) {
-        let trees = self.l1.tallies.len();
         loop {
-            index += self.forests[core].repeats(&quad.lines[index..end]);
+            let (lines, ways) = (&quad.lines[index..end], self.least_ways);
+            index += self.forests[core].access_all(lines, ways, &mut self.depths);
             if index == end {
                 return;
             }
-            self.forests[core].access(quad.lines[index], &mut self.depths[..trees]);
-            if self.depths[..trees]
-                .iter()
-                .all(|&d| u32::from(d) < self.least_ways)
-            {
-                index += 1;
-            } else {
-                index = self.missed(core, quad, index);
-            }
+            index = self.missed(core, quad, index);
         }
     }
 

@@ -8,8 +8,8 @@ use crate::cache::{Cache, InFlight, Levels};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
 use crate::result::TmuResult;
-use crate::stream::{Cores, QuadLines, StreamError};
-use crate::tmu::{Pipeline, PipelineStats, Turn};
+use crate::stream::{Cores, QuadLines, StreamError, furthest_behind};
+use crate::tmu::{Pending, Pipeline, PipelineStats, Turn};
 
 /// A cache and what is on its way into it.
 struct Level<C> {
@@ -18,14 +18,14 @@ struct Level<C> {
 }
 
 impl<C: Cache> Level<C> {
-    fn new(cache: C) -> Self {
+    fn new(cache: C, usual_cycles: u64) -> Self {
         Self {
             cache,
-            in_flight: InFlight::default(),
+            in_flight: InFlight::new(usual_cycles),
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn arrive(&mut self, now: u64) {
         self.in_flight.arrive(now, &mut self.cache);
     }
@@ -36,7 +36,7 @@ impl<C: Cache> Level<C> {
         if arrival <= now {
             self.cache.fill(line);
         } else {
-            self.in_flight.request(line, arrival);
+            self.in_flight.request(line, now, arrival);
         }
     }
 }
@@ -48,21 +48,16 @@ struct Memory<C> {
     l2: Level<C>,
     tmu: TmuConfig,
     counts: CacheCounts,
-    /// The current thread's core, tile and cycle.
-    core: usize,
-    tile: usize,
-    now: u64,
-    /// For each of its footprints that misses, when the last of its lines arrives.
-    pending: Vec<u64>,
+    /// What the current thread waits for.
+    pending: Vec<Pending>,
     /// Lines that it had to ask for.
-    fetches: u64,
+    fetches: u32,
 }
 
 /// Texture units, and the caches that they share.
 pub struct Timed<C> {
     memory: Memory<C>,
     units: Vec<Pipeline>,
-    busy: Vec<bool>,
     /// Cycles until the last core was done.
     cycles: u64,
 }
@@ -71,20 +66,20 @@ impl<C: Cache> Timed<C> {
     /// Empty caches, a texture unit for each L1.
     pub fn new(levels: Levels<C>, tmu: TmuConfig, counts: CacheCounts) -> Self {
         let cores = levels.l1.len();
+        let memory_cycles = u64::from(tmu.l1_penalty_cycles) + u64::from(tmu.l2_penalty_cycles);
+        // Later trips of threads that miss many lines included.
+        let usual_cycles = memory_cycles + 8 * u64::from(tmu.loop_cycles);
+        let l1 = levels.l1.into_iter();
         Self {
             memory: Memory {
-                l1: levels.l1.into_iter().map(Level::new).collect(),
-                l2: Level::new(levels.l2),
+                l1: l1.map(|cache| Level::new(cache, usual_cycles)).collect(),
+                l2: Level::new(levels.l2, memory_cycles),
                 tmu,
                 counts,
-                core: 0,
-                tile: 0,
-                now: 0,
                 pending: Vec::new(),
                 fetches: 0,
             },
             units: vec![Pipeline::new(tmu); cores],
-            busy: vec![false; cores],
             cycles: 0,
         }
     }
@@ -98,41 +93,35 @@ impl<C: Cache> Timed<C> {
         assign: Assign,
     ) -> Result<(), StreamError> {
         let mut items = Items::new(phase, assign, self.units.len());
-        while let Some(core) = self.furthest_behind() {
-            match self.units[core].turn() {
-                Turn::Looped => {}
-                Turn::Done => self.busy[core] = false,
-                Turn::Free => {
-                    if !self.start_thread(core, work) {
-                        match items.next(core) {
-                            Some(item) => work.load(core, item)?,
-                            None => self.units[core].drain(),
+        // A core that is done is at the end of time.
+        let mut clocks: Vec<u64> = self.units.iter().map(Pipeline::clock).collect();
+        while let Some((core, until)) = furthest_behind(&clocks) {
+            let unit = &mut self.units[core];
+            let clock = &mut clocks[core];
+            while *clock <= until {
+                match unit.turn() {
+                    Turn::Looped => {}
+                    Turn::Done => {
+                        *clock = u64::MAX;
+                        break;
+                    }
+                    Turn::Free => {
+                        if let Some(quad) = work.next_quad(core) {
+                            if quad.footprints > 0 {
+                                self.memory.look_up(core, unit.clock(), &quad);
+                                unit.start(quad.footprints, &self.memory.pending);
+                            }
+                        } else if let Some(item) = items.next(core) {
+                            work.load(core, item)?;
+                        } else {
+                            unit.drain();
                         }
                     }
                 }
+                *clock = unit.clock();
             }
         }
         Ok(())
-    }
-
-    #[inline]
-    fn furthest_behind(&self) -> Option<usize> {
-        let busy = (0..self.units.len()).filter(|&core| self.busy[core]);
-        busy.min_by_key(|&core| self.units[core].clock())
-    }
-
-    /// Starts the core's next quad; false if its item has none left.
-    #[inline]
-    fn start_thread(&mut self, core: usize, work: &mut Cores<'_>) -> bool {
-        let unit = &mut self.units[core];
-        let Some(quad) = work.next_quad(core) else {
-            return false;
-        };
-        if quad.footprints > 0 {
-            self.memory.look_up(core, unit.clock(), &quad);
-            unit.start(quad.footprints, &self.memory.pending);
-        }
-        true
     }
 }
 
@@ -171,57 +160,101 @@ impl<'a> Items<'a> {
 }
 
 impl<C: Cache> Memory<C> {
-    /// Looks up all footprints of a thread that enters now.
+    /// Looks up all footprints of a thread that enters `now`.
+    #[inline(always)]
     fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) {
-        (self.core, self.tile, self.now) = (core, quad.tile(), now);
         self.l1[core].arrive(now);
         self.l2.arrive(now);
         self.pending.clear();
         self.fetches = 0;
-        let safe_lines = self.l1[core].cache.repeat_safe_lines() as usize;
-        for footprint in quad.footprints() {
-            for _ in 0..=footprint.repeats {
-                let hit = self.footprint(footprint.cell, footprint.lines);
-                // Repeats that would find everything there need no simulation.
-                if hit && footprint.lines.len() <= safe_lines {
-                    break;
-                }
+        let mut index = 0;
+        loop {
+            // Repeats of a footprint that finds everything change nothing.
+            index += self.l1[core].cache.lookup_all(&quad.lines[index..]);
+            if index == quad.lines.len() {
+                return;
             }
+            index = self.missed(core, now, quad, index);
         }
     }
 
-    /// True if all lines are there.
-    #[inline(always)]
-    fn footprint(&mut self, cell: usize, lines: &[u32]) -> bool {
+    /// The line at `index` is not there: looks up the rest of its footprint, asks for what is
+    /// missing, and does so again for the footprint's repeats. Says where the next one starts.
+    #[inline(never)]
+    fn missed(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, index: usize) -> usize {
+        let mut start = index;
+        while !quad.tags[start].is_first() {
+            start -= 1;
+        }
+        let end = quad.end_of_footprint(index);
         let mut misses = FootprintMisses::default();
-        let mut ready = 0;
-        for &line in lines {
-            if !self.l1[self.core].cache.lookup(line) {
-                ready = self.request(line, &mut misses).max(ready);
+        let mut ready = self.request(core, now, quad.lines[index], &mut misses);
+        let mut earliest = ready;
+        for &line in &quad.lines[index + 1..end] {
+            if !self.l1[core].cache.lookup(line) {
+                let arrival = self.request(core, now, line, &mut misses);
+                (ready, earliest) = (ready.max(arrival), earliest.min(arrival));
             }
         }
-        if misses.l1_lines + misses.l1_secondary == 0 {
-            return true;
+        let repeats = quad.tags[start].repeats();
+        let (cell, tile) = (quad.cell(start), quad.tile());
+        if earliest > now {
+            // Nothing was filled, so every repeat finds the same lines missing, on their way now.
+            let missing = misses.l1_lines + misses.l1_secondary;
+            misses.l1_secondary += repeats * missing;
+            self.wait(ready, 1 + repeats);
+            self.counts.footprint(cell, tile, &misses);
+            return end;
         }
-        if ready > self.now {
-            self.pending.push(ready);
+        self.counts.footprint(cell, tile, &misses);
+        if ready > now {
+            self.wait(ready, 1);
         }
-        self.counts.footprint(cell, self.tile, &misses);
-        false
+        for _ in 0..repeats {
+            let mut misses = FootprintMisses::default();
+            let mut ready = now;
+            for &line in &quad.lines[start..end] {
+                if !self.l1[core].cache.lookup(line) {
+                    ready = ready.max(self.request(core, now, line, &mut misses));
+                }
+            }
+            if misses.l1_lines + misses.l1_secondary == 0 {
+                break;
+            }
+            self.counts.footprint(cell, tile, &misses);
+            if ready > now {
+                self.wait(ready, 1);
+            }
+        }
+        end
+    }
+
+    /// Footprints of the current thread wait until a cycle.
+    #[inline(always)]
+    fn wait(&mut self, ready: u64, footprints: u32) {
+        match self.pending.last_mut() {
+            Some(last) if last.ready == ready => last.footprints += footprints,
+            _ => self.pending.push(Pending { ready, footprints }),
+        }
     }
 
     /// Asks for a line that is not in the L1, unless it is on its way already; says when it
     /// arrives.
-    #[inline(never)]
-    fn request(&mut self, line: u32, misses: &mut FootprintMisses) -> u64 {
-        let l1 = &mut self.l1[self.core];
-        if let Some(arrival) = l1.in_flight.arrival(line) {
+    #[inline(always)]
+    fn request(&mut self, core: usize, now: u64, line: u32, misses: &mut FootprintMisses) -> u64 {
+        if let Some(arrival) = self.l1[core].in_flight.arrival(line) {
             misses.l1_secondary += 1;
             return arrival;
         }
         misses.l1_lines += 1;
+        self.fetch(core, now, line, misses)
+    }
+
+    /// Asks the L2 for a line.
+    #[inline(never)]
+    fn fetch(&mut self, core: usize, now: u64, line: u32, misses: &mut FootprintMisses) -> u64 {
         let tmu = &self.tmu;
-        let trip = self.fetches / u64::from(tmu.fetches_per_trip);
+        let trip = u64::from(self.fetches / tmu.fetches_per_trip);
         self.fetches += 1;
         // Without penalties nothing loops, so there is no later trip to wait for.
         let instant = tmu.l1_penalty_cycles == 0 && tmu.l2_penalty_cycles == 0;
@@ -231,18 +264,18 @@ impl<C: Cache> Memory<C> {
             trip * u64::from(tmu.loop_cycles)
         };
         let in_l2 = if self.l2.cache.lookup(line) {
-            self.now
+            now
         } else if let Some(arrival) = self.l2.in_flight.arrival(line) {
             misses.l2_secondary += 1;
             arrival
         } else {
             misses.l2_lines += 1;
-            let arrival = self.now + u64::from(tmu.l2_penalty_cycles);
-            self.l2.enter(line, self.now, arrival);
+            let arrival = now + u64::from(tmu.l2_penalty_cycles);
+            self.l2.enter(line, now, arrival);
             arrival
         };
         let in_l1 = in_l2 + u64::from(tmu.l1_penalty_cycles) + wait;
-        l1.enter(line, self.now, in_l1);
+        self.l1[core].enter(line, now, in_l1);
         in_l1
     }
 }
@@ -258,7 +291,6 @@ impl<C: Cache> Machine for Timed<C> {
         for phase in phases {
             let cycles = self.cycles;
             self.units.iter_mut().for_each(|unit| unit.resume(cycles));
-            self.busy.fill(true);
             self.run_phase(work, phase, assign)?;
             self.cycles = self.units.iter().map(Pipeline::clock).max().unwrap_or(0);
         }

@@ -48,7 +48,8 @@ impl Claim {
         let found = settings.pointer(pointer);
         found.is_some_and(|value| match value.as_str() {
             Some(text) => text == expected,
-            None => value.to_string() == expected,
+            None => serde_json::from_str(expected)
+                .is_ok_and(|expected: serde_json::Value| *value == expected),
         })
     }
 

@@ -52,12 +52,25 @@ impl PipelineStats {
 }
 
 /// A thread on its way back to the first stage.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Looping {
     /// When it is there.
     back: u64,
-    /// For each footprint that is not filtered yet, when the last of its lines arrives.
-    pending: Vec<u64>,
+    /// When the first of the footprints that it waits for is ready.
+    earliest: u64,
+    /// Footprints that it waits for.
+    waiting: u32,
+    /// Its list in [`Pipeline::pending`].
+    list: u32,
+}
+
+/// Footprints of a thread that are not filtered yet and wait for the same cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pending {
+    /// When the last of their lines arrives.
+    pub ready: u64,
+    /// How many they are.
+    pub footprints: u32,
 }
 
 /// The pipeline of one core.
@@ -73,12 +86,14 @@ pub struct Pipeline {
     clock: u64,
     /// In order of return, since every loop is equally long.
     looping: VecDeque<Looping>,
+    /// What they wait for.
+    pending: Vec<Vec<Pending>>,
+    /// Lists that no thread has.
+    spare: Vec<u32>,
     /// Pending footprints in a retry slot that is not full: the next thread's retries share it.
     open_slot: u32,
     drained: bool,
     stats: PipelineStats,
-    /// Lists of finished threads, for reuse.
-    spare: Vec<Vec<u64>>,
 }
 
 impl Pipeline {
@@ -89,10 +104,11 @@ impl Pipeline {
             config,
             clock: 0,
             looping: VecDeque::with_capacity(config.threads as usize),
+            pending: Vec::new(),
+            spare: Vec::new(),
             open_slot: 0,
             drained: false,
             stats: PipelineStats::default(),
-            spare: Vec::new(),
         }
     }
 
@@ -140,50 +156,79 @@ impl Pipeline {
     }
 
     fn retry(&mut self) {
-        if let Some(mut thread) = self.looping.pop_front() {
-            self.stats.loops += 1;
-            let before = thread.pending.len();
-            thread.pending.retain(|&ready| ready > self.clock);
-            let arrived = before - thread.pending.len();
-            self.trip(arrived as u64, thread.pending);
-        }
-    }
-
-    /// A new thread enters now. `pending` has, for each of its `footprints` that misses, when the
-    /// last of its lines arrives.
-    #[inline]
-    pub fn start(&mut self, footprints: u32, pending: &[u64]) {
-        self.stats.threads += 1;
-        let hits = u64::from(footprints) - pending.len() as u64;
-        if pending.is_empty() {
-            self.stats.useful += hits;
-            self.clock += hits;
+        let Some(thread) = self.looping.pop_front() else {
+            return;
+        };
+        self.stats.loops += 1;
+        if thread.earliest > self.clock {
+            self.trip(0, thread);
             return;
         }
-        let mut own = self.spare.pop().unwrap_or_default();
-        own.clear();
-        own.extend_from_slice(pending);
-        self.trip(hits, own);
+        let clock = self.clock;
+        let list = &mut self.pending[thread.list as usize];
+        list.retain(|pending| pending.ready > clock);
+        let left = Looping::new(thread.list, list);
+        self.trip((thread.waiting - left.waiting).into(), left);
+        if left.waiting == 0 {
+            self.spare.push(thread.list);
+        }
     }
 
-    /// One trip: `hits` footprints are filtered, `pending` ones are not.
-    fn trip(&mut self, hits: u64, pending: Vec<u64>) {
+    /// A new thread enters now. `pending` are those of its `footprints` that miss.
+    #[inline(always)]
+    pub fn start(&mut self, footprints: u32, pending: &[Pending]) {
+        self.stats.threads += 1;
+        if pending.is_empty() {
+            self.stats.useful += u64::from(footprints);
+            self.clock += u64::from(footprints);
+        } else {
+            self.start_looping(footprints, pending);
+        }
+    }
+
+    fn start_looping(&mut self, footprints: u32, pending: &[Pending]) {
+        let list = self.spare.pop().unwrap_or_else(|| {
+            self.pending.push(Vec::new());
+            self.pending.len() as u32 - 1
+        });
+        let own = &mut self.pending[list as usize];
+        own.clear();
+        own.extend_from_slice(pending);
+        let thread = Looping::new(list, own);
+        self.trip((footprints - thread.waiting).into(), thread);
+    }
+
+    /// One trip: `hits` footprints are filtered; those that the thread waits for are not.
+    #[inline(always)]
+    fn trip(&mut self, hits: u64, thread: Looping) {
         let entered = self.clock;
         self.stats.useful += hits;
         self.clock += hits;
-        if pending.is_empty() {
-            self.spare.push(pending);
+        if thread.waiting == 0 {
             return;
         }
-        self.open_slot += pending.len() as u32;
+        self.open_slot += thread.waiting;
         let slots = u64::from(self.open_slot / self.config.retry_footprints);
         self.open_slot %= self.config.retry_footprints;
         self.stats.wasted += slots;
         self.clock += slots;
         self.looping.push_back(Looping {
             back: entered + u64::from(self.config.loop_cycles),
-            pending,
+            ..thread
         });
+    }
+}
+
+impl Looping {
+    /// A thread that waits for what is in a list.
+    #[inline(always)]
+    fn new(list: u32, pending: &[Pending]) -> Self {
+        Self {
+            back: 0,
+            earliest: pending.iter().map(|p| p.ready).min().unwrap_or(u64::MAX),
+            waiting: pending.iter().map(|p| p.footprints).sum(),
+            list,
+        }
     }
 }
 
@@ -211,7 +256,11 @@ mod tests {
                 Turn::Free => match threads.next() {
                     Some((hits, latencies)) => {
                         let now = pipeline.clock();
-                        let pending: Vec<u64> = latencies.iter().map(|l| now + l).collect();
+                        let pending = latencies.iter().map(|l| Pending {
+                            ready: now + l,
+                            footprints: 1,
+                        });
+                        let pending: Vec<Pending> = pending.collect();
                         pipeline.start(hits + pending.len() as u32, &pending);
                     }
                     None => pipeline.drain(),

@@ -154,6 +154,20 @@ pub trait CaptureBackend {
         lens: &Lens,
     ) -> Result<Vec<Marks>, RasterError>;
 
+    /// Why the driver's multiview cannot be trusted; `None` where it can.
+    ///
+    /// # Errors
+    /// Driver errors.
+    fn multiview_defect(&mut self) -> Result<Option<String>, RasterError>;
+
+    /// Renders the left and the right layer, whole and of one size, with one list of draws for both:
+    /// in one submission where the driver's multiview can be trusted, else one by one. [`Work`]
+    /// counts one submission either way.
+    ///
+    /// # Errors
+    /// Driver errors.
+    fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError>;
+
     /// Makes the frame's pictures from its layers, all of whose regions have been rendered; those
     /// that are layers are there already.
     ///

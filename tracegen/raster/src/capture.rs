@@ -2,7 +2,7 @@
 
 use super::backend::{CaptureBackend, View};
 use super::cascades;
-use super::draws::{DrawList, DrawMode};
+use super::draws::{DrawCall, DrawList, DrawMode};
 use super::error::RasterError;
 use super::frame::Frame;
 use super::lighting::Lighting;
@@ -12,7 +12,8 @@ use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
-use techniques::{FramePlan, Planner, Skips};
+use techniques::least_work::Object;
+use techniques::{FramePlan, Planner, Skips, Start};
 use visibility::Rig;
 
 /// What to capture, the same for plain rendering and capture.
@@ -40,7 +41,15 @@ impl CaptureJob<'_> {
     /// How a frame is rendered.
     #[must_use]
     pub fn plan(&self, views: &FrameViews) -> FramePlan {
-        self.planner.plan(views)
+        let objects = || {
+            let size_px = self.planner.hmd().eye_size_px;
+            let object = |call: &DrawCall| {
+                let triangles = self.scene.meshes[call.mesh].triangles() as u32;
+                Object::of_bounds(call.bounds, triangles, &views.eyes, size_px)
+            };
+            self.draws.calls.iter().filter_map(object).collect()
+        };
+        self.planner.plan(views, objects)
     }
 
     /// Passes of the frames in the order in which [`Self::capture_frame`] writes them.
@@ -134,10 +143,15 @@ impl CaptureJob<'_> {
             backend.render(self.draws, &view, corner, None)?;
             backend.render(self.draws, &view, corner, Some(&mut |_| Ok(())))?;
         }
+        if self.planner.settings().multiview {
+            // Finds out whether the driver can be trusted.
+            self.render_layers(backend, frame)?;
+        }
         backend.compose(frame)
     }
 
-    /// Renders every layer of a frame without capture. The frame's shadow maps have been rendered.
+    /// Renders every layer of a frame without capture; both eyes' in one submission where multiview asks
+    /// for that and they are nothing but their pictures. The frame's shadow maps have been rendered.
     ///
     /// # Errors
     /// Driver errors.
@@ -146,12 +160,18 @@ impl CaptureJob<'_> {
         backend: &mut dyn CaptureBackend,
         frame: &Frame,
     ) -> Result<(), RasterError> {
-        for view in frame.views() {
+        let views: Vec<View<'_>> = frame.views().collect();
+        if let ([left, right], true) = (&views[..], self.planner.settings().multiview)
+            && [left, right].iter().all(|view| view.layer.is_plain())
+        {
+            return backend.render_both(self.draws, [left, right]);
+        }
+        for view in &views {
             let whole = Region {
                 origin_px: [0, 0],
                 size_px: view.layer.size_px,
             };
-            backend.render(self.draws, &view, whole, None)?;
+            backend.render(self.draws, view, whole, None)?;
         }
         Ok(())
     }
@@ -206,7 +226,8 @@ impl CaptureJob<'_> {
 /// The pass that a layer of a frame is written as.
 fn pass(frame: u32, plan: &FramePlan, number: usize) -> Pass {
     let layer = &plan.layers[number];
-    let (kind, number) = if plan.is_picture(number) {
+    let whole = plan.is_picture(number) && layer.start == Start::Sky;
+    let (kind, number) = if whole {
         (PassKind::Main, 0)
     } else {
         (PassKind::Layer, layer.number)

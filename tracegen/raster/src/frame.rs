@@ -5,7 +5,7 @@ use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
 use super::skips::Skipped;
 use std::time::{Duration, Instant};
-use techniques::{FramePlan, Stage};
+use techniques::{FramePlan, Stage, Start};
 use visibility::{Culling, Rig, Scratch, TooWide};
 
 /// One frame, ready to be drawn.
@@ -61,11 +61,12 @@ impl Frame {
             .map(|layer| {
                 // An eye's own picture gets the technique's list, a part of it or another view what
                 // the list has for it.
-                let whole = rig.eyes().iter().any(|eye| eye.view == layer.view);
+                let whole = rig.eyes().iter().any(|eye| eye.view == layer.view)
+                    && !matches!(layer.start, Start::Nearer { .. });
                 let mut visible = if whole {
                     kept.clone()
                 } else {
-                    draws.visible_of(&kept, layer.clip_from_world())
+                    draws.visible_of(&kept, layer.drawn_from_world())
                 };
                 visible.retain(|&draw| {
                     let call = &draws.calls[draw as usize];

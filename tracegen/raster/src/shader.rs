@@ -72,3 +72,52 @@ pub(crate) fn source(captures: bool) -> String {
     }
     text
 }
+
+/// The module for pictures of two views at once: the view is one of two, by the number that each entry
+/// point is told.
+pub(crate) fn of_two_views() -> String {
+    let one = source(false);
+    let declaration = "var<uniform> view: View;";
+    let two = "var<uniform> views: array<View, 2>;\nvar<private> view_number: u32;";
+    assert!(one.contains(declaration), "the shader declares its view");
+    let text = one
+        .replace(declaration, two)
+        .replace("view.", "views[view_number].");
+    let mut told = String::with_capacity(text.len());
+    let mut rest = text.as_str();
+    while let Some(stage) = ["@vertex", "@fragment"]
+        .iter()
+        .filter_map(|s| rest.find(s))
+        .min()
+    {
+        // `fn name(parameters) -> result {`, perhaps over several lines.
+        let opening = rest[stage..]
+            .find("fn ")
+            .and_then(|f| Some(stage + f + rest[stage + f..].find('(')? + 1));
+        let body = opening.and_then(|o| Some(o + rest[o..].find("{\n")? + 2));
+        let (Some(opening), Some(body)) = (opening, body) else {
+            break;
+        };
+        told += &rest[..opening];
+        told += "@builtin(view_index) view_index: u32, ";
+        told += &rest[opening..body];
+        told += "    view_number = view_index;\n";
+        rest = &rest[body..];
+    }
+    told + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_entry_point_for_two_views_is_told_its_view() {
+        let (one, two) = (source(false), of_two_views());
+        let entries = one.matches("@vertex").count() + one.matches("@fragment").count();
+        assert!(entries >= 6, "{entries}");
+        assert_eq!(two.matches("@builtin(view_index)").count(), entries);
+        assert_eq!(two.matches("view_number = view_index;").count(), entries);
+        assert!(!two.contains(" view."), "every use of the view names which");
+    }
+}

@@ -288,7 +288,7 @@ impl Layout {
                 let height = y + 0.16 + radius;
                 self.put(self.p.pipe[size][service], ALONG, at, height, z);
                 self.put(self.p.shoe, ALONG, at, y + 0.1, z + 1.0);
-                if (bay + slot) % 2 == 0 {
+                if (bay + slot).is_multiple_of(2) {
                     self.put(self.p.flange[size], ALONG, at, height, z);
                 }
                 if (bay * 7 + slot) % 9 == 4 && size == 1 {

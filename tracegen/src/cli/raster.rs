@@ -133,6 +133,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         args.views.eyes(),
         args.path.fps,
     )?;
+    if let Some(first) = setup.frames.first() {
+        planner.check_views(first)?;
+    }
     let job = job(args, &setup, &draws, &planner, bounds);
     let finest = job.finest_levels(&setup.frames)?;
     let searched = started.elapsed();
@@ -165,6 +168,13 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     summary.shadows += job.light(&mut backend, &first)?;
     if !args.no_plain {
         job.warm_up(&mut backend, &first)?;
+    }
+    if planner.settings().multiview
+        && let Some(defect) = backend.multiview_defect()?
+    {
+        shell::warn(&format!(
+            "multiview cannot be trusted, so views are drawn one by one: {defect}"
+        ));
     }
     let mut first = Some(first);
     let mut recorder = job.recorder(&tables);

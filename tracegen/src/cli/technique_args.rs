@@ -10,7 +10,7 @@ use std::str::FromStr;
 use techniques::Gaze;
 use techniques::Settings;
 use techniques::gaze::GazeSample;
-use techniques::settings::{Foveation, FoveationKind, Rates};
+use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
 use visibility::Culling;
 
 /// Techniques of a capture.
@@ -31,6 +31,17 @@ pub struct TechniqueArgs {
     /// Draw nothing that the lens does not show.
     #[arg(long)]
     hidden_area_mask: bool,
+    /// Submit both eyes at once where the driver can be trusted with that (the capture goes eye by eye).
+    #[arg(long)]
+    multiview: bool,
+    /// Draw what is farther than a distance in metres once for both eyes: 7.5, or so far that nothing is
+    /// off by more than some pixels: 1px, or where a frame then costs least: least-work, least-work:2px
+    /// [default of least-work: 1px].
+    #[arg(long, value_name = "METRES|Npx|least-work", conflicts_with = "foveate")]
+    far_field: Option<SplitFlag>,
+    /// How both eyes get it.
+    #[arg(long, value_enum, value_name = "HOW", requires = "far_field", default_value_t = FarVariant::Plain)]
+    far_field_variant: FarVariant,
     /// Shade more coarsely away from the gaze.
     #[arg(long, value_enum, value_name = "HOW")]
     foveate: Option<Foveate>,
@@ -47,6 +58,40 @@ pub struct TechniqueArgs {
     /// quad at the first), or `acuity`: where the eye cannot tell [default: 15,25,35,45].
     #[arg(long, value_name = "A,B,C,D|acuity", requires = "foveate")]
     rates: Option<RatesFlag>,
+}
+
+/// `--far-field`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SplitFlag(Split);
+
+impl FromStr for SplitFlag {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let px = |text: &str| text.strip_suffix("px")?.parse().ok();
+        let split = match text.strip_prefix("least-work") {
+            Some("") => Some(Split::LeastWork { within_px: 1.0 }),
+            Some(rest) => (rest.strip_prefix(':').and_then(px))
+                .map(|within_px| Split::LeastWork { within_px }),
+            None => px(text)
+                .map(Split::Pixels)
+                .or_else(|| text.parse().ok().map(Split::Metres)),
+        };
+        split.map(Self).ok_or_else(|| {
+            format!("expected metres as in 7.5, pixels as in 1px, least-work or least-work:2px, found '{text}'")
+        })
+    }
+}
+
+/// `--far-field-variant`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FarVariant {
+    /// As a camera between the eyes sees it.
+    Plain,
+    /// Shifted for each eye by the disparity at the split.
+    DepthShift,
+    /// From the left eye in even frames, from the right eye in odd ones.
+    AlternateEye,
 }
 
 /// `--foveate`.
@@ -89,7 +134,16 @@ impl TechniqueArgs {
         let settings = Settings {
             culling: self.cull,
             occlusion: self.occlusion,
+            multiview: self.multiview,
             hidden_area_mask: self.hidden_area_mask,
+            far_field: self.far_field.map(|SplitFlag(split)| FarField {
+                split,
+                variant: match self.far_field_variant {
+                    FarVariant::Plain => Variant::Plain,
+                    FarVariant::DepthShift => Variant::DepthShift,
+                    FarVariant::AlternateEye => Variant::AlternateEye,
+                },
+            }),
             foveation: self.foveation(hmd)?,
             ..Settings::default()
         };
@@ -186,6 +240,21 @@ mod tests {
             assert!(message.contains("5,-3 or a file"), "{message}");
         }
         assert!(gaze("absent.csv").is_err());
+    }
+
+    #[test]
+    fn a_split_is_metres_pixels_or_least_work() {
+        let of = |text: &str| text.parse::<SplitFlag>().map(|flag| flag.0);
+        assert_eq!(of("7.5"), Ok(Split::Metres(7.5)));
+        assert_eq!(of("1px"), Ok(Split::Pixels(1.0)));
+        assert_eq!(of("least-work"), Ok(Split::LeastWork { within_px: 1.0 }));
+        assert_eq!(
+            of("least-work:2.5px"),
+            Ok(Split::LeastWork { within_px: 2.5 })
+        );
+        for bad in ["", "px", "7.5m", "least-work:2", "least-work2px"] {
+            assert!(of(bad).unwrap_err().contains("least-work:2px"), "{bad}");
+        }
     }
 
     #[test]

@@ -12,6 +12,7 @@ use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
 use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
+use raster::skips::Skipped;
 use record::CaptureCounts;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
 use techniques::layer::Predicted;
@@ -19,8 +20,10 @@ use techniques::{Layer, Planner, Settings, Skips};
 use textures::TextureSet;
 
 mod culling;
+mod far_field;
 mod layers;
 mod motion;
+mod skips;
 
 const SIZE_PX: [u32; 2] = [200, 136];
 const BUDGET: u64 = 128 << 20;
@@ -101,12 +104,29 @@ fn capture_as(
     budget: u64,
     plain: bool,
 ) -> Result<Captured, RasterError> {
+    let skips = Skips::default();
+    Ok(capture_skipping(planner, scene, cascades, budget, plain, skips)?.0)
+}
+
+/// As [`capture_as`], with the given skips; also what they left out of the textures and of the frame.
+fn capture_skipping(
+    planner: &Planner,
+    scene: &Scene,
+    cascades: u32,
+    budget: u64,
+    plain: bool,
+    skips: Skips,
+) -> Result<(Captured, TextureSet, Skipped), RasterError> {
     let size_px = planner.hmd().eye_size_px;
     let draws = DrawList::new(scene, cascades).unwrap();
-    let set = TextureSet::compress(scene).unwrap();
-    let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
     let views = views(scene, size_px);
-    let job = job(scene, &draws, planner);
+    let job = CaptureJob {
+        skips,
+        ..job(scene, &draws, planner)
+    };
+    let finest = job.finest_levels(std::slice::from_ref(&views))?;
+    let set = TextureSet::prepare(scene, |image| finest[image], None).unwrap();
+    let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
     let textures = draws.textures(&set);
     let (samplers, draw_table) = draws.tables(scene, &set, &textures);
     let tables = Tables {
@@ -150,7 +170,7 @@ fn capture_as(
                 .collect()
         })
         .collect();
-    Ok(Captured {
+    let captured = Captured {
         trace,
         tables,
         tiles,
@@ -167,7 +187,8 @@ fn capture_as(
             regions: after.regions - before.regions,
             ..after
         },
-    })
+    };
+    Ok((captured, set, frame.skipped))
 }
 
 /// Agreement of one eye's pass with the reference.

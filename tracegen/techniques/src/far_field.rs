@@ -125,6 +125,8 @@ pub struct FarView {
     pub eye_from_far_clip: [Mat4; 2],
     /// Depth of the split in the eyes' clip space.
     pub split_depth: [f32; 2],
+    /// Pixels of the eyes around the place of a pixel of this picture that may take from it.
+    pub reach_px: u32,
 }
 
 impl FarField {
@@ -306,7 +308,18 @@ impl Stereo {
             eye_from_far_px: far_from_eye_px.map(|m| normalised(m.inverse()).as_mat3()),
             eye_from_far_clip,
             split_depth,
+            // A pixel of turned eyes may be smaller at the edge.
+            reach_px: if self.is_turned() { 2 } else { 1 },
         })
+    }
+
+    /// Whether the camera looks elsewhere than the eyes.
+    fn is_turned(&self) -> bool {
+        let turn = |eye: &Eye| {
+            let between = self.world_from_camera.inverse() * eye.world_from_eye;
+            1.0 - between.z_axis.z
+        };
+        turn(&self.eyes[0]).max(turn(&self.eyes[1])) > 1e-6
     }
 
     /// The camera in an eye's coordinates, z ahead.
@@ -362,5 +375,6 @@ fn normalised(m: DMat3) -> DMat3 {
     m * (1.0 / m.z_axis.z)
 }
 
+pub(crate) mod plan;
 #[cfg(test)]
 mod tests;

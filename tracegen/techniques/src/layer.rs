@@ -1,8 +1,9 @@
 //! What a frame is rendered as.
 
 use crate::Mask;
+use crate::start::Start;
 use formats::view::{Eye, EyeView};
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Mat4, Vec2, Vec3, Vec4};
 use std::sync::Arc;
 
 /// One rendering of a part of one eye's picture, or of both eyes': a pass of the trace.
@@ -20,6 +21,8 @@ pub struct Layer {
     pub mask: Option<Arc<Mask>>,
     /// Which draws enter it.
     pub draws: Stage,
+    /// What it holds before them.
+    pub start: Start,
 }
 
 impl Layer {
@@ -33,7 +36,14 @@ impl Layer {
             size_px,
             mask: None,
             draws: Stage::All,
+            start: Start::Sky,
         }
+    }
+
+    /// All draws over the sky, without a mask.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.mask.is_none() && self.start == Start::Sky && self.draws == Stage::All
     }
 
     /// World to clip space.
@@ -41,6 +51,18 @@ impl Layer {
     pub fn clip_from_world(&self) -> Mat4 {
         Mat4::from_cols_array_2d(&self.view.eye_to_clip)
             * Mat4::from_cols_array_2d(&self.view.world_to_eye)
+    }
+
+    /// World to a clip space that ends where nothing is drawn any more.
+    #[must_use]
+    pub fn drawn_from_world(&self) -> Mat4 {
+        match self.start {
+            Start::Nearer { end } => {
+                let nearer = Vec4::new(1.0, 1.0, 1.0 / end.max(1e-6), 1.0);
+                Mat4::from_diagonal(nearer) * self.clip_from_world()
+            }
+            _ => self.clip_from_world(),
+        }
     }
 
     /// Whether something in world-space bounds may reach a pixel that may be drawn. Errs on the

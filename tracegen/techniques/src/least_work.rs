@@ -8,6 +8,9 @@
 //! depths at which a box begins or ends the cost is linear in the split, so the best split is one of
 //! those, or the nearest one allowed.
 
+use formats::view::EyeView;
+use glam::{Mat4, Vec2, Vec3};
+
 /// What the model knows of a draw that is visible in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Object {
@@ -19,6 +22,56 @@ pub struct Object {
     pub triangles: u32,
     /// Area that its bounds take up in a view.
     pub area_px: f32,
+}
+
+impl Object {
+    /// A draw with the given world-space bounds, as two eyes with pictures of `size_px` see it; `None`
+    /// where neither does.
+    #[must_use]
+    pub fn of_bounds(
+        [low, high]: [Vec3; 2],
+        triangles: u32,
+        eyes: &[EyeView; 2],
+        size_px: [u32; 2],
+    ) -> Option<Self> {
+        let mut object: Option<Self> = None;
+        for eye in eyes {
+            let clip = Mat4::from_cols_array_2d(&eye.eye_to_clip)
+                * Mat4::from_cols_array_2d(&eye.world_to_eye);
+            let (mut near_m, mut far_m) = (f32::INFINITY, f32::NEG_INFINITY);
+            let (mut first, mut last) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+            for corner in 0..8 {
+                let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
+                let at = clip * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
+                (near_m, far_m) = (near_m.min(at.w), far_m.max(at.w));
+                // Beside the eye or behind it: it may reach any edge.
+                let ndc = if at.w > 1e-3 {
+                    at.truncate().truncate() / at.w
+                } else {
+                    Vec2::INFINITY
+                };
+                first = first.min(if at.w > 1e-3 { ndc } else { -ndc });
+                last = last.max(ndc);
+            }
+            let seen = last.min(Vec2::ONE) - first.max(-Vec2::ONE);
+            if far_m > 0.0 && seen.min_element() > 0.0 {
+                let area_px = seen.x * seen.y / 4.0 * size_px[0] as f32 * size_px[1] as f32;
+                let known = object.unwrap_or(Self {
+                    near_m,
+                    far_m,
+                    triangles,
+                    area_px,
+                });
+                object = Some(Self {
+                    near_m: known.near_m.min(near_m).max(0.0),
+                    far_m: known.far_m.max(far_m),
+                    area_px: known.area_px.max(area_px),
+                    ..known
+                });
+            }
+        }
+        object
+    }
 }
 
 /// What things cost, in any one unit.
@@ -293,6 +346,36 @@ mod tests {
             with > 10 && without > 10,
             "{with} with and {without} without a far field"
         );
+    }
+
+    #[test]
+    fn an_object_has_the_range_and_the_area_of_its_box() {
+        let projection = glam::camera::rh::proj::directx::perspective(
+            std::f32::consts::FRAC_PI_2,
+            1.0,
+            0.1,
+            100.0,
+        );
+        let eye = EyeView {
+            eye_to_clip: projection.to_cols_array_2d(),
+            ..EyeView::default()
+        };
+        let of = |low: Vec3, high: Vec3| Object::of_bounds([low, high], 7, &[eye; 2], [100, 200]);
+        let seen = of(Vec3::new(-1.0, -1.0, -8.0), Vec3::new(1.0, 1.0, -4.0)).unwrap();
+        assert!((seen.near_m - 4.0).abs() < 1e-5 && (seen.far_m - 8.0).abs() < 1e-5);
+        // 2 m of 8 m at 4 m, both ways.
+        assert!(
+            (seen.area_px - 100.0 * 200.0 / 16.0).abs() < 1.0,
+            "{seen:?}"
+        );
+        assert_eq!(seen.triangles, 7);
+        assert_eq!(of(Vec3::splat(2.0), Vec3::splat(3.0)), None);
+        assert_eq!(
+            of(Vec3::new(20.0, 0.0, -5.0), Vec3::new(21.0, 1.0, -4.0)),
+            None
+        );
+        let around = of(Vec3::splat(-5.0), Vec3::splat(5.0)).unwrap();
+        assert_eq!((around.near_m, around.area_px), (0.0, 20_000.0));
     }
 
     #[test]

@@ -15,6 +15,7 @@ pub mod plan;
 pub mod planner;
 pub mod settings;
 pub mod skips;
+pub mod start;
 
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};
@@ -23,3 +24,4 @@ pub use plan::FramePlan;
 pub use planner::Planner;
 pub use settings::{Settings, SettingsError};
 pub use skips::Skips;
+pub use start::Start;

@@ -4,6 +4,7 @@ use crate::Mask;
 use crate::eye::EyePicture;
 use crate::layer::{Layer, Stage};
 use crate::plan::{Filter, Part};
+use crate::start::Start;
 use formats::view::{Eye, EyeView, TILE_SIZE_PX};
 use glam::{DMat4, DVec4, Mat4};
 use std::sync::Arc;
@@ -98,6 +99,7 @@ impl Patch {
             size_px: self.size_px,
             mask: self.mask.clone(),
             draws: Stage::All,
+            start: Start::Sky,
         }
     }
 

@@ -1,14 +1,19 @@
 //! From settings to plans.
 
 use crate::eye::EyePicture;
+use crate::far_field::{self, FarFieldError, FarView, Stereo};
 use crate::foveation::{multi_resolution, radial_density, rings};
 use crate::layer::Predicted;
+use crate::least_work::Object;
 use crate::patch::EyePatches;
 use crate::plan::{FramePlan, Picture};
 use crate::settings::{FoveationKind, SettingsError};
 use crate::{Settings, hidden_area};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use std::sync::{Arc, Mutex};
+
+/// Largest edge of a layer.
+const MAX_LAYER_PX: u32 = 8192;
 
 /// What each eye's picture is made of.
 type Patches = Arc<Vec<EyePatches>>;
@@ -38,6 +43,19 @@ impl Planner {
         fps: f32,
     ) -> Result<Self, SettingsError> {
         settings.check(hmd)?;
+        let needs_both = [
+            ("far field", settings.far_field.is_some()),
+            ("multiview", settings.multiview),
+        ];
+        if let Some((what, _)) = needs_both.into_iter().find(|(_, asked)| *asked)
+            && eyes != [Eye::Left, Eye::Right]
+        {
+            return Err(SettingsError {
+                what,
+                expected: "both eyes".into(),
+                found: format!("{eyes:?}"),
+            });
+        }
         Ok(Self {
             settings: settings.clone(),
             hmd: hmd.clone(),
@@ -72,9 +90,37 @@ impl Planner {
         &self.lenses
     }
 
-    /// Plans a frame.
+    /// Checks that the far field, if there is one, can be drawn for a frame's eyes.
+    ///
+    /// # Errors
+    /// As [`Stereo::view`].
+    pub fn check_views(&self, views: &FrameViews) -> Result<(), FarFieldError> {
+        self.far_view(views, Vec::new).map(|_| ())
+    }
+
+    fn far_view(
+        &self,
+        views: &FrameViews,
+        objects: impl FnOnce() -> Vec<Object>,
+    ) -> Result<Option<FarView>, FarFieldError> {
+        let Some(far_field) = &self.settings.far_field else {
+            return Ok(None);
+        };
+        let size_px = self.hmd.eye_size_px;
+        let stereo = Stereo::new(&views.eyes, size_px, far_field.variant, views.frame);
+        far_field.view(&stereo, MAX_LAYER_PX, objects)
+    }
+
+    /// Plans a frame; `objects` tells what draws it has where a technique needs to know.
     #[must_use]
-    pub fn plan(&self, views: &FrameViews) -> FramePlan {
+    pub fn plan(&self, views: &FrameViews, objects: impl FnOnce() -> Vec<Object>) -> FramePlan {
+        // Eyes that have none have been refused: see `check_views`.
+        if let Ok(Some(far)) = self.far_view(views, objects) {
+            let masks = self.patches([0.0; 2]);
+            let mask = |eye: usize| masks[eye].patches.first().and_then(|p| p.mask.clone());
+            let size_px = self.hmd.eye_size_px;
+            return far_field::plan::plan(&far, views, size_px, [mask(0), mask(1)]);
+        }
         let time_s = views.frame as f32 / self.fps;
         let gaze = (self.settings.foveation.as_ref())
             .map_or([0.0; 2], |foveation| foveation.gaze.at(time_s));

@@ -3,33 +3,6 @@
 use super::*;
 use crate::config::Replacement;
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ z >> 31) % end
-    }
-
-    fn of<T: Copy>(&mut self, values: &[T]) -> T {
-        values[self.below(values.len() as u64) as usize]
-    }
-
-    /// An LRU cache of up to `most_sets` sets and any small number of ways.
-    fn cache(&mut self, most_sets: u64) -> CacheConfig {
-        let ways = self.of(&[1, 2, 3, 4, 4, 4, 5, 8, 12, 16]);
-        let sets = 1 << self.below(u64::from(most_sets.ilog2()) + 1);
-        CacheConfig {
-            ways,
-            ..CacheConfig::lru(sets * u64::from(ways) * 16)
-        }
-    }
-}
-
 /// LRU sets as plain lists, most recent last.
 struct Twin {
     sets: Vec<Vec<u32>>,

@@ -112,6 +112,48 @@ impl Lavapipe {
     }
 }
 
+impl Lavapipe {
+    /// Depths of a layer that has been rendered, row by row.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn depths(&self, layer: usize) -> Result<Vec<f32>, RasterError> {
+        let texture = self.target(layer)?.depth_view.texture();
+        let size = texture.size();
+        let row_bytes = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let readback = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: u64::from(row_bytes) * u64::from(size.height),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &readback,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(row_bytes),
+                    rows_per_image: None,
+                },
+            },
+            size,
+        );
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.read(&readback, 0..readback.size(), |bytes| {
+            let row = |row: &[u8]| -> Vec<f32> {
+                let texels = row.chunks_exact(4).take(size.width as usize);
+                texels.map(bytemuck::pod_read_unaligned).collect()
+            };
+            Ok(bytes
+                .chunks_exact(row_bytes as usize)
+                .flat_map(row)
+                .collect())
+        })
+    }
+}
+
 /// A non-negative integer up to 2048 in half precision.
 fn half_to_integer(bits: u16) -> u32 {
     let exponent = i32::from(bits >> 10) - 15;

@@ -14,6 +14,8 @@ pub struct Gpu {
     pub driver: String,
     /// It runs on the processor.
     pub is_software: bool,
+    /// It has a multiview, which need not be sound.
+    pub has_multiview: bool,
     /// What it lacks for captures; without it only pictures can be rendered.
     pub no_capture: Option<String>,
 }
@@ -84,9 +86,10 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
             what: what.clone(),
         });
     }
+    let multiview = adapter.features() & wgpu::Features::MULTIVIEW;
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         label: None,
-        required_features: (PICTURE_FEATURES | CAPTURE_FEATURES) - missing,
+        required_features: ((PICTURE_FEATURES | CAPTURE_FEATURES) - missing) | multiview,
         required_limits: adapter.limits(),
         experimental_features: wgpu::ExperimentalFeatures::disabled(),
         memory_hints: wgpu::MemoryHints::MemoryUsage,
@@ -102,6 +105,7 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
         adapter: info.name.clone(),
         driver,
         is_software: info.device_type == wgpu::DeviceType::Cpu,
+        has_multiview: !multiview.is_empty(),
         no_capture,
     })
 }

@@ -3,8 +3,10 @@
 mod compose;
 mod counter;
 pub mod device;
+mod multiview;
 mod pipelines;
 mod records;
+mod starts;
 mod targets;
 mod upload;
 mod visible;
@@ -20,14 +22,18 @@ use super::uniforms::ViewData;
 use compose::Composer;
 use device::Gpu;
 use formats::view::Lens;
+use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
 use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
 use records::RecordBuffers;
 use scene::Scene;
+use starts::{Drawn, Starts};
 use std::sync::Arc;
 use std::time::Instant;
 use targets::{ColorTarget, LayerMask, LayerTarget, Readback, ShadowMaps};
+use techniques::Start;
 use techniques::plan::Picture;
+use techniques::start::Opening;
 use textures::TextureSet;
 use upload::SceneBuffers;
 use wgpu::util::DeviceExt;
@@ -50,6 +56,11 @@ pub struct Lavapipe {
     eye_bindings: wgpu::BindGroup,
     /// How each material is drawn.
     materials: Vec<MaterialState>,
+    /// Both views at once; made when it is first asked for.
+    multiview: Option<Multiview>,
+    multiview_trust: Trust,
+    /// What layers start with that is not the sky; made when a layer does.
+    starts: Option<Starts>,
     work: Work,
 }
 
@@ -125,6 +136,9 @@ impl Lavapipe {
             shadow_maps,
             eye_bindings,
             materials,
+            multiview: None,
+            multiview_trust: Trust::Unknown,
+            starts: None,
             work,
         })
     }
@@ -204,44 +218,103 @@ impl Lavapipe {
         Ok(plan)
     }
 
-    /// Issues a plan, setting only the state that changes. Tells how many changes there were.
+    /// What a layer starts with; nothing to draw where that is the sky alone.
+    fn start(&self, start: &Start) -> Result<Option<Drawn<'_>>, RasterError> {
+        let Some(starts) = &self.starts else {
+            return Ok(None);
+        };
+        let gpu = &self.gpu;
+        Ok(match start {
+            Start::Sky => None,
+            Start::Nearer { end } => Some(starts.nearer(gpu, *end)),
+            Start::Behind([left, right]) => {
+                let of = |opening: &Opening| self.target(opening.nearer);
+                let openings = [(left, of(left)?), (right, of(right)?)];
+                Some(starts.behind(gpu, openings))
+            }
+            Start::Composed(composition) => {
+                let nearer = self.target(composition.nearer)?;
+                let farther = self.target(composition.farther)?;
+                Some(starts.composed(gpu, composition, nearer, farther))
+            }
+        })
+    }
+
+    /// Issues a plan, setting only the state that changes.
     fn issue(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         draws: &DrawList,
         plan: &[(Batch, PipelineKey)],
-    ) -> u64 {
-        let mut changes = 0;
-        let (mut last_key, mut last_material, mut last_mesh) = (None, None, None);
+    ) {
+        let mut last = None;
         pass.set_vertex_buffer(1, self.scene.instance_draws.slice(..));
         for (batch, key) in plan {
-            let call = &draws.calls[batch.draw as usize];
+            let state = State::new(draws, batch, *key);
             let (Some(mesh), Some(pipeline)) =
-                (&self.scene.meshes[call.mesh], self.pipelines.get(key))
+                (&self.scene.meshes[state.mesh], self.pipelines.get(key))
             else {
                 // Every draw's mesh is uploaded, and a plan prepares its pipelines.
                 continue;
             };
-            if last_key.replace(*key) != Some(*key) {
+            let [new_pipeline, new_material, new_mesh] = state.changes(last.replace(state));
+            if new_pipeline {
                 pass.set_pipeline(pipeline);
-                changes += 1;
             }
-            if last_material.replace(call.material) != Some(call.material) {
-                pass.set_bind_group(1, &self.scene.materials[call.material], &[]);
-                changes += 1;
+            if new_material {
+                pass.set_bind_group(1, &self.scene.materials[state.material], &[]);
             }
-            if last_mesh.replace(call.mesh) != Some(call.mesh) {
+            if new_mesh {
                 pass.set_vertex_buffer(0, mesh.vertices.slice(..));
                 if let Some(colors) = &mesh.colors {
                     pass.set_vertex_buffer(2, colors.slice(..));
                 }
                 pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-                changes += 1;
             }
             pass.draw_indexed(0..mesh.index_count, 0, batch.range.clone());
         }
-        changes
     }
+}
+
+/// What is set before a draw call.
+#[derive(Clone, Copy)]
+struct State {
+    key: PipelineKey,
+    material: usize,
+    mesh: usize,
+}
+
+impl State {
+    fn new(draws: &DrawList, batch: &Batch, key: PipelineKey) -> Self {
+        let call = &draws.calls[batch.draw as usize];
+        Self {
+            key,
+            material: call.material,
+            mesh: call.mesh,
+        }
+    }
+
+    /// Whether pipeline, material and mesh differ from those of the call before.
+    fn changes(&self, last: Option<Self>) -> [bool; 3] {
+        last.map_or([true; 3], |last| {
+            [
+                last.key != self.key,
+                last.material != self.material,
+                last.mesh != self.mesh,
+            ]
+        })
+    }
+}
+
+/// State changes of a plan.
+fn state_changes(draws: &DrawList, plan: &[(Batch, PipelineKey)]) -> u64 {
+    let mut last = None;
+    let changes = plan.iter().map(|(batch, key)| {
+        let state = State::new(draws, batch, *key);
+        let changes = state.changes(last.replace(state));
+        changes.iter().filter(|changed| **changed).count() as u64
+    });
+    changes.sum()
 }
 
 impl CaptureBackend for Lavapipe {
@@ -348,13 +421,17 @@ impl CaptureBackend for Lavapipe {
         let plan = self.plan(draws, view.visible, purpose)?;
         self.work.regions += 1;
         self.work.bytes_uploaded += size_of::<ViewData>() as u64 + 4;
+        if view.layer.start != Start::Sky && self.starts.is_none() {
+            self.starts = Some(Starts::new(&self.gpu)?);
+        }
+        let start_drawn = self.start(&view.layer.start)?;
         let gpu = &self.gpu;
         let (buffers, target) = (&self.buffers, self.target(view.target)?);
         let data = ViewData::of_eye(view, buffers.capacity);
         gpu.queue
             .write_buffer(&buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         gpu.queue.write_buffer(&buffers.counter, 0, &[0; 4]);
-        let changes = gpu.checked("rendering a layer", || {
+        gpu.checked("rendering a layer", || {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 // Regions add up to a picture: everything is loaded, and the background clears
@@ -388,20 +465,27 @@ impl CaptureBackend for Lavapipe {
             if let Some(any) = self.scene.materials.first() {
                 pass.set_bind_group(1, any, &[]);
             }
-            pass.set_pipeline(&self.pipelines.background);
-            pass.draw(0..3, 0..1);
+            if start_drawn.as_ref().is_none_or(|start| start.over_sky) {
+                pass.set_pipeline(&self.pipelines.background);
+                pass.draw(0..3, 0..1);
+            }
+            if let Some(start) = &start_drawn {
+                pass.set_pipeline(start.pipeline);
+                pass.set_bind_group(0, &start.bindings, &[]);
+                pass.draw(0..3, 0..1);
+                pass.set_bind_group(0, &self.eye_bindings, &[]);
+            }
             if let (Some(mask), Some(composer)) = (&target.mask, &self.composer) {
                 pass.set_pipeline(&composer.mask);
                 pass.set_bind_group(0, &mask.bindings, &[]);
                 pass.draw(0..3, 0..1);
                 pass.set_bind_group(0, &self.eye_bindings, &[]);
             }
-            let changes = self.issue(&mut pass, draws, &plan);
+            self.issue(&mut pass, draws, &plan);
             drop(pass);
             gpu.queue.submit([encoder.finish()]);
-            changes
         })?;
-        self.work.state_changes += changes;
+        self.work.state_changes += state_changes(draws, &plan);
         let Some(sink) = sink else {
             let submitted = Instant::now();
             gpu.wait("rendering a layer")?;
@@ -433,6 +517,14 @@ impl CaptureBackend for Lavapipe {
             })?;
         }
         Ok(Captured::Complete)
+    }
+
+    fn multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
+        self.find_multiview_defect()
+    }
+
+    fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError> {
+        self.draw_both(draws, views)
     }
 
     fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError> {

@@ -6,11 +6,17 @@ use crate::roles::{PipelineKey, Role};
 use crate::shader::{self, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
 use crate::vertices::{COLOR_STRIDE, VERTEX_STRIDE};
 use std::collections::BTreeMap;
+use std::num::NonZeroU32;
 
 /// Format of the picture.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 /// Format of depth and shadow maps.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// The views that [`Pipelines::for_both_views`] draws at once.
+pub const VIEWS: NonZeroU32 = NonZeroU32::new(0b11).unwrap();
+/// How many they are.
+pub const VIEW_COUNT: u32 = VIEWS.get().count_ones();
 
 const ADDITIVE: wgpu::BlendState = {
     let add = wgpu::BlendComponent {
@@ -40,6 +46,7 @@ pub struct Pipelines {
     pub background: wgpu::RenderPipeline,
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
+    multiview_mask: Option<NonZeroU32>,
     made: BTreeMap<PipelineKey, wgpu::RenderPipeline>,
 }
 
@@ -49,14 +56,28 @@ impl Pipelines {
     /// # Errors
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
+        Self::compile(gpu, &shader::source(gpu.no_capture.is_none()), None)
+    }
+
+    /// Compiles the shader for pictures of two views at once.
+    ///
+    /// # Errors
+    /// Driver and validation errors.
+    pub fn for_both_views(gpu: &Gpu) -> Result<Self, RasterError> {
+        Self::compile(gpu, &shader::of_two_views(), Some(VIEWS))
+    }
+
+    fn compile(
+        gpu: &Gpu,
+        source: &str,
+        multiview_mask: Option<NonZeroU32>,
+    ) -> Result<Self, RasterError> {
         gpu.checked("compiling the shader", || {
             let module = gpu
                 .device
                 .create_shader_module(wgpu::ShaderModuleDescriptor {
                     label: Some("capture"),
-                    source: wgpu::ShaderSource::Wgsl(
-                        shader::source(gpu.no_capture.is_none()).into(),
-                    ),
+                    source: wgpu::ShaderSource::Wgsl(source.into()),
                 });
             let layouts = Layouts {
                 view: gpu
@@ -79,12 +100,13 @@ impl Pipelines {
                     bind_group_layouts: &[Some(&layouts.view), Some(&layouts.material)],
                     immediate_size: 0,
                 });
-            let background = background(gpu, &module, &layout);
+            let background = background(gpu, &module, &layout, multiview_mask);
             Self {
                 layouts,
                 background,
                 module,
                 layout,
+                multiview_mask,
                 made: BTreeMap::new(),
             }
         })
@@ -222,7 +244,7 @@ impl Pipelines {
                     compilation_options,
                     targets: if colorless { &[] } else { &color },
                 }),
-                multiview_mask: None,
+                multiview_mask: self.multiview_mask,
                 cache: None,
             })
     }
@@ -232,6 +254,7 @@ fn background(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
     layout: &wgpu::PipelineLayout,
+    multiview_mask: Option<NonZeroU32>,
 ) -> wgpu::RenderPipeline {
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -258,7 +281,7 @@ fn background(
                 compilation_options: Default::default(),
                 targets: &[Some(COLOR_FORMAT.into())],
             }),
-            multiview_mask: None,
+            multiview_mask,
             cache: None,
         })
 }

@@ -48,7 +48,13 @@ impl LayerTarget {
         check_size(gpu, size_px)?;
         let color = ColorTarget::new(gpu, size_px)?;
         gpu.checked("making a depth buffer", || {
-            let depth = attachment(gpu, size_px, 1, DEPTH_FORMAT, wgpu::TextureUsages::empty());
+            let depth = attachment(
+                gpu,
+                size_px,
+                1,
+                DEPTH_FORMAT,
+                wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            );
             Self {
                 color,
                 depth_view: depth.create_view(&Default::default()),
@@ -126,7 +132,9 @@ impl ColorTarget {
     /// Driver errors.
     pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Result<Self, RasterError> {
         gpu.checked("making a render target", || {
-            let usage = wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::TEXTURE_BINDING;
+            let usage = wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::COPY_DST
+                | wgpu::TextureUsages::TEXTURE_BINDING;
             let texture = attachment(gpu, size_px, 1, COLOR_FORMAT, usage);
             Self {
                 size_px,

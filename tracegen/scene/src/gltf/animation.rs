@@ -157,12 +157,12 @@ fn chain(parents: &[Option<usize>], node: usize) -> impl Iterator<Item = usize> 
     std::iter::successors(Some(node), |&node| parents[node])
 }
 
-/// The samplers that move each node, with their places in the file.
-fn targets<'a>(
-    root: &'a Root,
-    origin: &Origin,
-) -> Result<HashMap<usize, Vec<(Channel, String, &'a Sampler)>>, SceneError> {
-    let mut targets: HashMap<usize, Vec<(Channel, String, &Sampler)>> = HashMap::new();
+/// What moves each node: the property, the channel's place in the file and its sampler.
+type Targets<'a> = HashMap<usize, Vec<(Channel, String, &'a Sampler)>>;
+
+/// Finds what moves each node.
+fn targets<'a>(root: &'a Root, origin: &Origin) -> Result<Targets<'a>, SceneError> {
+    let mut targets = Targets::new();
     for (a, animation) in root.animations.iter().enumerate() {
         for (c, channel) in animation.channels.iter().enumerate() {
             let place = format!("animations[{a}].channels[{c}]");

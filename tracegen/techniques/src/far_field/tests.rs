@@ -223,8 +223,8 @@ fn ahead_of_an_eye_the_camera_has_as_many_pixels_an_angle() {
         let view = Stereo::new(eyes, SIZE_PX, Variant::Plain, 0)
             .view(8.0, 8192)
             .unwrap();
-        for eye in 0..2 {
-            let e = Eye::new(&eyes[eye]);
+        for (eye, view_of_eye) in eyes.iter().enumerate() {
+            let e = Eye::new(view_of_eye);
             let scale = DVec2::from_array(SIZE_PX.map(f64::from));
             let ahead = e.clip_from_eye.project_point3(DVec3::NEG_Z).truncate();
             let px = (ahead * DVec2::new(0.5, -0.5) + 0.5) * scale;
@@ -240,7 +240,7 @@ fn both_maps_between_pixels_undo_each_other_and_depth_comes_with_them() {
     for eyes in displays() {
         let stereo = Stereo::new(&eyes, SIZE_PX, Variant::DepthShift, 0);
         let view = stereo.view(4.0, 8192).unwrap();
-        for eye in 0..2 {
+        for (eye, view_of_eye) in eyes.iter().enumerate() {
             let (point, px) = point_beyond(&stereo, eye, 4.0, &mut random);
             let back = through(
                 &view.eye_from_far_px[eye],
@@ -251,8 +251,8 @@ fn both_maps_between_pixels_undo_each_other_and_depth_comes_with_them() {
                 * Mat4::from_cols_array_2d(&view.camera.world_to_eye);
             let far_ndc = clip.project_point3(point.as_vec3());
             let eye_ndc = view.eye_from_far_clip[eye].project_point3(far_ndc);
-            let e = Mat4::from_cols_array_2d(&eyes[eye].eye_to_clip)
-                * Mat4::from_cols_array_2d(&eyes[eye].world_to_eye);
+            let e = Mat4::from_cols_array_2d(&view_of_eye.eye_to_clip)
+                * Mat4::from_cols_array_2d(&view_of_eye.world_to_eye);
             let expected: Vec3 = e.project_point3(point.as_vec3());
             assert!(
                 (eye_ndc.z - expected.z).abs() < 1e-4,

@@ -37,7 +37,7 @@ fn foveated(kind: FoveationKind, gaze: [f32; 2], hidden_area_mask: bool) -> Sett
 fn plan(settings: &Settings, hmd: &Hmd) -> FramePlan {
     let lenses = hmd.fov.map(|fov| Lens::of(&fov));
     let planner = Planner::new(settings, hmd, lenses, BOTH, 72.0).unwrap();
-    planner.plan(&FrameViews::default())
+    planner.plan(&FrameViews::default(), Vec::new)
 }
 
 /// Every setting that makes layers, with a gaze ahead and one at a corner.
@@ -171,7 +171,7 @@ fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
         let lenses = hmd.fov.map(|fov| Lens::of(&fov));
         let plan = Planner::new(&settings, &hmd, lenses, BOTH, 72.0)
             .unwrap()
-            .plan(&views);
+            .plan(&views, Vec::new);
         for picture in &plan.pictures {
             let Picture::Composed { parts, .. } = picture else {
                 continue;
@@ -278,10 +278,13 @@ fn the_layers_of_a_gaze_that_stays_are_made_once() {
     let settings = foveated(FoveationKind::Rings, [3.0, 4.0], true);
     let planner = Planner::new(&settings, &hmd, lenses, BOTH, 72.0).unwrap();
     let masks = |frame| {
-        let plan = planner.plan(&FrameViews {
-            frame,
-            ..FrameViews::default()
-        });
+        let plan = planner.plan(
+            &FrameViews {
+                frame,
+                ..FrameViews::default()
+            },
+            Vec::new,
+        );
         plan.layers
             .into_iter()
             .map(|layer| layer.mask)

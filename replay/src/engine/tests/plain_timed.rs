@@ -1,0 +1,350 @@
+//! The timed machine in plain terms: a heap and a map of what is in flight, a list of waiting
+//! footprints a thread, one footprint looked up after another. The fast machine has to agree with it
+//! cycle by cycle.
+
+use super::*;
+use crate::cache::Cache;
+use crate::config::{Replacement, TmuConfig};
+use crate::engine::counts::FootprintMisses;
+use crate::engine::timed::Timed;
+use crate::result::TmuResult;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+
+/// Lines on their way into one cache.
+#[derive(Default)]
+struct PlainInFlight {
+    lines: HashMap<u32, u64>,
+    arrivals: BinaryHeap<Reverse<(u64, u64, u32)>>,
+    requests: u64,
+}
+
+struct PlainLevel {
+    cache: Box<dyn Cache>,
+    in_flight: PlainInFlight,
+}
+
+impl PlainLevel {
+    fn new(cache: Box<dyn Cache>) -> Self {
+        Self {
+            cache,
+            in_flight: PlainInFlight::default(),
+        }
+    }
+
+    fn arrive(&mut self, now: u64) {
+        let PlainInFlight {
+            lines, arrivals, ..
+        } = &mut self.in_flight;
+        while let Some(&Reverse((cycle, _, line))) = arrivals.peek() {
+            if cycle > now {
+                break;
+            }
+            arrivals.pop();
+            lines.remove(&line);
+            self.cache.fill(line);
+        }
+    }
+
+    fn enter(&mut self, line: u32, now: u64, arrival: u64) {
+        if arrival <= now {
+            self.cache.fill(line);
+        } else {
+            let flight = &mut self.in_flight;
+            flight.lines.insert(line, arrival);
+            flight
+                .arrivals
+                .push(Reverse((arrival, flight.requests, line)));
+            flight.requests += 1;
+        }
+    }
+}
+
+/// A core's texture unit.
+#[derive(Default)]
+struct PlainUnit {
+    clock: u64,
+    busy: bool,
+    drained: bool,
+    /// When each is back at the first stage, and when its footprints are ready.
+    looping: VecDeque<(u64, Vec<u64>)>,
+    open_slot: u32,
+    useful: u64,
+    wasted: u64,
+    idle: u64,
+    threads: u64,
+    loops: u64,
+}
+
+impl PlainUnit {
+    fn trip(&mut self, tmu: &TmuConfig, hits: u64, pending: Vec<u64>) {
+        let entered = self.clock;
+        self.useful += hits;
+        self.clock += hits;
+        if pending.is_empty() {
+            return;
+        }
+        self.open_slot += pending.len() as u32;
+        let slots = u64::from(self.open_slot / tmu.retry_footprints);
+        self.open_slot %= tmu.retry_footprints;
+        self.wasted += slots;
+        self.clock += slots;
+        let back = entered + u64::from(tmu.loop_cycles);
+        self.looping.push_back((back, pending));
+    }
+}
+
+struct PlainTimed {
+    l1: Vec<PlainLevel>,
+    l2: PlainLevel,
+    tmu: TmuConfig,
+    counts: CacheCounts,
+    units: Vec<PlainUnit>,
+    cycles: u64,
+}
+
+impl PlainTimed {
+    fn new(config: &RunConfig, bins: &Bins) -> Self {
+        let Levels { l1, l2 } = Levels::build(config).unwrap();
+        let l1 = l1
+            .into_iter()
+            .map(|cache| PlainLevel::new(cache.into_box()));
+        Self {
+            l1: l1.collect(),
+            l2: PlainLevel::new(l2.into_box()),
+            tmu: config.tmu,
+            counts: CacheCounts::new(bins, config.tile_maps),
+            units: (0..config.cores).map(|_| PlainUnit::default()).collect(),
+            cycles: 0,
+        }
+    }
+
+    fn start(&mut self, core: usize, quad: &QuadLines<'_>) {
+        let now = self.units[core].clock;
+        self.l1[core].arrive(now);
+        self.l2.arrive(now);
+        let (mut pending, mut fetches) = (Vec::new(), 0);
+        for footprint in quad.footprints() {
+            for _ in 0..=footprint.repeats {
+                let mut misses = FootprintMisses::default();
+                let mut ready = 0;
+                for &line in footprint.lines {
+                    if !self.l1[core].cache.lookup(line) {
+                        let arrival = self.request(core, now, line, &mut fetches, &mut misses);
+                        ready = ready.max(arrival);
+                    }
+                }
+                if ready > now {
+                    pending.push(ready);
+                }
+                self.counts.footprint(footprint.cell, quad.tile(), &misses);
+            }
+        }
+        let unit = &mut self.units[core];
+        unit.threads += 1;
+        let hits = u64::from(quad.footprints) - pending.len() as u64;
+        unit.trip(&self.tmu, hits, pending);
+    }
+
+    fn request(
+        &mut self,
+        core: usize,
+        now: u64,
+        line: u32,
+        fetches: &mut u64,
+        misses: &mut FootprintMisses,
+    ) -> u64 {
+        let l1 = &mut self.l1[core];
+        if let Some(&arrival) = l1.in_flight.lines.get(&line) {
+            misses.l1_secondary += 1;
+            return arrival;
+        }
+        misses.l1_lines += 1;
+        let tmu = &self.tmu;
+        let trip = *fetches / u64::from(tmu.fetches_per_trip);
+        *fetches += 1;
+        let instant = tmu.l1_penalty_cycles == 0 && tmu.l2_penalty_cycles == 0;
+        let wait = if instant {
+            0
+        } else {
+            trip * u64::from(tmu.loop_cycles)
+        };
+        let in_l2 = if self.l2.cache.lookup(line) {
+            now
+        } else if let Some(&arrival) = self.l2.in_flight.lines.get(&line) {
+            misses.l2_secondary += 1;
+            arrival
+        } else {
+            misses.l2_lines += 1;
+            let arrival = now + u64::from(tmu.l2_penalty_cycles);
+            self.l2.enter(line, now, arrival);
+            arrival
+        };
+        let in_l1 = in_l2 + u64::from(tmu.l1_penalty_cycles) + wait;
+        l1.enter(line, now, in_l1);
+        in_l1
+    }
+
+    /// What the core's first stage does next.
+    fn turn(
+        &mut self,
+        core: usize,
+        work: &mut Cores<'_>,
+        item: &mut dyn FnMut() -> Option<WorkItem>,
+    ) {
+        let unit = &mut self.units[core];
+        let full = unit.drained || unit.looping.len() >= self.tmu.threads as usize;
+        match unit.looping.front().map(|(back, _)| *back) {
+            Some(back) if back <= unit.clock => {
+                let (_, mut pending) = unit.looping.pop_front().unwrap();
+                unit.loops += 1;
+                let before = pending.len();
+                pending.retain(|&ready| ready > unit.clock);
+                unit.trip(&self.tmu, (before - pending.len()) as u64, pending);
+            }
+            Some(back) if full => {
+                unit.idle += back - unit.clock;
+                unit.clock = back;
+            }
+            None if unit.drained => unit.busy = false,
+            _ => match work.next_quad(core) {
+                Some(quad) if quad.footprints > 0 => self.start(core, &quad),
+                Some(_) => {}
+                None => match item() {
+                    Some(item) => work.load(core, &item).unwrap(),
+                    None => unit.drained = true,
+                },
+            },
+        }
+    }
+}
+
+impl Machine for PlainTimed {
+    fn run(
+        &mut self,
+        work: &mut Cores<'_>,
+        phases: &[Phase],
+        assign: Assign,
+    ) -> Result<(), StreamError> {
+        let cores = self.units.len();
+        for phase in phases {
+            for unit in &mut self.units {
+                (unit.busy, unit.drained) = (true, false);
+                unit.clock = unit.clock.max(self.cycles);
+            }
+            // Static: the core's items are every so many; first idle: the next of all.
+            let mut next: Vec<usize> = match assign {
+                Assign::FirstIdle => vec![0],
+                Assign::Static => (0..cores).collect(),
+            };
+            loop {
+                let busy = (0..cores).filter(|&core| self.units[core].busy);
+                let Some(core) = busy.min_by_key(|&core| self.units[core].clock) else {
+                    break;
+                };
+                let own = core % next.len();
+                let step = next.len();
+                let slot = &mut next[own];
+                self.turn(core, work, &mut || {
+                    let item = phase.get(*slot).copied();
+                    *slot += step;
+                    item
+                });
+            }
+            self.cycles = self.units.iter().map(|unit| unit.clock).max().unwrap_or(0);
+        }
+        Ok(())
+    }
+
+    fn outcome(&self, _config: &RunConfig) -> batch::Outcome {
+        let sum = |of: fn(&PlainUnit) -> u64| self.units.iter().map(of).sum::<u64>();
+        let (useful, wasted) = (sum(|unit| unit.useful), sum(|unit| unit.wasted));
+        let cycles = useful + wasted + sum(|unit| unit.idle);
+        let utilization = match cycles {
+            0 => 0.0,
+            _ => useful as f64 / cycles as f64,
+        };
+        batch::Outcome {
+            counts: self.counts.clone(),
+            tmu: Some(TmuResult {
+                utilization,
+                wasted_issues: wasted,
+                threads: sum(|unit| unit.threads),
+                loops: sum(|unit| unit.loops),
+            }),
+            cycles: Some(self.cycles),
+        }
+    }
+}
+
+#[test]
+fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
+    let traces = [4, 5].map(|seed| {
+        Synthetic {
+            size_px: [52, 36],
+            patch_px: 17,
+            layers: 2,
+            textures: 3,
+            materials: 2,
+            seed,
+        }
+        .generate()
+    });
+    let mut random = Random(2);
+    let orders: Vec<Order> = Order::all().collect();
+    let policies: Vec<Replacement> = Replacement::all().collect();
+    let mut loops = 0;
+    for step in 0..200 {
+        let trace = &traces[random.below(2) as usize];
+        let (mut l1, mut l2) = (random.cache(32), random.cache(256));
+        if random.below(2) == 0 {
+            (l1.ways, l2.ways) = (4, 4);
+            (l1.size_bytes, l2.size_bytes) = (64 << random.below(6), 64 << random.below(9));
+            l1.replacement = random.of(&policies);
+            l2.replacement = random.of(&policies);
+        }
+        let config = RunConfig {
+            mode: Mode::Timed,
+            order: random.of(&orders),
+            cores: random.of(&[1, 2, 2, 3, 5]),
+            assign: random.of(&[Assign::FirstIdle, Assign::Static]),
+            l1,
+            l2,
+            tmu: TmuConfig {
+                l1_penalty_cycles: random.of(&[0, 1, 20, 20, 300]),
+                l2_penalty_cycles: random.of(&[0, 7, 200, 200, 9000]),
+                loop_cycles: random.of(&[1, 36, 64, 64, 5000]),
+                threads: random.of(&[1, 4, 64, 64, 300]),
+                retry_footprints: random.of(&[1, 4, 4, 5]),
+                fetches_per_trip: random.of(&[1, 2, 2, 64]),
+            },
+            tile_maps: true,
+            ..RunConfig::default()
+        };
+        let bins = Bins::new(&trace.tables).unwrap();
+        let plain = alone(trace, &config, &mut PlainTimed::new(&config, &bins));
+        assert_eq!(replay(trace, &config).unwrap(), plain, "{step}: {config:?}");
+        loops += plain.tmu.unwrap().loops;
+    }
+    assert!(loops > 100_000, "{loops}");
+}
+
+#[test]
+fn compiled_and_general_caches_agree() {
+    let trace = small();
+    let config = RunConfig {
+        mode: Mode::Timed,
+        ..functional(Order::Z2_STA)
+    };
+    let Levels { l1, l2 } = Levels::build(&config).unwrap();
+    let pointers = Levels {
+        l1: l1.into_iter().map(AnyCache::into_box).collect(),
+        l2: l2.into_box(),
+    };
+    let counts = CacheCounts::new(&Bins::new(&trace.tables).unwrap(), false);
+    let mut general = Timed::new(pointers, config.tmu, counts);
+    assert_eq!(
+        alone(&trace, &config, &mut general),
+        replay(&trace, &config).unwrap()
+    );
+}

@@ -1,0 +1,249 @@
+//! What a layer holds before its draws, where that is not the sky.
+
+use super::device::Gpu;
+use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
+use super::targets::LayerTarget;
+use crate::error::RasterError;
+use glam::{Mat3, Mat4};
+use techniques::start::{Composition, Opening};
+use wgpu::util::DeviceExt;
+
+/// Pipelines that draw what layers start with.
+pub struct Starts {
+    nearer: Pipeline,
+    behind: Pipeline,
+    composed: Pipeline,
+}
+
+/// A pipeline over the whole target, with the layout of its only group.
+struct Pipeline {
+    pipeline: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+    /// Bindings of its textures.
+    textures: Vec<u32>,
+}
+
+/// A start with what it is drawn with.
+pub struct Drawn<'a> {
+    /// Over the whole target.
+    pub pipeline: &'a wgpu::RenderPipeline,
+    /// Its group 0.
+    pub bindings: wgpu::BindGroup,
+    /// The sky is drawn before it.
+    pub over_sky: bool,
+}
+
+/// The shader's `Start`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct StartData {
+    maps: [[[f32; 4]; 4]; 2],
+    from_farther_clip: [[f32; 4]; 4],
+    ends: [f32; 4],
+}
+
+const DEPTH: wgpu::TextureSampleType = wgpu::TextureSampleType::Depth;
+const COLOR: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
+
+impl Starts {
+    /// Compiles the shader.
+    ///
+    /// # Errors
+    /// Driver and validation errors.
+    pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
+        gpu.checked("compiling the shader of the far field", || {
+            let module = gpu
+                .device
+                .create_shader_module(wgpu::ShaderModuleDescriptor {
+                    label: Some("starts"),
+                    source: wgpu::ShaderSource::Wgsl(include_str!("../shaders/starts.wgsl").into()),
+                });
+            let make = |entry_point, textures: &[(u32, wgpu::TextureSampleType)]| {
+                Pipeline::new(gpu, &module, entry_point, textures)
+            };
+            Self {
+                nearer: make("fragment_nearer", &[]),
+                behind: make("fragment_behind", &[(1, DEPTH), (2, DEPTH)]),
+                composed: make(
+                    "fragment_composed",
+                    &[(1, DEPTH), (3, COLOR), (4, COLOR), (5, DEPTH)],
+                ),
+            }
+        })
+    }
+
+    /// Nothing, and nothing from a depth on.
+    pub fn nearer(&self, gpu: &Gpu, end: f32) -> Drawn<'_> {
+        let data = StartData {
+            ends: [end, 0.0, 0.0, 0.0],
+            ..bytemuck::Zeroable::zeroed()
+        };
+        self.nearer.drawn(gpu, &data, &[], false)
+    }
+
+    /// The sky where one of two layers, each given with its target, leaves it open.
+    pub fn behind(&self, gpu: &Gpu, openings: [(&Opening, &LayerTarget); 2]) -> Drawn<'_> {
+        let [(left, left_target), (right, right_target)] = openings;
+        let data = StartData {
+            maps: [left, right].map(|opening| columns(opening.nearer_from_px)),
+            from_farther_clip: Mat4::IDENTITY.to_cols_array_2d(),
+            ends: [
+                left.end,
+                right.end,
+                left.reach_px.max(right.reach_px) as f32,
+                0.0,
+            ],
+        };
+        let textures = [&left_target.depth_view, &right_target.depth_view];
+        self.behind.drawn(gpu, &data, &textures, true)
+    }
+
+    /// A nearer and a farther layer, given with their targets.
+    pub fn composed(
+        &self,
+        gpu: &Gpu,
+        composition: &Composition,
+        nearer: &LayerTarget,
+        farther: &LayerTarget,
+    ) -> Drawn<'_> {
+        let data = StartData {
+            maps: [columns(composition.farther_from_px); 2],
+            from_farther_clip: composition.from_farther_clip.to_cols_array_2d(),
+            ends: [composition.end, 0.0, 0.0, 0.0],
+        };
+        let textures = [
+            &nearer.depth_view,
+            &nearer.color.view,
+            &farther.color.view,
+            &farther.depth_view,
+        ];
+        self.composed.drawn(gpu, &data, &textures, false)
+    }
+}
+
+impl Pipeline {
+    /// `textures`: number and kind of each binding after the uniform's.
+    fn new(
+        gpu: &Gpu,
+        module: &wgpu::ShaderModule,
+        entry_point: &'static str,
+        textures: &[(u32, wgpu::TextureSampleType)],
+    ) -> Self {
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        };
+        let uniform = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
+        let texture = |&(binding, sample_type): &(u32, wgpu::TextureSampleType)| {
+            let ty = wgpu::BindingType::Texture {
+                sample_type,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            };
+            entry(binding, ty)
+        };
+        let mut entries = vec![entry(0, uniform)];
+        entries.extend(textures.iter().map(texture));
+        let layout = gpu
+            .device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(entry_point),
+                entries: &entries,
+            });
+        let whole = gpu
+            .device
+            .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(entry_point),
+                bind_group_layouts: &[Some(&layout)],
+                immediate_size: 0,
+            });
+        let pipeline = gpu
+            .device
+            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(entry_point),
+                layout: Some(&whole),
+                vertex: wgpu::VertexState {
+                    module,
+                    entry_point: Some("vertex_whole"),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH_FORMAT,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(wgpu::CompareFunction::Always),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module,
+                    entry_point: Some(entry_point),
+                    compilation_options: Default::default(),
+                    targets: &[Some(COLOR_FORMAT.into())],
+                }),
+                multiview_mask: None,
+                cache: None,
+            });
+        Self {
+            pipeline,
+            layout,
+            textures: textures.iter().map(|(binding, _)| *binding).collect(),
+        }
+    }
+
+    /// `textures` in the order in which [`Self::new`] was told of them.
+    fn drawn(
+        &self,
+        gpu: &Gpu,
+        data: &StartData,
+        textures: &[&wgpu::TextureView],
+        over_sky: bool,
+    ) -> Drawn<'_> {
+        let uniform = gpu
+            .device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("start"),
+                contents: bytemuck::bytes_of(data),
+                usage: wgpu::BufferUsages::UNIFORM,
+            });
+        let mut entries = vec![wgpu::BindGroupEntry {
+            binding: 0,
+            resource: uniform.as_entire_binding(),
+        }];
+        for (binding, texture) in self.textures.iter().zip(textures) {
+            entries.push(wgpu::BindGroupEntry {
+                binding: *binding,
+                resource: wgpu::BindingResource::TextureView(texture),
+            });
+        }
+        let bindings = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("start"),
+            layout: &self.layout,
+            entries: &entries,
+        });
+        Drawn {
+            pipeline: &self.pipeline,
+            bindings,
+            over_sky,
+        }
+    }
+}
+
+/// A homogeneous map of the plane in the columns of a larger matrix.
+fn columns(map: Mat3) -> [[f32; 4]; 4] {
+    Mat4::from_cols(
+        map.x_axis.extend(0.0),
+        map.y_axis.extend(0.0),
+        map.z_axis.extend(0.0),
+        glam::Vec4::ZERO,
+    )
+    .to_cols_array_2d()
+}
