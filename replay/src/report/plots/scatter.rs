@@ -124,7 +124,7 @@ impl ScatterChart {
                 let to = name.nearest(*dot);
                 if distance(*dot, to) > NEAR_PX {
                     let line = [*dot, to].map(|(x, y)| (x as i32, y as i32));
-                    root.draw(&PathElement::new(line, theme::GRID.stroke_width(1)))?;
+                    root.draw(&PathElement::new(line, theme::AXIS.stroke_width(1)))?;
                 }
             }
             for (point, (x, y)) in self.points.iter().zip(&dots) {
