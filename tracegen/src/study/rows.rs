@@ -1,6 +1,6 @@
 //! The techniques by name, and the rows of a study: each technique alone, and combinations.
 
-use techniques::settings::{Foveation, FoveationKind, Rates};
+use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
 use techniques::{Gaze, Settings};
 use visibility::Culling;
 
@@ -31,8 +31,20 @@ pub enum Setting {
     Occlusion,
     /// Whether what the lens hides is drawn.
     Mask,
+    /// Whether both eyes are submitted at once.
+    Multiview,
+    /// Where far geometry is drawn once.
+    FarField,
     /// How the periphery is coarsened.
     Foveation,
+}
+
+impl Setting {
+    /// No capture can change both.
+    fn excludes(self, other: Self) -> bool {
+        let pair = [self, other];
+        self == other || (pair.contains(&Self::FarField) && pair.contains(&Self::Foveation))
+    }
 }
 
 impl PartialEq for Part {
@@ -68,6 +80,36 @@ impl Part {
                 Setting::Mask,
                 |s| {
                     s.hidden_area_mask = true;
+                },
+            ),
+            Self::new("multiview", "Multiview", true, Setting::Multiview, |s| {
+                s.multiview = true;
+            }),
+            Self::new(
+                "far-field",
+                "Mono far field, 1 px",
+                false,
+                Setting::FarField,
+                |s| {
+                    s.far_field = Some(far_field(Variant::Plain));
+                },
+            ),
+            Self::new(
+                "far-field-depth-shift",
+                "Mono far field with depth shift, 1 px",
+                false,
+                Setting::FarField,
+                |s| {
+                    s.far_field = Some(far_field(Variant::DepthShift));
+                },
+            ),
+            Self::new(
+                "far-field-alternate-eye",
+                "Mono far field from alternate eyes, 1 px",
+                false,
+                Setting::FarField,
+                |s| {
+                    s.far_field = Some(far_field(Variant::AlternateEye));
                 },
             ),
             Self::new(
@@ -156,7 +198,8 @@ impl Part {
     #[must_use]
     pub fn is_shift(&self) -> bool {
         match self.change {
-            Change::Culling(_) | Change::Switch(..) => false,
+            Change::Culling(_) => false,
+            Change::Switch(setting, _) => setting == Setting::FarField,
         }
     }
 
@@ -174,6 +217,14 @@ impl Part {
             Change::Culling(culling) => settings.culling = culling,
             Change::Switch(_, change) => change(settings),
         }
+    }
+}
+
+/// From where on nothing is off by more than a pixel.
+fn far_field(variant: Variant) -> FarField {
+    FarField {
+        split: Split::Pixels(1.0),
+        variant,
     }
 }
 
@@ -199,6 +250,10 @@ const COMBINATIONS: &[(&str, &str)] = &[
     (
         "All that lose nothing",
         "superfrustum+occlusion+hidden-area-mask",
+    ),
+    (
+        "Far field once, nothing else lost",
+        "superfrustum+hidden-area-mask+far-field",
     ),
     (
         "Everything",
@@ -280,7 +335,7 @@ impl Row {
         let name = names.join("+");
         let mut settings = Settings::default();
         for (number, part) in parts.iter().enumerate() {
-            let same = |other: &&Part| other.setting() == part.setting();
+            let same = |other: &&Part| other.setting().excludes(part.setting());
             if let Some(other) = parts[..number].iter().find(same) {
                 return Err(RowError::Contradiction {
                     row: name,
@@ -380,5 +435,7 @@ mod tests {
             text.contains("conical and superfrustum exclude each other"),
             "{text}"
         );
+        let text = error("far-field+foveation-rings");
+        assert!(text.contains("exclude each other"), "{text}");
     }
 }
