@@ -36,8 +36,11 @@ pub fn run(args: &RasterArgs, budget: Budget) -> anyhow::Result<()> {
         sizes,
         args.cache,
     )?;
-    let Prepared { world, mut backend } = prepared;
-    let choice = choose(&world, &mut backend, budget, &progress)?;
+    let Prepared {
+        mut world,
+        mut backend,
+    } = prepared;
+    let choice = choose(&mut world, &mut backend, budget, &progress)?;
     let frames: Vec<u32> = (0..args.frames).collect();
     let planners = choice.planners(&world)?;
     let planner = |frame: u32| &planners[choice.held.of_frame[frame as usize]];

@@ -147,7 +147,10 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         sizes,
         args.cache,
     )?;
-    let Prepared { world, mut backend } = prepared;
+    let Prepared {
+        mut world,
+        mut backend,
+    } = prepared;
     let mut impossible = Vec::new();
     for row in &rows {
         if let Err(error) = world.check(&row.settings) {
@@ -161,7 +164,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     rows.retain(|row| !impossible.contains(&row.name));
     let folder = Folder::create(&args.output, &subject)?;
     let mut bench = Bench {
-        world: &world,
+        world: &mut world,
         backend: &mut backend,
         captures,
         extent: &extent,

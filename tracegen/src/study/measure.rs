@@ -57,7 +57,7 @@ impl Extent {
 /// Measures rows on a device.
 pub struct Bench<'a> {
     /// Scene and path.
-    pub world: &'a World,
+    pub world: &'a mut World,
     /// The device.
     pub backend: &'a mut Lavapipe,
     /// It can capture.
@@ -129,10 +129,10 @@ impl Bench<'_> {
         row: &Row,
         planner: &impl Fn(u32) -> &'s Planner,
     ) -> anyhow::Result<(Vec<FrameRecord>, Option<String>)> {
-        let (world, extent) = (self.world, self.extent);
+        let extent = self.extent;
         let (kept, left_out): (Vec<u32>, Vec<u32>) =
             (extent.frames().into_iter()).partition(|frame| extent.trace_frames.contains(frame));
-        let tables = [&kept, &left_out].map(|frames| world.trace_tables(planner, frames));
+        let tables = [&kept, &left_out].map(|frames| self.world.trace_tables(planner, frames));
         let (trace_name, trace_path) = self.folder.trace(&row.name);
         let mut traced = match kept.is_empty() || !self.captures {
             true => None,
@@ -152,16 +152,18 @@ impl Bench<'_> {
         let mut frames = Vec::new();
         let mut memory = Occlusion::default();
         for (number, measured) in extent.rendered(row.settings.occlusion) {
-            let shot = world.shoot(self.backend, planner(number), number, &mut memory)?;
+            let shot = self
+                .world
+                .shoot(self.backend, planner(number), number, &mut memory)?;
             if !measured {
                 continue;
             }
-            let pictures = world.pictures(self.backend, &shot)?;
-            let size_px = world.hmd.eye_size_px;
+            let pictures = self.world.pictures(self.backend, &shot)?;
+            let size_px = self.world.hmd.eye_size_px;
             let images = self
                 .folder
                 .write_images(&row.name, number, &pictures, size_px)?;
-            let job = world.job(planner(number));
+            let job = self.world.job(planner(number));
             let counts = if kept.contains(&number) {
                 traced
                     .as_mut()
@@ -232,7 +234,7 @@ impl Bench<'_> {
 /// # Errors
 /// Driver errors.
 pub fn time<'s>(
-    world: &World,
+    world: &mut World,
     backend: &mut Lavapipe,
     extent: &Extent,
     planner: impl Fn(u32) -> &'s Planner,

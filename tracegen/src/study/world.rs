@@ -85,6 +85,7 @@ impl World {
     /// They do not.
     pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
         let planner = self.planner(settings)?;
+        planner.check_views(&self.views[0])?;
         self.job(&planner).frame(&self.views[0])?;
         Ok(())
     }
@@ -95,14 +96,18 @@ impl World {
     /// # Errors
     /// Driver errors, and eyes that the culling technique is not made for.
     pub fn shoot(
-        &self,
+        &mut self,
         backend: &mut dyn CaptureBackend,
         planner: &Planner,
         number: u32,
         memory: &mut Occlusion,
     ) -> Result<Shot, RasterError> {
-        let job = self.job(planner);
+        let before = backend.work();
         let start = Instant::now();
+        self.draws.pose(&self.scene, number as f32 / self.fps);
+        backend.pose(&self.draws);
+        let posed = backend.work() - before;
+        let job = self.job(planner);
         let mut frame = job.frame(&self.views[number as usize])?;
         if planner.settings().occlusion {
             job.occlude(backend, &mut frame, memory)?;
@@ -115,11 +120,13 @@ impl World {
         let rendered = start.elapsed();
         backend.compose(&frame)?;
         let done = start.elapsed();
+        let mut work = backend.work() - before;
+        work.bytes_uploaded += posed.bytes_uploaded;
         Ok(Shot {
             frame,
             compose: done - rendered,
             total: planned + done,
-            work: backend.work() - before,
+            work,
         })
     }
 

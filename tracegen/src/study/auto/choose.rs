@@ -45,7 +45,7 @@ impl Choice {
 /// # Errors
 /// A budget that nothing meets, and driver errors.
 pub fn choose(
-    world: &World,
+    world: &mut World,
     backend: &mut Lavapipe,
     budget: Budget,
     progress: &Progress,
@@ -98,11 +98,13 @@ pub fn choose(
             })?
         }
         None => {
-            let planner = world.planner(&chosen.settings)?;
+            let planner = bench.world.planner(&chosen.settings)?;
             let mut times: Vec<Duration> = Vec::new();
             let mut memory = Occlusion::default();
             for frame in 0..path_frames {
-                let shot = world.shoot(bench.backend, &planner, frame, &mut memory)?;
+                let shot = bench
+                    .world
+                    .shoot(bench.backend, &planner, frame, &mut memory)?;
                 times.push(shot.total);
                 progress.advance(1);
             }

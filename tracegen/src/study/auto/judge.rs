@@ -17,7 +17,7 @@ use visibility::Occlusion;
 /// Renders combinations and the baseline beside them.
 pub struct Bench<'a> {
     /// Scene and path.
-    pub world: &'a World,
+    pub world: &'a mut World,
     /// The device.
     pub backend: &'a mut Lavapipe,
     /// What errors are measured in.
@@ -39,7 +39,7 @@ impl Bench<'_> {
     /// Driver errors.
     pub fn error(&mut self, row: &Row, frame: u32, memory: &mut Occlusion) -> anyhow::Result<f64> {
         let planner = self.planner(&row.settings)?;
-        let shot = (self.world).shoot(self.backend, &planner, frame, memory)?;
+        let shot = self.world.shoot(self.backend, &planner, frame, memory)?;
         if let Budget::Pixels(_) = self.budget {
             let shift = shot.frame.plan.predicted.disparity_px;
             return Ok(shift.map_or(0.0, f64::from));
@@ -74,7 +74,8 @@ impl Bench<'_> {
 
     /// The baseline's pictures of a frame, left and right.
     fn references(&mut self, frame: u32) -> anyhow::Result<Vec<Reference>> {
-        let (world, baseline) = (self.world, self.planner(&Settings::default())?);
+        let baseline = self.planner(&Settings::default())?;
+        let world = &mut *self.world;
         let shot = world.shoot(self.backend, &baseline, frame, &mut Occlusion::default())?;
         let pictures = world.pictures(self.backend, &shot)?;
         let size_px = world.hmd.eye_size_px;
