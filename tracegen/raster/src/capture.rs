@@ -126,7 +126,7 @@ impl CaptureJob<'_> {
     }
 
     /// Makes the driver compile every shader that the frame's plain and captured pictures use, by
-    /// rendering one tile of each, so that neither's time includes it.
+    /// rendering a tile of each layer, so that neither's time includes it.
     ///
     /// # Errors
     /// Driver errors.
@@ -136,12 +136,20 @@ impl CaptureJob<'_> {
         frame: &Frame,
     ) -> Result<(), RasterError> {
         for view in frame.views() {
-            let corner = Region {
-                origin_px: [0, 0],
-                size_px: view.layer.size_px.map(|s| s.min(TILE_SIZE_PX)),
+            let layer = view.layer;
+            let open = layer
+                .mask
+                .as_ref()
+                .map_or(Some([0, 0]), |mask| mask.first());
+            let Some(open) = open else { continue };
+            let origin_px = open.map(|px| px / TILE_SIZE_PX * TILE_SIZE_PX);
+            let tile = Region {
+                origin_px,
+                size_px: [0, 1]
+                    .map(|axis: usize| (layer.size_px[axis] - origin_px[axis]).min(TILE_SIZE_PX)),
             };
-            backend.render(self.draws, &view, corner, None)?;
-            backend.render(self.draws, &view, corner, Some(&mut |_| Ok(())))?;
+            backend.render(self.draws, &view, tile, None)?;
+            backend.render(self.draws, &view, tile, Some(&mut |_| Ok(())))?;
         }
         if self.planner.settings().multiview {
             // Finds out whether the driver can be trusted.

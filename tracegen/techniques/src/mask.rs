@@ -79,6 +79,13 @@ impl Mask {
         &self.drawn
     }
 
+    /// The first pixel that may be drawn, row by row.
+    #[must_use]
+    pub fn first(&self) -> Option<[u32; 2]> {
+        let at = self.drawn.iter().position(|drawn| *drawn)? as u32;
+        Some([at % self.size_px[0], at / self.size_px[0]])
+    }
+
     /// Pixels that may be drawn.
     #[must_use]
     pub fn count(&self) -> u64 {
@@ -158,6 +165,7 @@ mod tests {
         let mask = Mask::new([70, 50], |x, y| (x, y) == (20, 33) || (x, y) == (69, 40));
         assert_eq!(mask.bounds_px(), Some([[16, 32], [54, 16]]));
         assert_eq!(mask.tile_count(), 2);
+        assert_eq!(mask.first(), Some([20, 33]));
         assert_eq!(Mask::new([70, 50], |_, _| false).bounds_px(), None);
     }
 

@@ -124,7 +124,7 @@ impl ScatterChart {
                 let to = name.nearest(*dot);
                 if distance(*dot, to) > NEAR_PX {
                     let line = [*dot, to].map(|(x, y)| (x as i32, y as i32));
-                    root.draw(&PathElement::new(line, theme::GRID.stroke_width(1)))?;
+                    root.draw(&PathElement::new(line, theme::AXIS.stroke_width(1)))?;
                 }
             }
             for (point, (x, y)) in self.points.iter().zip(&dots) {
@@ -245,10 +245,7 @@ fn place(dots: &[(f64, f64)], widths: &[f64], room: Rect) -> Vec<Rect> {
             };
             // Beside a dot, its own height reads best.
             let aside = (f64::midpoint(place.top, place.bottom) - dot.1).abs();
-            away + 0.5 * aside
-                + 40.0 * (names + marks)
-                + 30.0 * crossed as f64
-                + 30.0 * through as f64
+            away + aside + 40.0 * (names + marks) + 30.0 * crossed as f64 + 30.0 * through as f64
         };
         let mut best: Option<(f64, Rect)> = None;
         let mut radius = f64::from(DOT_PX) + 4.0;

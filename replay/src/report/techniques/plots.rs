@@ -9,6 +9,19 @@ use crate::techniques::{Measured, Measures, Spread};
 /// At most so many lines are told apart.
 const MOST_LINES: usize = 6;
 
+/// Longest name in a plot; tables have them whole.
+const LONGEST_NAME_CHARS: usize = 48;
+
+/// A technique's name as a plot writes it.
+fn name(measured: &Measured) -> String {
+    let name = &measured.row.technique;
+    if name.chars().count() <= LONGEST_NAME_CHARS {
+        return name.clone();
+    }
+    let start: String = name.chars().take(LONGEST_NAME_CHARS - 1).collect();
+    format!("{start}\u{2026}")
+}
+
 /// Colour by what a technique is: lossless, lossy, or the baseline.
 fn style(measured: &Measured) -> SeriesStyle {
     let index = match (measured.is_baseline(), measured.row.lossless) {
@@ -16,7 +29,7 @@ fn style(measured: &Measured) -> SeriesStyle {
         (false, true) => 3,
         (false, false) => 4,
     };
-    SeriesStyle::nth(measured.row.technique.as_str(), index)
+    SeriesStyle::nth(name(measured), index)
 }
 
 /// Run time against error.
@@ -69,7 +82,7 @@ fn chosen<'m, 'a>(measures: &'m Measures<'a>) -> Vec<(&'m Measured<'a>, SeriesSt
     let styled = |(index, m): (usize, &'m Measured<'a>)| {
         // The neutral colour is the baseline's.
         let index = if m.is_baseline() { 7 } else { index - 1 };
-        (m, SeriesStyle::nth(m.row.technique.as_str(), index))
+        (m, SeriesStyle::nth(name(m), index))
     };
     let all = baseline.into_iter().chain(best);
     all.take(MOST_LINES).enumerate().map(styled).collect()
