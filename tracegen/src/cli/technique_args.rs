@@ -145,7 +145,6 @@ impl TechniqueArgs {
                 },
             }),
             foveation: self.foveation(hmd)?,
-            ..Settings::default()
         };
         settings.check(hmd)?;
         Ok(settings)
