@@ -179,8 +179,7 @@ pub struct RunConfig {
     pub tmu: TmuConfig,
     /// Also count by tile.
     pub tile_maps: bool,
-    /// Hidden-surface removal, `early-z` where it is left out.
-    // Left out of results, too, which so stay what they were before there was the key.
+    /// Hidden-surface removal; results name it where it is not the default.
     #[serde(skip_serializing_if = "Hsr::is_default")]
     pub hsr: Hsr,
 }

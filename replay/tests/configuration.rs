@@ -164,6 +164,9 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             describe(sources, kind, &format!("{key}."), inner, page);
             continue;
         }
+        // The one key that the written default leaves out.
+        let hsr = (key == "hsr").then(|| Value::try_from(Hsr::default()).unwrap());
+        let default = default.or(hsr.as_ref());
         let default = default.map_or_else(|| "none".to_owned(), |v| format!("`{v}`"));
         let values = values(sources, kind);
         for (value, _) in &values {

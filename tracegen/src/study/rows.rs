@@ -74,6 +74,33 @@ impl Part {
                     s.hidden_area_mask = true;
                 },
             ),
+            Self::new("multiview", "Multiview", true, Setting::Multiview, |s| {
+                s.multiview = true;
+            }),
+            Self::far_field("far-field", "Mono far field, 1 px", |s| {
+                s.far_field = far_field(Split::Pixels(1.0), Variant::Plain);
+            }),
+            Self::far_field(
+                "far-field-least-work",
+                "Mono far field where it saves most",
+                |s| {
+                    s.far_field = far_field(Split::LeastWork { within_px: 1.0 }, Variant::Plain);
+                },
+            ),
+            Self::far_field(
+                "far-field-depth-shift",
+                "Mono far field with depth shift, 1 px",
+                |s| {
+                    s.far_field = far_field(Split::Pixels(1.0), Variant::DepthShift);
+                },
+            ),
+            Self::far_field(
+                "far-field-alternate-eye",
+                "Mono far field from alternate eyes, 1 px",
+                |s| {
+                    s.far_field = far_field(Split::Pixels(1.0), Variant::AlternateEye);
+                },
+            ),
             Self::new(
                 "foveation-rings",
                 "Foveation by rings",

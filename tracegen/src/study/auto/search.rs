@@ -54,7 +54,7 @@ pub struct Found {
 #[derive(Clone, Debug)]
 pub struct Infeasible {
     /// What comes closest.
-    pub closest: Tried,
+    pub closest: Box<Tried>,
 }
 
 /// A combination must save this share of the frame time to take the place of a simpler one: less
@@ -117,7 +117,9 @@ pub fn search<J: Judge>(
                 chosen = search.least_error(chosen, &lossy, fits)?;
             }
             if !fits(&chosen) {
-                return Ok(Err(Infeasible { closest: chosen }));
+                return Ok(Err(Infeasible {
+                    closest: Box::new(chosen),
+                }));
             }
             let lossless = chosen.row.lossless || !fits(&best_single);
             if !lossless && best_single.verdict.error < chosen.verdict.error {
