@@ -6,10 +6,14 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo test lint build deps golden clean
+.PHONY: demo techniques test lint build deps golden clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
+
+# Every stereo rendering technique on three scenes, measured against its image error.
+techniques: deps build
+	@OUT="$(OUT)" scripts/techniques.sh
 
 test:
 	@scripts/install-deps.sh test

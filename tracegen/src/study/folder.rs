@@ -189,8 +189,24 @@ pub fn check(root: &Path, inputs: &[&Path]) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Removes the temporary files (see `formats::container::atomic`) below a folder.
+fn remove_temporaries(folder: &Path) -> std::io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let (name, kind) = (entry.file_name(), entry.file_type()?);
+        let name = name.to_string_lossy();
+        if kind.is_dir() {
+            remove_temporaries(&entry.path())?;
+        } else if kind.is_file() && name.starts_with('.') && name.ends_with(".part") {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
 impl Folder {
-    /// Makes the folder of a study.
+    /// Makes the folder of a study, or takes up an earlier one, without what a killed run left
+    /// half-written under temporary names.
     ///
     /// # Errors
     /// It cannot be written.
@@ -198,6 +214,7 @@ impl Folder {
         for folder in ["rows", "images", "traces"] {
             let path = root.join(folder);
             fs::create_dir_all(&path).with_context(|| cannot_write(&path))?;
+            remove_temporaries(&path).with_context(|| cannot_write(&path))?;
         }
         Ok(Self {
             root: root.to_owned(),

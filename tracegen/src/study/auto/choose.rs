@@ -141,6 +141,8 @@ fn search_frames(path_frames: u32) -> Vec<u32> {
         (even + part % 2).min(path_frames - 1)
     };
     let mut frames: Vec<u32> = (0..count).map(middle).collect();
+    // Parts of a short path are no longer than the step to the other parity.
+    frames.sort_unstable();
     frames.dedup();
     frames
 }
