@@ -255,6 +255,10 @@ const COMBINATIONS: &[(&str, &str)] = &[
         "superfrustum+occlusion+multiview+hidden-area-mask+far-field",
     ),
     (
+        "Far field once, nothing else lost",
+        "superfrustum+hidden-area-mask+far-field",
+    ),
+    (
         "Everything",
         "superfrustum+occlusion+multiview+hidden-area-mask+foveation-rings",
     ),
