@@ -228,6 +228,32 @@ fn what_cannot_be_is_refused_with_the_reason() {
 }
 
 #[test]
+fn a_budget_that_chooses_the_techniques_excludes_choosing_them() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    for technique in [
+        "--multiview",
+        "--hidden-area-mask",
+        "--far-field=1px",
+        "--foveate=rings",
+    ] {
+        let mut command = program("tracegen");
+        command.args([
+            "raster",
+            "atrium-plain",
+            "--auto",
+            "flip=0.01",
+            technique,
+            "-o",
+        ]);
+        let name = technique.split('=').next().expect("a flag");
+        refuse(
+            command.arg(root.path().join("x.textrace")),
+            &["--auto", name],
+        );
+    }
+}
+
+#[test]
 fn a_study_replaces_no_other_files() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let file = root.path().join("file");

@@ -71,7 +71,8 @@ pub struct RasterArgs {
     /// lens) or `pixels=PX` for the cheapest inside it, `budget-ms=MS` for the least error whose
     /// median frame takes no longer.
     #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
-          conflicts_with_all = ["cull", "occlusion", "views", "no_plain", "no_skip"])]
+          conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "far_field", "foveate",
+                                "views", "no_plain", "no_skip"])]
     auto: Option<Budget>,
     #[command(flatten)]
     techniques: TechniqueArgs,

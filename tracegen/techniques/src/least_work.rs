@@ -88,8 +88,8 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// Nanoseconds of lavapipe (Mesa 22.3.6, two cores), rounded: how the terms relate, not how long a
-    /// frame takes.
+    /// Nanoseconds, assumed for a software driver: round numbers that say how the terms relate, and
+    /// fitted to no measurement.
     pub const LAVAPIPE: Self = Self {
         draw: 6000.0,
         triangle: 90.0,
