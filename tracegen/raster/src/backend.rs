@@ -168,6 +168,13 @@ pub trait CaptureBackend {
     /// Driver errors.
     fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError>;
 
+    /// Makes what the frame's layers are rendered into, as far as the last frame's does not fit: memory
+    /// and masks that stay from frame to frame as long as the techniques do.
+    ///
+    /// # Errors
+    /// Driver errors.
+    fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError>;
+
     /// Makes the frame's pictures from its layers, all of whose regions have been rendered; those
     /// that are layers are there already.
     ///

@@ -109,10 +109,14 @@ impl World {
         let posed = backend.work() - before;
         let job = self.job(planner);
         let mut frame = job.frame(&self.views[number as usize])?;
+        let planned = start.elapsed();
+        // Of another technique's frame, the last one's targets and masks would not fit.
+        backend.prepare(&frame)?;
+        let start = Instant::now();
         if planner.settings().occlusion {
             job.occlude(backend, &mut frame, memory)?;
         }
-        let planned = start.elapsed();
+        let hidden = start.elapsed();
         job.light(backend, &frame)?;
         let before = backend.work();
         let start = Instant::now();
@@ -125,7 +129,7 @@ impl World {
         Ok(Shot {
             frame,
             compose: done - rendered,
-            total: planned + done,
+            total: planned + hidden + done,
             work,
         })
     }

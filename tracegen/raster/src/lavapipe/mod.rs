@@ -540,6 +540,13 @@ impl CaptureBackend for Lavapipe {
         self.read_marks(draws, view, lens)
     }
 
+    fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError> {
+        for view in frame.views() {
+            self.prepare_target(&view)?;
+        }
+        self.gpu.wait("preparing the targets")
+    }
+
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
         let start = Instant::now();
         let mut composes = false;
