@@ -242,43 +242,78 @@ pub fn time<'s>(
 ) -> anyhow::Result<Vec<Times>> {
     let baseline = world.planner(&Settings::default())?;
     let mut times: Vec<Times> = extent.frames().iter().map(|_| Times::default()).collect();
-    let remembers = (extent.frames().into_iter()).any(|frame| planner(frame).settings().occlusion);
-    for repeat in 0..extent.repeats {
-        let mut measured = times.iter_mut();
-        let mut memory = Occlusion::default();
-        for (number, is_measured) in extent.rendered(remembers) {
-            // Whoever comes second finds warmer caches: they take turns at that as well.
-            let [row, beside] = if repeat % 2 == 0 {
-                let beside = world.shoot(backend, &baseline, number, &mut Occlusion::default())?;
-                [
-                    world.shoot(backend, planner(number), number, &mut memory)?,
-                    beside,
-                ]
+    in_turns(
+        world,
+        backend,
+        extent,
+        2,
+        |contestant, frame| match contestant {
+            0 => planner(frame),
+            _ => &baseline,
+        },
+        |contestant, frame, shot| {
+            if contestant == 0 {
+                times[frame].add(shot);
+                advance();
             } else {
-                let row = world.shoot(backend, planner(number), number, &mut memory)?;
-                [
-                    row,
-                    world.shoot(backend, &baseline, number, &mut Occlusion::default())?,
-                ]
-            };
-            if !is_measured {
-                continue;
+                times[frame].baseline.push(shot.total);
             }
-            if let Some(times) = measured.next() {
-                times.add(&row, &beside);
+        },
+    )?;
+    Ok(times)
+}
+
+/// Renders each measured frame with every contestant, one after the other, as often as `extent` says;
+/// `planner` tells what a contestant renders a frame with. `took`
+/// hears the contestant's number, the position of the frame among the measured ones, and what was rendered.
+///
+/// # Errors
+/// Driver errors.
+pub fn in_turns<'s>(
+    world: &mut World,
+    backend: &mut Lavapipe,
+    extent: &Extent,
+    contestants: usize,
+    planner: impl Fn(usize, u32) -> &'s Planner,
+    mut took: impl FnMut(usize, usize, &Shot),
+) -> anyhow::Result<()> {
+    let frames = extent.frames();
+    let remembers = (frames.iter())
+        .any(|frame| (0..contestants).any(|c| planner(c, *frame).settings().occlusion));
+    for repeat in 0..extent.repeats as usize {
+        let mut memories: Vec<Occlusion> = (0..contestants).map(|_| Occlusion::default()).collect();
+        let mut measured = 0;
+        for (number, is_measured) in extent.rendered(remembers) {
+            for place in 0..contestants {
+                // Whoever comes later finds warmer caches: they take turns at that as well.
+                let contestant = (place + repeat + 1) % contestants;
+                let memory = &mut memories[contestant];
+                let shot = world.shoot(backend, planner(contestant, number), number, memory)?;
+                if is_measured {
+                    took(contestant, measured, &shot);
+                }
             }
-            advance();
+            measured += usize::from(is_measured);
         }
     }
-    Ok(times)
+    Ok(())
+}
+
+/// The time of all frames together without what disturbed them: of each frame's repeats the shortest.
+pub fn undisturbed_s<'a>(frames: impl IntoIterator<Item = &'a [Duration]>) -> f64 {
+    let shortest = |times: &[Duration]| times.iter().min().copied().unwrap_or_default();
+    frames
+        .into_iter()
+        .map(shortest)
+        .sum::<Duration>()
+        .as_secs_f64()
 }
 
 const CULL: &str = "cull";
 
 impl Times {
-    fn add(&mut self, row: &Shot, baseline: &Shot) {
+    fn add(&mut self, row: &Shot) {
         self.frame.push(row.total);
-        self.baseline.push(baseline.total);
         for (stage, time) in [
             (CULL, row.frame.cull_time),
             ("submit", row.work.submitting),

@@ -2,7 +2,7 @@
 
 use super::budget::Budget;
 use super::search::{Judge, Verdict};
-use crate::study::measure::{Extent, median_s, time};
+use crate::study::measure::{Extent, in_turns, median_s, time, undisturbed_s};
 use crate::study::rows::Row;
 use crate::study::world::World;
 use anyhow::Context;
@@ -11,8 +11,12 @@ use raster::lavapipe::Lavapipe;
 use shell::Progress;
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::Duration;
 use techniques::{Planner, Settings};
 use visibility::Occlusion;
+
+/// Times of each frame in the run-off: of so many one is hardly disturbed.
+const RUN_OFF_REPEATS: u32 = 6;
 
 /// Renders combinations and the baseline beside them.
 pub struct Bench<'a> {
@@ -110,20 +114,51 @@ impl Judge for Bench<'_> {
             }
         }
         let times = time(self.world, self.backend, &extent, |_| &*planner, || ())?;
-        let mut ratios = Vec::new();
-        let mut frame = Vec::new();
-        for times in &times {
-            let pairs = times.frame.iter().zip(&times.baseline);
-            ratios.extend(pairs.map(|(own, beside)| own.as_secs_f64() / beside.as_secs_f64()));
-            frame.extend(times.frame.iter().copied());
-        }
-        ratios.sort_by(f64::total_cmp);
         self.progress.advance(1);
+        let own = undisturbed_s(times.iter().map(|times| &*times.frame));
+        let beside = undisturbed_s(times.iter().map(|times| &*times.baseline));
+        let frames: Vec<Duration> = times.into_iter().flat_map(|times| times.frame).collect();
         Ok(Verdict {
-            frame_time_ratio: ratios[(ratios.len() - 1) / 2],
-            frame_s: median_s(&frame),
+            frame_time_ratio: own / beside,
+            frame_s: median_s(&frames),
             error,
         })
+    }
+
+    fn run_off(&mut self, rows: &[&Row]) -> anyhow::Result<Vec<f64>> {
+        let planners: Vec<Arc<Planner>> = (rows.iter())
+            .map(|row| self.planner(&row.settings))
+            .collect::<anyhow::Result<_>>()?;
+        let extent = Extent {
+            repeats: RUN_OFF_REPEATS,
+            ..self.extent.clone()
+        };
+        let frames = extent.frames().len();
+        self.progress.stage(
+            "deciding",
+            u64::from(RUN_OFF_REPEATS) * frames as u64,
+            "frames with each of the cheapest, in turns",
+        );
+        let mut times = vec![vec![Vec::new(); frames]; rows.len()];
+        in_turns(
+            self.world,
+            self.backend,
+            &extent,
+            rows.len(),
+            |contestant, _| &*planners[contestant],
+            |contestant, frame, shot| {
+                times[contestant][frame].push(shot.total);
+                if contestant == 0 {
+                    self.progress.advance(1);
+                }
+            },
+        )?;
+        let total_s = |times: &Vec<Vec<Duration>>| undisturbed_s(times.iter().map(|t| &**t));
+        let baseline_s = total_s(&times[0]);
+        Ok(times
+            .iter()
+            .map(|times| total_s(times) / baseline_s)
+            .collect())
     }
 }
 

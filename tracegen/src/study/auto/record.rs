@@ -108,6 +108,12 @@ fn reason(budget: Budget, found: &Found, held: &Held) -> String {
         "; the best single technique, {}, takes {:.2}",
         single.row.name, single.verdict.frame_time_ratio
     );
+    if found.finalists > 0 {
+        text += &format!(
+            " (the {} cheapest and the baseline timed again, in turns)",
+            found.finalists - 1
+        );
+    }
     let fallen = held.fallen_back().len();
     if let Some(worst) = held.errors.iter().copied().reduce(f64::max) {
         text += &format!(

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// What a combination costs and shows on the frames of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Frame time over the baseline's beside it, median.
+    /// Frame time over the baseline's beside it, each frame's shortest.
     pub frame_time_ratio: f64,
     /// Median frame time.
     pub frame_s: f64,
@@ -28,6 +28,13 @@ pub trait Judge {
     /// # Errors
     /// Its own.
     fn judge(&mut self, row: &Row) -> Result<Verdict, Self::Error>;
+
+    /// Times the baseline, which comes first, and combinations that were judged, in turns and more
+    /// often: the ratio of each one's frame time to the baseline's.
+    ///
+    /// # Errors
+    /// Its own.
+    fn run_off(&mut self, rows: &[&Row]) -> Result<Vec<f64>, Self::Error>;
 }
 
 /// A combination that was tried.
@@ -48,6 +55,8 @@ pub struct Found {
     pub best_single: Tried,
     /// Everything tried, in its order.
     pub tried: Vec<Tried>,
+    /// How many were timed again, in turns; their verdicts hold those times.
+    pub finalists: usize,
 }
 
 /// Nothing keeps the budget.
@@ -60,11 +69,15 @@ pub struct Infeasible {
 /// A combination must save this share of the frame time to take the place of a simpler one: less
 /// is noise.
 const LEAST_GAIN: f64 = 0.01;
+/// Single techniques and combinations that are timed again, each: what one timing tells apart is less
+/// than what separates the best.
+const FINALISTS: usize = 4;
 /// An option that alone costs more than this over the baseline is not tried with others.
 const WORST_ALONE: f64 = 1.10;
 
 /// The best combination of `options` under a budget: alone, then the cheapest with one more option
-/// (or another one of the same kind) as long as that saves time. Where time is bounded, errors are
+/// (or another one of the same kind) as long as that saves time; the cheapest few single ones and
+/// combinations are then timed again, in turns, and that decides. Where time is bounded, errors are
 /// added only as long as the time is not kept.
 ///
 /// # Errors
@@ -96,16 +109,15 @@ pub fn search<J: Judge>(
             .total_cmp(&ratio(b))
             .then_with(|| a.row.name.cmp(&b.row.name))
     });
-    let mut best_single = baseline.clone();
-    if let Some(first) = alone.first()
-        && saves(first, &baseline)
-    {
-        best_single = first.clone();
-    }
+    let best_single = match alone.first() {
+        Some(first) if saves(first, &baseline) => first.clone(),
+        _ => baseline.clone(),
+    };
     alone.retain(|tried| tried.verdict.frame_time_ratio <= WORST_ALONE);
-    let chosen = match budget {
+    match budget {
         Budget::Flip(_) | Budget::Pixels(_) => {
-            search.descend(best_single.clone(), &alone, fits_error)?
+            search.descend(best_single, &alone, fits_error)?;
+            search.decide(fits_error).map(Ok)
         }
         Budget::BudgetMs(limit_ms) => {
             let limit_s = limit_ms / 1e3;
@@ -125,14 +137,14 @@ pub fn search<J: Judge>(
             if !lossless && best_single.verdict.error < chosen.verdict.error {
                 chosen = best_single.clone();
             }
-            chosen
+            Ok(Ok(Found {
+                chosen,
+                best_single,
+                tried: search.tried,
+                finalists: 0,
+            }))
         }
-    };
-    Ok(Ok(Found {
-        chosen,
-        best_single,
-        tried: search.tried,
-    }))
+    }
 }
 
 struct Search<'a, J> {
@@ -174,6 +186,58 @@ impl<J: Judge> Search<'_, J> {
                 return Ok(best);
             }
         }
+    }
+
+    /// Times the cheapest of what was tried and fits again, in turns: the cheapest is chosen, and of those
+    /// that are as cheap the one of fewest parts.
+    fn decide(mut self, fits: impl Fn(&Tried) -> bool) -> Result<Found, J::Error> {
+        let baseline = Row::baseline().settings;
+        let mut cheapest: Vec<usize> = (0..self.tried.len())
+            .filter(|&i| self.tried[i].row.settings != baseline && fits(&self.tried[i]))
+            .collect();
+        let ratio = |tried: &Tried| tried.verdict.frame_time_ratio;
+        cheapest.sort_by(|&a, &b| ratio(&self.tried[a]).total_cmp(&ratio(&self.tried[b])));
+        let (single, combined): (Vec<usize>, Vec<usize>) =
+            (cheapest.into_iter()).partition(|&i| self.tried[i].row.parts.len() == 1);
+        let few = |all: Vec<usize>| all.into_iter().take(FINALISTS);
+        // What was tried first is the baseline.
+        let finalists: Vec<usize> = [0]
+            .into_iter()
+            .chain(few(single))
+            .chain(few(combined))
+            .collect();
+        let rows: Vec<&Row> = finalists.iter().map(|&i| &self.tried[i].row).collect();
+        let ratios = self.judge.run_off(&rows)?;
+        for (&finalist, ratio) in finalists.iter().zip(ratios) {
+            let verdict = &mut self.tried[finalist].verdict;
+            verdict.frame_s *= ratio / verdict.frame_time_ratio;
+            verdict.frame_time_ratio = ratio;
+        }
+        // Simple ones first: a combination must save something over them to take their place.
+        let mut in_turn = finalists.clone();
+        in_turn.sort_by_key(|&i| (i != 0, self.tried[i].row.parts.len()));
+        let best_of = |most_parts: usize| {
+            let mut best = &self.tried[0];
+            for &i in &in_turn {
+                let tried = &self.tried[i];
+                let as_simple =
+                    tried.row.parts.len() == best.row.parts.len() && best.row.settings != baseline;
+                let cheaper = match as_simple {
+                    true => ratio(tried) < ratio(best),
+                    false => saves(tried, best),
+                };
+                if tried.row.parts.len() <= most_parts && cheaper {
+                    best = tried;
+                }
+            }
+            best.clone()
+        };
+        Ok(Found {
+            chosen: best_of(usize::MAX),
+            best_single: best_of(1),
+            finalists: finalists.len(),
+            tried: self.tried,
+        })
     }
 
     /// Adds the option that keeps the time with the least error, or, where none does, the one that
