@@ -283,10 +283,14 @@ const SOURCE_TEXT: &[&str] = &[
     include_str!("music_train.rs"),
     include_str!("noise.rs"),
     include_str!("organic.rs"),
-    include_str!("plant.rs"),
-    include_str!("plant_machines.rs"),
-    include_str!("plant_materials.rs"),
-    include_str!("plant_parts.rs"),
+    include_str!("plant/building.rs"),
+    include_str!("plant/goods.rs"),
+    include_str!("plant/machines.rs"),
+    include_str!("plant/materials.rs"),
+    include_str!("plant/mod.rs"),
+    include_str!("plant/moving.rs"),
+    include_str!("plant/parts.rs"),
+    include_str!("plant/process.rs"),
     include_str!("scene_builder.rs"),
     include_str!("teapot.rs"),
     include_str!("teapot_patches.rs"),
@@ -296,12 +300,17 @@ const SOURCE_TEXT: &[&str] = &[
 #[cfg(test)]
 mod tests {
     use super::SOURCE_TEXT;
+    use std::path::PathBuf;
 
     #[test]
     fn the_keys_of_textures_cover_every_file_of_this_crate() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
+        let mut open = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src")];
+        while let Some(path) = open.pop() {
+            if path.is_dir() {
+                let entries = std::fs::read_dir(path).unwrap();
+                open.extend(entries.map(|entry| entry.unwrap().path()));
+                continue;
+            }
             let name = path.file_name().unwrap_or_default();
             // The table and the tests make no texture.
             if name != "lib.rs" && name != "tests.rs" {

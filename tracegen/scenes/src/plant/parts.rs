@@ -2,9 +2,9 @@
 //!
 //! Long parts run along +z from their origin; what stands on the floor has its origin there.
 
-use super::mesh_builder::{Frame, Knot, MeshBuilder, sharp, smooth};
-use super::plant_materials::{Kit, SERVICES};
-use super::scene_builder::SceneBuilder;
+use super::materials::{Kit, SERVICES};
+use crate::mesh_builder::{Frame, Knot, MeshBuilder, sharp, smooth};
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 

@@ -1,10 +1,10 @@
 //! What stands in the plant: tanks, pumps, machines, conveyors, racks and their loads, and the
 //! crane, each about its own origin on the floor.
 
-use super::mesh_builder::{MeshBuilder, sharp, smooth};
-use super::plant_materials::Kit;
-use super::plant_parts::{NAVE_M, bar};
-use super::scene_builder::SceneBuilder;
+use super::materials::Kit;
+use super::parts::{NAVE_M, bar};
+use crate::mesh_builder::{MeshBuilder, sharp, smooth};
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 

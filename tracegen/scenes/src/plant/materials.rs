@@ -1,9 +1,9 @@
 //! What the plant is made of: concrete, cladding, painted and bare steel, gratings, signs.
 
-use super::noise::{bank, hash_unit, lerp, smoothstep};
-use super::organic::{metal, planks};
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, Rgb, Surface, Texel, mix, rgb, shade};
+use crate::noise::{bank, hash_unit, lerp, smoothstep};
+use crate::organic::{metal, planks};
+use crate::scene_builder::{MaterialId, SceneBuilder};
+use crate::texture_synth::{Maps, Recipe, Rgb, Surface, Texel, mix, rgb, shade};
 use glam::{Vec3, vec3};
 use scene::AlphaMode;
 use std::f32::consts::TAU;

@@ -1,0 +1,306 @@
+//! What is said about broken files.
+
+use super::*;
+
+#[test]
+fn a_missing_file_is_named() {
+    let files = Files::new(&base());
+    std::fs::remove_file(files.path("mesh.bin")).unwrap();
+    files.fails_with(&["mesh.bin", "buffers[0]", "cannot read"]);
+}
+
+#[test]
+fn a_cut_buffer_is_told_with_both_lengths() {
+    let files = Files::new(&base());
+    files.write("mesh.bin", &[0; 40]);
+    files.fails_with(&["buffers[0]", "42 bytes", "40 bytes"]);
+}
+
+#[test]
+fn cut_or_foreign_json_is_an_error() {
+    let files = Files::new(&base());
+    let text = base().to_string();
+    for cut in [0, 1, text.len() / 2, text.len() - 1] {
+        files.write("scene.gltf", &text.as_bytes()[..cut]);
+        files.fails_with(&["JSON"]);
+    }
+    for glb in [
+        &b"glTF"[..],
+        b"glTF\x02\0\0\0\x05\0\0\0",
+        b"glTF\x02\0\0\0\xff\0\0\0abcd",
+    ] {
+        files.write("scene.gltf", glb);
+        files.fails_with(&["GLB"]);
+    }
+}
+
+#[test]
+fn ranges_outside_their_buffer_are_told() {
+    for (pointer, value, place) in [
+        ("/accessors/0/count", json!(4), "accessors[0]"),
+        ("/accessors/0/byteOffset", json!(1), "accessors[0]"),
+        ("/bufferViews/0/byteLength", json!(1000), "bufferViews[0]"),
+        (
+            "/bufferViews/0/byteOffset",
+            json!(u64::MAX),
+            "bufferViews[0]",
+        ),
+        ("/bufferViews/0/byteStride", json!(252), "accessors[0]"),
+    ] {
+        Files::new(&with(base(), pointer, value)).fails_with(&[place, "range inside"]);
+    }
+}
+
+#[test]
+fn indices_outside_their_table_are_told() {
+    for (pointer, value) in [
+        ("/nodes/0/mesh", json!(7)),
+        ("/meshes/0/primitives/0/material", json!(3)),
+        ("/meshes/0/primitives/0/indices", json!(9)),
+        ("/accessors/0/bufferView", json!(2)),
+        ("/bufferViews/1/buffer", json!(1)),
+        ("/scene", json!(4)),
+    ] {
+        Files::new(&with(base(), pointer, value)).fails_with(&["index inside its table"]);
+    }
+}
+
+#[test]
+fn a_vertex_index_past_the_vertices_is_told() {
+    let files = Files::new(&base());
+    files.write("mesh.bin", &triangle_bytes(CORNERS, [0, 1, 3]));
+    files.fails_with(&[
+        "'tri'",
+        "accessors[1], index 2",
+        "vertex below 3",
+        "found 3",
+    ]);
+}
+
+#[test]
+fn a_position_that_is_not_finite_names_mesh_accessor_and_vertex() {
+    for bad in [f32::NAN, f32::INFINITY] {
+        let mut corners = CORNERS;
+        corners[1][2] = bad;
+        let files = Files::new(&base());
+        files.write("mesh.bin", &triangle_bytes(corners, [0, 1, 2]));
+        files.fails_with(&[
+            "meshes[0] 'tri'",
+            "accessors[0], vertex 1",
+            "finite position",
+        ]);
+    }
+}
+
+#[test]
+fn accessors_of_the_wrong_type_are_told() {
+    for (pointer, value) in [
+        ("/accessors/0/type", json!("VEC2")),
+        ("/accessors/0/componentType", json!(5125)),
+        ("/accessors/1/componentType", json!(5126)),
+        ("/accessors/1/type", json!("MAT4")),
+    ] {
+        Files::new(&with(base(), pointer, value)).fails_with(&["accessors["]);
+    }
+}
+
+#[test]
+fn cycles_and_nodes_with_two_parents_are_told() {
+    let cycle = json!([{"children": [1]}, {"mesh": 0, "children": [0]}]);
+    Files::new(&with(base(), "/nodes", cycle)).fails_with(&["nodes[0]", "cycle"]);
+    let own_child = json!([{"mesh": 0, "children": [0]}]);
+    Files::new(&with(base(), "/nodes", own_child)).fails_with(&["nodes[0]", "cycle"]);
+}
+
+#[test]
+fn a_chain_of_a_hundred_thousand_nodes_does_not_overflow_the_stack() {
+    let n = 100_000;
+    let mut nodes: Vec<Value> = (1..n).map(|i| json!({"children": [i]})).collect();
+    nodes.push(json!({"mesh": 0}));
+    assert!(
+        Files::new(&with(base(), "/nodes", json!(nodes)))
+            .load()
+            .is_ok()
+    );
+}
+
+#[test]
+fn elements_beyond_what_the_file_can_hold_are_refused_before_they_are_made() {
+    let sparse = json!({"count": 1,
+        "indices": {"bufferView": 1, "componentType": 5123},
+        "values": {"bufferView": 0}});
+    for count in [1_000_000_000_000u64, u64::MAX] {
+        let accessor = json!({"componentType": 5126, "count": count,
+                              "type": "VEC3", "sparse": sparse});
+        Files::new(&with(base(), "/accessors/0", accessor)).fails_with(&[
+            "accessors[0]",
+            "in a file of this size",
+            &count.to_string(),
+        ]);
+        Files::new(&with(base(), "/accessors/1/count", json!(count))).fails_with(&[
+            "accessors[1]",
+            "in a file of this size",
+            &count.to_string(),
+        ]);
+    }
+}
+
+#[test]
+fn a_mesh_of_many_primitives_placed_many_times_is_refused_before_it_explodes() {
+    let primitive = json!({"attributes": {"POSITION": 0}});
+    let json = with(
+        base(),
+        "/meshes/0/primitives",
+        json!(vec![primitive; 10_000]),
+    );
+    let json = with(json, "/nodes", json!(vec![json!({"mesh": 0}); 10_000]));
+    let nodes: Vec<u32> = (0..10_000).collect();
+    let json = with(json, "/scenes/0/nodes", json!(nodes));
+    Files::new(&json).fails_with(&["instances of meshes[0]", "in a file of this size"]);
+}
+
+#[test]
+fn a_stride_below_the_elements_size_is_told() {
+    for stride in [4, 8] {
+        let json = with(base(), "/bufferViews/0/byteStride", json!(stride));
+        Files::new(&json).fails_with(&[
+            "bufferViews[0].byteStride",
+            "at least 12 bytes",
+            &format!("found {stride}"),
+        ]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_and_pipes_are_refused_as_buffers_and_images() {
+    for (json, place) in [
+        (
+            with(base(), "/buffers/0/uri", json!("/dev/zero")),
+            "buffers[0]",
+        ),
+        (
+            with(textured(), "/images/0/uri", json!("/dev/zero")),
+            "images[0]",
+        ),
+    ] {
+        let error = Files::new(&json).load().unwrap_err().to_string();
+        for part in ["/dev/zero", place, "a regular file", "a device"] {
+            assert!(error.contains(part), "'{part}' is not in: {error}");
+        }
+    }
+    let files = Files::new(&base());
+    std::fs::remove_file(files.path("mesh.bin")).unwrap();
+    let made = std::process::Command::new("mkfifo")
+        .arg(files.path("mesh.bin"))
+        .status();
+    assert!(made.unwrap().success());
+    files.fails_with(&["mesh.bin", "buffers[0]", "a regular file", "a pipe"]);
+}
+
+#[test]
+fn names_and_paths_with_terminal_escapes_are_shown_escaped() {
+    let json = with(base(), "/buffers/0/uri", json!("no\u{1b}]0;x\u{7}.bin"));
+    Files::new(&json).fails_with(&["no\\u{1b}]0;x\\u{7}.bin", "cannot read"]);
+    let json = with(base(), "/meshes/0/name", json!("a\u{1b}[2Jb\u{9b}"));
+    let files = Files::new(&json);
+    let scene = files.load().unwrap().scene;
+    assert_eq!(scene.meshes[0].name, "a\\u{1b}[2Jb\\u{9b}");
+    files.write("mesh.bin", &triangle_bytes(CORNERS, [0, 1, 3]));
+    files.fails_with(&["'a\\u{1b}[2Jb\\u{9b}'"]);
+}
+
+#[test]
+fn missing_corrupt_and_empty_images_are_told() {
+    let files = Files::new(&textured());
+    files.fails_with(&["my image.png", "images[0], used by materials[0] 'paint'"]);
+    let good = png([4, 4], [1, 2, 3, 255]);
+    for bytes in [&b""[..], b"not an image", &good[..good.len() / 2]] {
+        files.write("my image.png", bytes);
+        files.fails_with(&["my image.png", "PNG or JPEG"]);
+    }
+    // The width in the header of a PNG, which has a checksum: 0x4.
+    let mut empty = good.clone();
+    empty[16..20].fill(0);
+    files.write("my image.png", &empty);
+    files.fails_with(&["my image.png"]);
+    files.write("my image.png", &good);
+    assert!(files.load().is_ok());
+}
+
+#[test]
+fn a_huge_image_is_refused_before_it_is_decoded() {
+    // 0xffff x 0xffff in the frame header of an otherwise empty JPEG.
+    let jpeg = [
+        0xff, 0xd8, 0xff, 0xc0, 0, 11, 8, 0xff, 0xff, 0xff, 0xff, 1, 1, 0x11, 0,
+    ];
+    let files = Files::new(&textured());
+    files.write("my image.png", &jpeg);
+    files.fails_with(&["my image.png"]);
+}
+
+#[test]
+fn required_extensions_that_are_not_supported_are_named_before_all_else() {
+    // As such files are: accessors and textures that only the extension fills.
+    let mut draco = base();
+    draco["accessors"][0]
+        .as_object_mut()
+        .unwrap()
+        .remove("bufferView");
+    let mut basis = textured();
+    basis["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+    for (name, json) in [
+        ("KHR_draco_mesh_compression", draco.clone()),
+        ("EXT_meshopt_compression", draco),
+        ("KHR_texture_basisu", basis),
+    ] {
+        let required = json!(["KHR_texture_transform", name, name]);
+        let files = Files::new(&with(json, "/extensionsRequired", required));
+        files.fails_with(&["extensionsRequired", &format!("found {name}, unsupported")]);
+    }
+}
+
+#[test]
+fn a_huge_image_in_a_small_file_is_refused_before_it_is_decoded() {
+    let files = Files::new(&textured());
+    let mut huge = png([1, 1], [0; 4]);
+    // Width and height of the header, with its checksum made good.
+    huge[16..24].copy_from_slice(&[0, 0, 0x40, 0, 0, 0, 0x40, 0]);
+    let checksum = crc(&huge[12..29]);
+    huge[29..33].copy_from_slice(&checksum.to_be_bytes());
+    files.write("my image.png", &huge);
+    files.fails_with(&["my image.png", "16384x16384", "bytes of texels"]);
+}
+
+/// CRC-32 as PNG has it.
+fn crc(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0u32, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+            (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg())
+        })
+    })
+}
+
+#[test]
+fn a_scene_without_triangles_is_an_error() {
+    let files = Files::new(&with(base(), "/meshes/0/primitives/0/mode", json!(0)));
+    files.fails_with(&["at least one triangle"]);
+}
+
+#[test]
+fn no_single_changed_byte_of_the_json_panics() {
+    let text = textured().to_string().into_bytes();
+    let files = Files::new(&textured());
+    files.write("my image.png", &png([4, 4], [1, 2, 3, 255]));
+    for at in 0..text.len() {
+        let mut changed = text.clone();
+        changed[at] = if changed[at].is_ascii_digit() {
+            b'9'
+        } else {
+            b'1'
+        };
+        files.write("scene.gltf", &changed);
+        // Either outcome will do: what counts is that there is one.
+        let _ = files.load();
+    }
+}

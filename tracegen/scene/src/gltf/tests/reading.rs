@@ -1,0 +1,345 @@
+//! What is read.
+
+use super::*;
+
+#[test]
+fn a_file_without_normals_camera_or_lights_gets_them() {
+    let scene = Files::new(&base()).load().unwrap().scene;
+    let mesh = &scene.meshes[0];
+    assert_eq!(mesh.positions, CORNERS.map(Vec3::from_array));
+    assert_eq!(mesh.indices, [0, 1, 2]);
+    assert_eq!(mesh.normals, [Vec3::Z; 3]);
+    assert_eq!(mesh.tangents.len(), 3);
+    assert_eq!(scene.cameras[0].name, "default");
+    assert!(matches!(scene.lights[..], [Light::Directional { .. }]));
+}
+
+#[test]
+fn the_same_scene_comes_from_gltf_data_uris_and_glb() {
+    let files = Files::new(&base());
+    let expected = files.load().unwrap().scene.meshes[0].positions.clone();
+    let bytes = triangle_bytes(CORNERS, [0, 1, 2]);
+
+    let hex: String = bytes.iter().map(|b| format!("%{b:02x}")).collect();
+    let json = with(base(), "/buffers/0/uri", json!(format!("data:,{hex}")));
+    assert_eq!(
+        Files::new(&json).load().unwrap().scene.meshes[0].positions,
+        expected
+    );
+
+    let mut json = base();
+    json["buffers"][0].as_object_mut().unwrap().remove("uri");
+    let glb = gltf::binary::Glb {
+        header: gltf::binary::Header {
+            magic: *b"glTF",
+            version: 2,
+            length: 0,
+        },
+        json: json.to_string().into_bytes().into(),
+        bin: Some(bytes.into()),
+    };
+    files.write("scene.glb", &glb.to_vec().unwrap());
+    let path = files.path("scene.glb");
+    let scene = load_file(&path, &LoadOptions::ALL).unwrap().scene;
+    assert_eq!(scene.meshes[0].positions, expected);
+}
+
+#[test]
+fn transforms_multiply_down_the_tree_and_mirrors_are_told() {
+    let json = with(
+        base(),
+        "/nodes",
+        json!([
+            {"children": [1], "translation": [10.0, 0.0, 0.0]},
+            {"mesh": 0, "scale": [-2.0, 1.0, 3.0]}
+        ]),
+    );
+    let scene = Files::new(&json).load().unwrap().scene;
+    let instance = scene.instances[0];
+    assert!(instance.mirrored());
+    let corner = instance.transform.transform_point3(Vec3::ONE);
+    assert_eq!(corner, Vec3::new(8.0, 1.0, 3.0));
+}
+
+#[test]
+fn two_nodes_of_one_mesh_are_two_instances() {
+    let json = with(base(), "/scenes/0/nodes", json!([0, 1]));
+    let json = with(json, "/nodes", json!([{"mesh": 0}, {"mesh": 0}]));
+    let scene = Files::new(&json).load().unwrap().scene;
+    assert_eq!((scene.meshes.len(), scene.instances.len()), (1, 2));
+    assert_eq!(scene.triangle_count(), 2);
+}
+
+#[test]
+fn a_camera_node_looks_along_its_minus_z() {
+    let json = with(
+        base(),
+        "/cameras",
+        json!([
+            {"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.5, "zfar": 50.0}}
+        ]),
+    );
+    // Turned by 90 degrees about y: -z becomes -x.
+    let turned = json!([
+        0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 1.0
+    ]);
+    let json = with(
+        json,
+        "/nodes",
+        json!([
+            {"mesh": 0}, {"name": "cam_side", "camera": 0, "matrix": turned}
+        ]),
+    );
+    let json = with(json, "/scenes/0/nodes", json!([0, 1]));
+    let camera = &Files::new(&json).load().unwrap().scene.cameras[0];
+    assert_eq!(camera.name, "cam_side");
+    assert_eq!(camera.eye, Vec3::new(1.0, 2.0, 3.0));
+    assert_eq!(camera.target, Vec3::new(0.0, 2.0, 3.0));
+    assert_eq!((camera.near, camera.far, camera.up), (0.5, 50.0, Vec3::Y));
+}
+
+#[test]
+fn an_image_in_both_colour_spaces_is_listed_twice_and_otherwise_once() {
+    let json = with(
+        textured(),
+        "/materials/0/occlusionTexture",
+        json!({"index": 0}),
+    );
+    let json = with(json, "/materials/0/emissiveTexture", json!({"index": 0}));
+    let files = Files::new(&json);
+    files.write("my image.png", &png([2, 2], [10, 20, 30, 255]));
+    let scene = files.load().unwrap().scene;
+    assert_eq!(scene.images.len(), 2);
+    let material = &scene.materials[0];
+    assert_eq!(material.base_color_texture.unwrap().image, 0);
+    assert_eq!(material.emissive_texture.unwrap().image, 0);
+    assert_eq!(material.occlusion_texture.unwrap().image, 1);
+    let texels = crate::image::texels(&scene.images, |i| i == 0).unwrap();
+    assert_eq!(texels[0].as_ref().unwrap()[..4], [10, 20, 30, 255]);
+    assert_eq!(texels[1], None);
+}
+
+#[test]
+fn images_are_decoded_when_their_texels_are_asked_for() {
+    let files = Files::new(&textured());
+    let whole = png([6, 3], [0; 4]);
+    files.write("my image.png", &whole[..whole.len() - 20]);
+    let scene = files.load().unwrap().scene;
+    assert_eq!(scene.images[0].size, [6, 3]);
+    let error = crate::image::texels(&scene.images, |_| true).unwrap_err();
+    assert!(error.to_string().contains("my image.png"), "{error}");
+}
+
+#[test]
+fn materials_keep_their_alpha_mode_transmission_and_ior() {
+    let json = with(
+        base(),
+        "/materials",
+        json!([
+            {"alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": true},
+            {"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}},
+            {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.5},
+                            "KHR_materials_ior": {"ior": 1.33}}}
+        ]),
+    );
+    let primitive = |m: u32| json!({"attributes": {"POSITION": 0}, "indices": 1, "material": m});
+    let primitives: Vec<Value> = (0..3).map(primitive).collect();
+    let json = with(json, "/meshes/0/primitives", json!(primitives));
+    let materials = Files::new(&json).load().unwrap().scene.materials;
+    assert_eq!(materials[0].alpha, AlphaMode::Mask(0.25));
+    assert!(materials[0].double_sided);
+    assert_eq!(
+        (materials[1].alpha, materials[1].transmission),
+        (AlphaMode::Blend, 0.75)
+    );
+    assert_eq!((materials[2].transmission, materials[2].ior), (0.5, 1.33));
+}
+
+#[test]
+fn a_texture_transform_turns_as_the_extension_says() {
+    let transform = json!({"offset": [0.5, 0.25], "rotation": std::f32::consts::FRAC_PI_2,
+                           "scale": [2.0, 3.0]});
+    let texture = json!({"index": 0, "extensions": {"KHR_texture_transform": transform}});
+    let json = with(
+        textured(),
+        "/materials/0/pbrMetallicRoughness/baseColorTexture",
+        texture.clone(),
+    );
+    let json = with(json, "/materials/0/normalTexture", texture);
+    let files = Files::new(&json);
+    files.write("my image.png", &png([2, 2], [0; 4]));
+    let material = files.load().unwrap().scene.materials.remove(0);
+    let rows = material.base_color_texture.unwrap().uv_transform;
+    assert_eq!(rows, material.normal_texture.unwrap().uv_transform);
+    // (1, 0) scales to (2, 0), turns to (0, -2), moves to (0.5, -1.75).
+    let u = rows[0][0] + rows[0][2];
+    let v = rows[1][0] + rows[1][2];
+    assert!(
+        (u - 0.5).abs() < 1e-6 && (v + 1.75).abs() < 1e-6,
+        "{rows:?}"
+    );
+}
+
+#[test]
+fn tangents_of_the_file_are_kept() {
+    let mut bytes = triangle_bytes(CORNERS, [0, 1, 2]);
+    bytes.extend([0, 0]);
+    bytes.extend(
+        [0.0f32, 1.0, 0.0, -1.0]
+            .repeat(3)
+            .iter()
+            .flat_map(|v| v.to_le_bytes()),
+    );
+    let json = with(base(), "/buffers/0/byteLength", json!(92));
+    let mut json = with(json, "/meshes/0/primitives/0/attributes/TANGENT", json!(2));
+    json["bufferViews"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({"buffer": 0, "byteOffset": 44, "byteLength": 48}));
+    json["accessors"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC4"}));
+    let files = Files::new(&json);
+    files.write("mesh.bin", &bytes);
+    let scene = files.load().unwrap().scene;
+    assert_eq!(
+        scene.meshes[0].tangents,
+        [Vec4::new(0.0, 1.0, 0.0, -1.0); 3]
+    );
+}
+
+#[test]
+fn points_and_lines_are_skipped_with_a_warning() {
+    let mut json = base();
+    json["meshes"][0]["primitives"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({"attributes": {"POSITION": 0}, "mode": 1}));
+    let loaded = Files::new(&json).load().unwrap();
+    assert_eq!(loaded.scene.triangle_count(), 1);
+    assert!(
+        loaded.warnings[0].contains("Lines"),
+        "{:?}",
+        loaded.warnings
+    );
+}
+
+#[test]
+fn what_is_left_out_is_told_once_with_its_count() {
+    let mut json = with(base(), "/skins", json!([{"joints": [0]}, {"joints": [0]}]));
+    json["animations"] = json!([{"samplers": [], "channels": []}]);
+    json["extensionsUsed"] = json!(["FOO_a", "KHR_texture_transform", "FOO_b"]);
+    let primitive = json!({"attributes": {"POSITION": 0}, "targets": [{"POSITION": 0}]});
+    json["meshes"][0]["primitives"] = json!([primitive, primitive, primitive]);
+    let loaded = Files::new(&json).load().unwrap();
+    let warnings = loaded.warnings;
+    for part in [
+        "1 animations are left out",
+        "2 skins are left out",
+        "2 unsupported extensions are left out: FOO_a, FOO_b",
+        "has morph targets; it is shown at rest (and 2 more like this)",
+    ] {
+        let told = warnings.iter().filter(|w| w.contains(part)).count();
+        assert_eq!(told, 1, "'{part}' in {warnings:?}");
+    }
+    assert_eq!(warnings.len(), 4, "{warnings:?}");
+}
+
+#[test]
+fn a_buffer_longer_than_it_says_is_read_as_far_as_it_says() {
+    let files = Files::new(&base());
+    let mut bytes = triangle_bytes(CORNERS, [0, 1, 2]);
+    bytes.resize(100_000, 7);
+    files.write("mesh.bin", &bytes);
+    let loaded = files.load().unwrap();
+    assert!(
+        loaded.warnings[0].contains("100000 bytes, 42 are used"),
+        "{:?}",
+        loaded.warnings
+    );
+    let json = with(base(), "/bufferViews/1/byteLength", json!(7));
+    files.write("scene.gltf", json.to_string().as_bytes());
+    files.fails_with(&["bufferViews[1]", "buffers[0] of 42 bytes"]);
+}
+
+/// `base()` with COLOR_0 of three vertices in `bytes`.
+fn colored(of: &str, component: u32, bytes: &[u8]) -> Result<Vec<Vec4>, SceneError> {
+    let mut json = with(
+        base(),
+        "/meshes/0/primitives/0/attributes/COLOR_0",
+        json!(2),
+    );
+    let view = json!({"buffer": 1, "byteLength": bytes.len()});
+    json["bufferViews"].as_array_mut().unwrap().push(view);
+    let accessor = json!({"bufferView": 2, "componentType": component, "count": 3, "type": of,
+                          "normalized": component != 5126});
+    json["accessors"].as_array_mut().unwrap().push(accessor);
+    let buffer = json!({"uri": "colors.bin", "byteLength": bytes.len()});
+    json["buffers"].as_array_mut().unwrap().push(buffer);
+    let files = Files::new(&json);
+    files.write("colors.bin", bytes);
+    files
+        .load()
+        .map(|mut loaded| loaded.scene.meshes.remove(0).colors)
+}
+
+#[test]
+fn vertex_colours_of_every_type_are_read() {
+    let floats = |values: &[f32]| -> Vec<u8> {
+        let all = values.repeat(3);
+        all.iter().flat_map(|v| v.to_le_bytes()).collect()
+    };
+    let shorts = |values: &[u16]| -> Vec<u8> {
+        let all = values.repeat(3);
+        all.iter().flat_map(|v| v.to_le_bytes()).collect()
+    };
+    let (rgb, rgba) = (Vec4::new(1.0, 0.0, 0.2, 1.0), Vec4::new(1.0, 0.0, 0.2, 0.4));
+    for (of, component, bytes, expected) in [
+        ("VEC3", 5126, floats(&[1.0, 0.0, 0.2]), rgb),
+        ("VEC4", 5126, floats(&[1.0, 0.0, 0.2, 0.4]), rgba),
+        ("VEC3", 5121, [255, 0, 51].repeat(3), rgb),
+        ("VEC4", 5121, [255, 0, 51, 102].repeat(3), rgba),
+        ("VEC3", 5123, shorts(&[65535, 0, 13107]), rgb),
+        ("VEC4", 5123, shorts(&[65535, 0, 13107, 26214]), rgba),
+        ("VEC4", 5126, floats(&[9.0, -1.0, 0.2, 0.4]), rgba),
+        ("VEC3", 5126, floats(&[f32::NAN, 0.0, 0.2]), Vec4::ONE),
+    ] {
+        let colors = colored(of, component, &bytes).unwrap();
+        assert_eq!(colors, [expected; 3], "{of} of {component}");
+    }
+    let error = colored("VEC2", 5126, &floats(&[1.0, 0.0]))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("accessors[2]") && error.contains("colours"),
+        "{error}"
+    );
+}
+
+#[test]
+fn quantised_positions_are_read_where_the_extension_is_used() {
+    let positions = [0u16, 0, 0, 0, 4, 0, 0, 0, 0, 4, 0, 0];
+    let mut bytes: Vec<u8> = positions.iter().flat_map(|v| v.to_le_bytes()).collect();
+    bytes.resize(36, 0);
+    bytes.extend([0u16, 1, 2].iter().flat_map(|i| i.to_le_bytes()));
+    let mut json = with(base(), "/accessors/0/componentType", json!(5123));
+    json["bufferViews"][0]["byteStride"] = json!(8);
+    let files = Files::new(&json);
+    files.write("mesh.bin", &bytes);
+    files.fails_with(&["accessors[0]", "positions"]);
+    json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+    files.write("scene.gltf", json.to_string().as_bytes());
+    let scene = files.load().unwrap().scene;
+    assert_eq!(
+        scene.meshes[0].positions,
+        [Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0]
+    );
+}
+
+#[test]
+fn degenerate_triangles_are_kept() {
+    let files = Files::new(&base());
+    files.write("mesh.bin", &triangle_bytes([[1.0; 3]; 3], [0, 0, 0]));
+    assert_eq!(files.load().unwrap().scene.triangle_count(), 1);
+}

@@ -1,0 +1,251 @@
+//! An industrial hall of very many objects: naves of pipe racks, tanks, pumps, machines, stores and
+//! walkways under travelling cranes. It stands for the data of a factory's planners.
+//!
+//! The hall is laid out bay by bay, then sorted by mesh, so that the instances of a mesh follow each
+//! other and make one draw call. Directions are quarter turns throughout: their matrices hold
+//! zeros and ones, which keeps boxes tight and cheap.
+
+mod building;
+mod goods;
+mod machines;
+mod materials;
+mod moving;
+mod parts;
+mod process;
+
+use crate::scene_builder::SceneBuilder;
+use glam::{Affine3A, Mat3, Vec3, vec3};
+use machines::{Machines, machines};
+use materials::kit;
+use parts::{BAY_M, NAVE_M, Parts, parts};
+use scene::{Movement, Scene};
+use std::ops::RangeInclusive;
+
+/// Instances where no number is asked for.
+pub const DEFAULT_INSTANCES: u32 = 20_000;
+/// Instances that can be asked for.
+pub const INSTANCES: RangeInclusive<u32> = 20_000..=100_000;
+
+/// Instances that a bay of a nave has at most.
+const BAY_INSTANCES: usize = 460;
+/// Foot of the cranes' rails, metres.
+const RAIL_M: f32 = 7.8;
+
+/// Quarter turns: where x, y and z point.
+const ALONG: Mat3 = Mat3::IDENTITY;
+const AROUND: Mat3 = Mat3::from_cols(Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z);
+/// z to +x.
+const RIGHT: Mat3 = Mat3::from_cols(Vec3::NEG_Z, Vec3::Y, Vec3::X);
+/// z to -x.
+const LEFT: Mat3 = Mat3::from_cols(Vec3::Z, Vec3::Y, Vec3::NEG_X);
+/// z to +y.
+const UP: Mat3 = Mat3::from_cols(Vec3::X, Vec3::NEG_Z, Vec3::Y);
+/// z to +x, y to -y: an elbow from +x down.
+const RIGHT_DOWN: Mat3 = Mat3::from_cols(Vec3::Z, Vec3::NEG_Y, Vec3::X);
+/// z to +y, y to -x: an elbow from up to -x.
+const UP_LEFT: Mat3 = Mat3::from_cols(Vec3::NEG_Z, Vec3::NEG_X, Vec3::Y);
+/// z to +y, y to +z: a valve in a riser, its wheel to +z.
+const UP_WHEEL_OUT: Mat3 = Mat3::from_cols(Vec3::NEG_X, Vec3::Z, Vec3::Y);
+
+/// What is placed where, before it is sorted.
+struct Layout {
+    placed: Vec<(usize, Affine3A, Option<usize>)>,
+    motions: Vec<Vec<Movement>>,
+    p: Parts,
+    m: Machines,
+}
+
+/// The scene with its usual number of instances.
+#[must_use]
+pub fn scene() -> Scene {
+    with_instances(DEFAULT_INSTANCES)
+}
+
+/// The scene with exactly so many instances, of [`INSTANCES`].
+#[must_use]
+pub fn with_instances(instances: u32) -> Scene {
+    let instances = instances as usize;
+    let mut scene = SceneBuilder::new("plant");
+    let kit = kit(&mut scene);
+    let (p, m) = (parts(&mut scene, &kit), machines(&mut scene, &kit));
+    let mut layout = Layout {
+        placed: Vec::with_capacity(instances),
+        motions: Vec::new(),
+        p,
+        m,
+    };
+    // A hall some three times as long as wide; its last bay holds the stores.
+    let cells = instances as f32 / 390.0;
+    let naves = ((cells * BAY_M / (3.0 * NAVE_M)).sqrt().round() as usize).max(1);
+    let mut bays = instances / (naves * BAY_INSTANCES / 2);
+    loop {
+        layout.clear();
+        layout.hall(naves, bays);
+        if layout.placed.len() <= instances {
+            break;
+        }
+        bays -= 1;
+    }
+    layout.stores(naves, bays, instances);
+    layout.finish(&mut scene);
+
+    let (width, length) = (naves as f32 * NAVE_M, bays as f32 * BAY_M);
+    let nave = |x: f32| x - width / 2.0;
+    let end = length / 2.0;
+    let mut camera =
+        |name: &str, eye: Vec3, target: Vec3| scene.camera(name, eye, target, 0.1, 600.0);
+    camera(
+        "default",
+        vec3(nave(11.6), 1.75, end - 31.0),
+        vec3(nave(4.6), 2.6, end - 12.0),
+    );
+    camera(
+        "aisle",
+        vec3(nave(11.5), 1.7, end - 50.0),
+        vec3(nave(11.5), 2.2, end),
+    );
+    camera(
+        "walkway",
+        vec3(nave(20.2), 5.2, end - 40.0),
+        vec3(nave(8.0), 1.5, end - 22.0),
+    );
+    camera(
+        "pumps",
+        vec3(nave(9.4), 1.5, end - 24.0),
+        vec3(nave(2.0), 1.6, end - 17.0),
+    );
+    camera(
+        "overview",
+        vec3(nave(20.5), 9.9, -end + 1.0),
+        vec3(nave(10.0), 3.0, end),
+    );
+    scene.sun(vec3(-0.42, -1.0, 0.3), vec3(1.2, 1.16, 1.08));
+    for k in 0..8 {
+        let (x, z) = (
+            nave(6.0 + 12.0 * (k % 2) as f32),
+            end - 10.0 - 12.0 * (k / 2) as f32,
+        );
+        scene.lamp(vec3(x, 9.0, z), vec3(11.0, 10.4, 9.2));
+    }
+    scene.finish(vec3(0.5, 0.55, 0.6), 0)
+}
+
+impl Layout {
+    fn clear(&mut self) {
+        self.placed.clear();
+        self.motions.clear();
+    }
+
+    fn put(&mut self, mesh: usize, turn: Mat3, x: f32, y: f32, z: f32) {
+        let place = Affine3A::from_mat3_translation(turn, vec3(x, y, z));
+        self.placed.push((mesh, place, None));
+    }
+
+    /// Puts a part of what moves together.
+    fn put_moving(&mut self, motion: usize, mesh: usize, turn: Mat3, at: Vec3) {
+        let place = Affine3A::from_mat3_translation(turn, at);
+        self.placed.push((mesh, place, Some(motion)));
+    }
+
+    fn motion(&mut self, movements: Vec<Movement>) -> usize {
+        self.motions.push(movements);
+        self.motions.len() - 1
+    }
+
+    /// Instances of a mesh follow each other, in the order in which they were placed.
+    fn finish(mut self, scene: &mut SceneBuilder) {
+        self.placed.sort_by_key(|(mesh, ..)| *mesh);
+        let mut groups = vec![Vec::new(); self.motions.len()];
+        for (number, (mesh, place, motion)) in self.placed.into_iter().enumerate() {
+            scene.place(mesh, place);
+            if let Some(motion) = motion {
+                groups[motion].push(number);
+            }
+        }
+        for (instances, movements) in groups.into_iter().zip(self.motions) {
+            scene.motion(instances, movements);
+        }
+    }
+
+    /// The building with all that stands in it, but for the stores.
+    fn hall(&mut self, naves: usize, bays: usize) {
+        let (x0, z0) = (-(naves as f32) * NAVE_M / 2.0, -(bays as f32) * BAY_M / 2.0);
+        for bay in 0..bays {
+            let z = z0 + bay as f32 * BAY_M;
+            for nave in 0..naves {
+                let x = x0 + nave as f32 * NAVE_M;
+                self.building(x, z);
+                self.overhead(x, z);
+                self.pipe_rack(x, z, nave, bay);
+                self.cable_trays(x, z);
+                self.walkway(x, z, bay);
+                if bay + 1 < bays {
+                    self.west(x, z, nave, bay);
+                    self.east(x, z, nave, bay);
+                }
+            }
+            self.columns(x0 + naves as f32 * NAVE_M, z);
+            for (x, turn, shift) in [
+                (x0, ALONG, 0.0),
+                (x0 + naves as f32 * NAVE_M, AROUND, BAY_M),
+            ] {
+                self.side_wall(x, z + shift, turn);
+            }
+        }
+        let z1 = z0 + bays as f32 * BAY_M;
+        for quarter in 0..naves * 4 {
+            let x = x0 + quarter as f32 * BAY_M;
+            self.side_wall(x, z1, RIGHT);
+            self.side_wall(x + BAY_M, z0, LEFT);
+        }
+        for nave in 0..naves {
+            let x = x0 + nave as f32 * NAVE_M;
+            self.crane(x, z0, bays, 3 * nave + 1);
+            self.cart(x + 11.5, z0, bays, nave);
+            for k in 0..2 {
+                self.fan(x + 8.0 + 8.0 * k as f32, z1 - 0.4, (nave + k) as f32);
+            }
+        }
+    }
+
+    /// Four anchor bolts around a base plate.
+    fn bolts(&mut self, x: f32, y: f32, z: f32, half_x: f32, half_z: f32) {
+        for (sx, sz) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
+            self.put(self.p.bolt, ALONG, x + sx * half_x, y, z + sz * half_z);
+        }
+    }
+
+    fn cabinet(&mut self, x: f32, z: f32, turn: Mat3, panel: bool) {
+        // The door is at -z: it faces against the turned z axis.
+        let turn = turn * AROUND;
+        self.put(self.m.cabinet, turn, x, 0.0, z);
+        if panel {
+            self.put(self.m.panel, turn, x, 0.0, z);
+            self.put(
+                self.m.signal[usize::from(z as i32 % 5 == 0)],
+                turn,
+                x,
+                2.0,
+                z,
+            );
+        }
+    }
+
+    fn mill(&mut self, x: f32, z: f32, turn: Mat3, number: usize) {
+        // The door looks along the turned z axis.
+        let turn = turn * AROUND;
+        let side = |along: f32, out: f32| turn * vec3(along, 0.0, -out);
+        self.put(self.m.mill, turn, x, 0.0, z);
+        self.put(self.m.mill_guard, turn, x, 0.0, z);
+        let light = side(1.0, 0.4);
+        self.put(
+            self.m.signal[number % 2],
+            turn,
+            x + light.x,
+            2.35,
+            z + light.z,
+        );
+        let bench = side(0.4, 1.4);
+        self.put(self.m.bin, turn, x + bench.x, 0.0, z + bench.z);
+    }
+}
