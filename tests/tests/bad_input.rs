@@ -181,7 +181,7 @@ fn culling_that_the_display_cannot_have_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("out.textrace");
     let wide: &[&str] = &["--hfov", "100", "--cant", "42"];
-    let cases: [(&[&str], &[&str], &[&str]); 4] = [
+    let cases: [(&[&str], &[&str], &[&str]); 6] = [
         (
             &["--cull", "superfrustum"],
             wide,
@@ -201,6 +201,16 @@ fn culling_that_the_display_cannot_have_is_refused() {
             &["--lens-radius", "-1"],
             &[],
             &["--lens-radius", "radius above 0", "-1"],
+        ),
+        (
+            &["--lens-center", "0.1"],
+            &[],
+            &["--lens-center", "two tangents", "'0.1'"],
+        ),
+        (
+            &["--lens-center", "nan,0"],
+            &[],
+            &["--lens-center", "centre x and y", "NaN"],
         ),
     ];
     for (technique, display, message) in cases {

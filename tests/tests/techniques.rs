@@ -176,6 +176,30 @@ fn the_search_keeps_its_budget_on_frames_it_did_not_see_and_is_as_cheap_as_any_t
 }
 
 #[test]
+fn a_capture_under_a_budget_is_a_trace_of_the_path_with_what_was_chosen() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let (trace, picture) = (root.path().join("a.textrace"), root.path().join("a.png"));
+    let mut command = program("tracegen");
+    command
+        .args(["raster", "teapot", "--size", "64x72", "--frames", "2"])
+        .args(["--auto", "pixels=1", "-o"])
+        .arg(&trace)
+        .arg("--image")
+        .arg(&picture);
+    let said = String::from_utf8(run_ok(&mut command).stdout).expect("UTF-8");
+    assert!(
+        said.contains("--auto pixels=1: of ") && said.contains("at most 1 px by construction"),
+        "{said}"
+    );
+    run_ok(program("replay").arg("validate").arg(&trace));
+    let info = run_ok(program("replay").args(["info", "--json"]).arg(&trace)).stdout;
+    let info: Value = serde_json::from_slice(&info).expect("JSON");
+    let frames = info["meta"]["frames"].as_array().map(Vec::len);
+    assert_eq!(frames, Some(2));
+    assert!(picture.exists());
+}
+
+#[test]
 fn a_budget_that_nothing_meets_is_told() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let mut command = study(root.path(), "none");

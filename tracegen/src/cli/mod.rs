@@ -1,7 +1,8 @@
 //! The command line, one file a subcommand.
 
 mod cache_args;
-pub mod path_args;
+pub mod lens_args;
+mod path_args;
 mod prepared;
 pub mod raster;
 mod raster_auto;

@@ -25,6 +25,7 @@ pub struct Prepared {
 /// Unreadable textures, driver errors.
 pub fn prepare(
     setup: SceneSetup,
+    lens: [Lens; 2],
     fps: f32,
     spec: &str,
     gpu: Gpu,
@@ -46,7 +47,7 @@ pub fn prepare(
         lighting: Lighting::new(scene),
         bounds,
         shadow_range_m: raster::shadow_range_m(&setup, bounds),
-        lens: setup.hmd.fov.map(|fov| Lens::of(&fov)),
+        lens,
         tables,
         fps,
         hmd: setup.hmd,

@@ -75,7 +75,7 @@ pub struct RasterArgs {
                                 "views", "no_plain", "no_skip"])]
     auto: Option<Budget>,
     #[command(flatten)]
-    techniques: TechniqueArgs,
+    pub(super) techniques: TechniqueArgs,
     #[command(flatten)]
     pub(super) cache: CacheArgs,
     #[command(flatten)]
@@ -130,7 +130,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let planner = Planner::new(
         &args.techniques.settings(&setup.hmd)?,
         &setup.hmd,
-        args.techniques.lenses(&setup.hmd)?,
+        args.techniques.lens.lenses(&setup.hmd)?,
         args.views.eyes(),
         args.path.fps,
     )?;

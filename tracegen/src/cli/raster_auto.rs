@@ -28,8 +28,10 @@ pub fn run(args: &RasterArgs, budget: Budget) -> anyhow::Result<()> {
     ];
     progress.stage("preparing textures and shaders", 0, "");
     let gpu = device::open(None)?;
+    let lens = args.techniques.lens.lenses(&setup.hmd)?;
     let prepared = prepare(
         setup,
+        lens,
         args.path.fps,
         &args.scene.scene,
         gpu,

@@ -1,9 +1,10 @@
 //! Flags that say what a capture may leave out or do more coarsely.
 
-use anyhow::{bail, ensure};
+use super::lens_args::LensArgs;
+use anyhow::ensure;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use formats::view::{Hmd, Lens};
+use formats::view::Hmd;
 use scene::paths::read_gazes;
 use std::path::Path;
 use std::str::FromStr;
@@ -24,10 +25,8 @@ pub struct TechniqueArgs {
     /// Leave out draws that others hide: what the last frame showed is drawn for its depth first.
     #[arg(long)]
     occlusion: bool,
-    /// Radius of the circle that the lens shows of an eye's picture, as a tangent [default: half of
-    /// the sum of the longer axis's tangents].
-    #[arg(long, value_name = "TAN", allow_hyphen_values = true)]
-    lens_radius: Option<f32>,
+    #[command(flatten)]
+    pub lens: LensArgs,
     /// Draw nothing that the lens does not show.
     #[arg(long)]
     hidden_area_mask: bool,
@@ -178,25 +177,6 @@ impl TechniqueArgs {
             },
         }))
     }
-
-    /// What the lenses show of the left and right eye's picture.
-    ///
-    /// # Errors
-    /// A radius out of range.
-    pub fn lenses(&self, hmd: &Hmd) -> anyhow::Result<[Lens; 2]> {
-        let lenses = hmd.fov.map(|fov| {
-            let lens = Lens::of(&fov);
-            let radius = self.lens_radius.unwrap_or(lens.radius);
-            Lens { radius, ..lens }
-        });
-        for lens in &lenses {
-            if let Err(broken) = lens.check() {
-                let (expected, found) = (broken.expected, broken.found);
-                bail!("--lens-radius: expected {expected}, found {found}");
-            }
-        }
-        Ok(lenses)
-    }
 }
 
 fn culling_parser() -> impl TypedValueParser<Value = Culling> {
@@ -222,7 +202,7 @@ fn gaze(text: &str) -> anyhow::Result<Gaze> {
 }
 
 /// Exactly N numbers with commas between them.
-fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
+pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
     let numbers: Option<Vec<f32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
     numbers?.try_into().ok()
 }

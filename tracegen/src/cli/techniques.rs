@@ -1,6 +1,7 @@
 //! `tracegen techniques`.
 
 use super::cache_args::CacheArgs;
+use super::lens_args::LensArgs;
 use super::path_args::PathArgs;
 use super::prepared::{Prepared, prepare};
 use super::raster;
@@ -13,7 +14,6 @@ use crate::study::rows::Row;
 use ::raster::lavapipe::device;
 use anyhow::{Context, ensure};
 use clap::Args;
-use formats::view::Lens;
 use scene::LoadOptions;
 use shell::{Progress, Threads, note};
 use std::collections::HashMap;
@@ -53,6 +53,8 @@ pub struct TechniquesArgs {
     /// Times that each frame is timed, the baseline's beside it.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
+    #[command(flatten)]
+    lens: LensArgs,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     shadows: bool,
@@ -109,6 +111,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         ));
     }
     let cascades = raster::cascades(&setup.scene, args.shadows);
+    let lens = args.lens.lenses(&setup.hmd)?;
     let mut subject = Subject {
         tool: super::tool(),
         scene: args.scene.scene.clone(),
@@ -121,7 +124,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         fps: args.path.fps,
         size_px: setup.hmd.eye_size_px,
         hmd: setup.hmd.clone(),
-        lens: setup.hmd.fov.map(|fov| Lens::of(&fov)),
+        lens,
         pixels_per_degree: image_error::pixels_per_degree(
             setup.hmd.eye_size_px[0],
             &setup.hmd.fov[0],
@@ -141,6 +144,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     let sizes = [cascades.into(), RECORD_BUDGET];
     let prepared = prepare(
         setup,
+        lens,
         args.path.fps,
         &args.scene.scene,
         gpu,

@@ -1,5 +1,6 @@
 //! The techniques by name, and the rows of a study: each technique alone, and combinations.
 
+use formats::view::Hmd;
 use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
 use techniques::{Gaze, Settings};
 use visibility::Culling;
@@ -20,6 +21,7 @@ pub struct Part {
 enum Change {
     Culling(Culling),
     Switch(Setting, fn(&mut Settings)),
+    Foveation(Foveation),
 }
 
 /// The setting that a part changes: of two parts with the same one, only one can be.
@@ -132,9 +134,9 @@ impl Part {
         parts
     }
 
-    /// Every technique with the settings that are worth a search.
+    /// Every technique with the settings that are worth a search on a display.
     #[must_use]
-    pub fn options() -> Vec<Self> {
+    pub fn options(hmd: &Hmd) -> Vec<Self> {
         let mut parts = Self::all();
         parts.extend([
             Self::far_field("far-field-0.5px", "Mono far field, 0.5 px", |s| {
@@ -169,6 +171,26 @@ impl Part {
                 },
             ),
         ]);
+        let acuity = Rates::of_acuity(hmd);
+        for (name, title, kind) in [
+            (
+                "foveation-rings-acuity",
+                "Foveation by rings where the eye cannot tell",
+                FoveationKind::Rings,
+            ),
+            (
+                "radial-density-acuity",
+                "Radial density mask where the eye cannot tell",
+                FoveationKind::RadialDensity,
+            ),
+        ] {
+            parts.push(Self {
+                name: name.to_owned(),
+                title: title.to_owned(),
+                lossless: false,
+                change: Change::Foveation(foveation(kind, acuity)),
+            });
+        }
         parts
     }
 
@@ -212,13 +234,15 @@ impl Part {
         match self.change {
             Change::Culling(_) => Setting::Culling,
             Change::Switch(setting, _) => setting,
+            Change::Foveation(_) => Setting::Foveation,
         }
     }
 
     fn apply(&self, settings: &mut Settings) {
-        match self.change {
-            Change::Culling(culling) => settings.culling = culling,
+        match &self.change {
+            Change::Culling(culling) => settings.culling = *culling,
             Change::Switch(_, change) => change(settings),
+            Change::Foveation(foveation) => settings.foveation = Some(foveation.clone()),
         }
     }
 }

@@ -5,6 +5,7 @@ use crate::study::measure::{Extent, median_s};
 use crate::study::rows::{Part, Row};
 use crate::study::world::World;
 use anyhow::bail;
+use formats::view::Hmd;
 use raster::lavapipe::Lavapipe;
 use shell::Progress;
 use std::collections::HashMap;
@@ -52,7 +53,7 @@ pub fn choose(
 ) -> anyhow::Result<Choice> {
     let path_frames = world.views.len() as u32;
     let search_frames = search_frames(path_frames);
-    let options = options(budget);
+    let options = options(budget, &world.hmd);
     progress.stage(
         "searching",
         options.len() as u64 + 1,
@@ -148,9 +149,9 @@ fn search_frames(path_frames: u32) -> Vec<u32> {
 }
 
 /// What may be used under a budget.
-fn options(budget: Budget) -> Vec<Part> {
+fn options(budget: Budget, hmd: &Hmd) -> Vec<Part> {
     let baseline = Row::baseline();
-    (Part::options().into_iter())
+    (Part::options(hmd).into_iter())
         .filter(|part| !baseline.parts.contains(part))
         .filter(|part| match budget {
             Budget::Pixels(_) => part.lossless || part.is_shift(),
@@ -177,8 +178,12 @@ mod tests {
     #[test]
     fn only_shifts_may_be_used_where_shifts_are_bounded() {
         let lossy = |part: &&Part| !part.lossless && !part.is_shift();
-        assert_eq!(options(Budget::Pixels(1.0)).iter().filter(lossy).count(), 0);
-        assert!(options(Budget::Flip(0.01)).iter().filter(lossy).count() > 0);
+        let lossy = |budget: Budget| {
+            let options = options(budget, &Hmd::default());
+            options.iter().filter(lossy).count()
+        };
+        assert_eq!(lossy(Budget::Pixels(1.0)), 0);
+        assert!(lossy(Budget::Flip(0.01)) > 0);
     }
 
     #[test]

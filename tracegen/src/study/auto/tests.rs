@@ -3,6 +3,7 @@
 use super::search::Tried;
 use super::*;
 use crate::study::rows::{Part, Row};
+use formats::view::Hmd;
 use std::convert::Infallible;
 
 /// Costs and errors of parts multiply and add up.
@@ -60,7 +61,7 @@ impl Judge for Made<'_> {
 }
 
 fn part(name: &str) -> Part {
-    Part::options()
+    Part::options(&Hmd::default())
         .into_iter()
         .find(|part| part.name == name)
         .unwrap()

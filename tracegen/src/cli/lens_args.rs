@@ -1,0 +1,64 @@
+//! Flags that say what the lenses show.
+
+use super::technique_args::numbers;
+use anyhow::bail;
+use clap::Args;
+use formats::view::{Hmd, Lens};
+use std::str::FromStr;
+
+/// What the lenses show of an eye's picture.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Techniques")]
+pub struct LensArgs {
+    /// Radius of the circle that the lens shows of an eye's picture, as a tangent [default: half of
+    /// the sum of the longer axis's tangents].
+    #[arg(long, value_name = "TAN", allow_hyphen_values = true)]
+    lens_radius: Option<f32>,
+    /// Centre of that circle, as tangents right and up of straight ahead in the right eye's picture;
+    /// the left eye's is mirrored.
+    #[arg(
+        long,
+        value_name = "X,Y",
+        default_value = "0,0",
+        allow_hyphen_values = true
+    )]
+    lens_center: Center,
+}
+
+/// `--lens-center`.
+#[derive(Clone, Copy, Debug)]
+struct Center([f32; 2]);
+
+impl FromStr for Center {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        numbers(text)
+            .map(Self)
+            .ok_or_else(|| format!("expected two tangents as in 0.05,-0.02, found '{text}'"))
+    }
+}
+
+impl LensArgs {
+    /// What the lenses show of the left and right eye's picture.
+    ///
+    /// # Errors
+    /// A radius or a centre out of range.
+    pub fn lenses(&self, hmd: &Hmd) -> anyhow::Result<[Lens; 2]> {
+        let Center([x, y]) = self.lens_center;
+        let mirrored = [-1.0, 1.0];
+        let lenses = [0, 1].map(|eye| Lens {
+            center: [x * mirrored[eye], y],
+            radius: self
+                .lens_radius
+                .unwrap_or_else(|| Lens::of(&hmd.fov[eye]).radius),
+        });
+        for lens in &lenses {
+            if let Err(broken) = lens.check() {
+                let (expected, found) = (broken.expected, broken.found);
+                bail!("--lens-radius, --lens-center: expected {expected}, found {found}");
+            }
+        }
+        Ok(lenses)
+    }
+}
