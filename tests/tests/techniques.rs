@@ -75,13 +75,22 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn a_study_tells_of_every_technique_what_it_draws_shows_and_takes() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let folder = root.path().join("study");
-    run_ok(&mut study(&folder, "superfrustum,round-robin"));
+    let output = run_ok(&mut study(&folder, "superfrustum,round-robin,multiview"));
     let manifest = manifest(&folder);
+    // Either the driver's multiview gives the same pictures (see below), or it is said that it is not used.
+    let said = String::from_utf8_lossy(&output.stderr).contains("multiview cannot be trusted");
+    assert_eq!(said, manifest.get("multiview_defect").is_some());
+    let replayed = run_ok(program("replay").arg("techniques").arg(&folder)).stdout;
+    let told = String::from_utf8_lossy(&replayed).contains("timed view by view");
+    assert_eq!(told, said);
     assert_eq!(manifest["schema"], "tracegen.techniques/1");
     assert_eq!(manifest["frames"], serde_json::json!([0, 1, 4]));
     let rows = manifest["rows"].as_array().expect("rows");
     let names: Vec<&Value> = rows.iter().map(|row| &row["technique"]).collect();
-    assert_eq!(names, ["per-eye", "superfrustum", "round-robin"]);
+    assert_eq!(
+        names,
+        ["per-eye", "superfrustum", "round-robin", "multiview"]
+    );
     let image = |row: &Value, frame: usize, eye: usize| {
         let name = row["frames"][frame]["images"][eye]
             .as_str()

@@ -52,6 +52,9 @@ pub struct Manifest {
     /// What the search for the cheapest techniques inside a budget chose.
     #[serde(default)]
     pub auto: Option<Auto>,
+    /// Why the device drew view by view where both were to be drawn at once.
+    #[serde(default)]
+    pub multiview_defect: Option<String>,
 }
 
 /// A technique, or a combination of some.

@@ -103,6 +103,13 @@ impl Views {
     }
 }
 
+/// Says that both views are not drawn at once, and why.
+pub(super) fn warn_of_multiview(defect: &str) {
+    shell::warn(&format!(
+        "multiview cannot be trusted, so views are drawn one by one: {defect}"
+    ));
+}
+
 /// Runs `tracegen raster`.
 ///
 /// # Errors
@@ -173,9 +180,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     if planner.settings().multiview
         && let Some(defect) = backend.multiview_defect()?
     {
-        shell::warn(&format!(
-            "multiview cannot be trusted, so views are drawn one by one: {defect}"
-        ));
+        warn_of_multiview(&defect);
     }
     let mut first = Some(first);
     let mut recorder = job.recorder(&tables);

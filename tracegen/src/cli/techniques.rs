@@ -11,6 +11,7 @@ use crate::study::folder::{self, Folder, RowRecord, Subject};
 use crate::study::frames;
 use crate::study::measure::{Bench, Extent};
 use crate::study::rows::Row;
+use ::raster::backend::CaptureBackend;
 use ::raster::lavapipe::device;
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -186,7 +187,15 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         records.push(row);
         record
     });
-    let manifest = folder.finish(&subject, &records, auto.as_ref())?;
+    let at_once = records.iter().any(|row| row.settings.multiview);
+    let defect = match at_once {
+        true => backend.multiview_defect()?,
+        false => None,
+    };
+    if let Some(defect) = &defect {
+        raster::warn_of_multiview(defect);
+    }
+    let manifest = folder.finish(&subject, &records, auto.as_ref(), defect.as_deref())?;
     if records
         .iter()
         .flat_map(|row| &row.frames)

@@ -135,6 +135,8 @@ struct Manifest<'a> {
     rows: &'a [RowRecord],
     #[serde(skip_serializing_if = "Option::is_none")]
     auto: Option<&'a AutoRecord>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    multiview_defect: Option<&'a str>,
 }
 
 /// A finished row on its own, with what it belongs to.
@@ -301,7 +303,8 @@ impl Folder {
         write_json(&self.row_path(name), &kept)
     }
 
-    /// Writes the manifest: the study is complete.
+    /// Writes the manifest: the study is complete. `multiview_defect` tells why the device drew view by
+    /// view where both were to be drawn at once.
     ///
     /// # Errors
     /// It cannot be written.
@@ -310,6 +313,7 @@ impl Folder {
         subject: &Subject,
         rows: &[RowRecord],
         auto: Option<&AutoRecord>,
+        multiview_defect: Option<&str>,
     ) -> anyhow::Result<PathBuf> {
         let path = self.root.join("manifest.json");
         let schema = SCHEMA;
@@ -320,6 +324,7 @@ impl Folder {
                 subject,
                 rows,
                 auto,
+                multiview_defect,
             },
         )?;
         Ok(path)

@@ -137,6 +137,14 @@ impl<'a> TechniquesReport<'a> {
                 formats::text::printable(&manifest.adapter)
             );
         }
+        for manifest in &self.manifests {
+            if let Some(defect) = &manifest.multiview_defect {
+                text += &format!(
+                    "multiview was timed view by view, counted as one submission: {}\n",
+                    formats::text::printable(defect)
+                );
+            }
+        }
         text
     }
 

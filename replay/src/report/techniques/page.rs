@@ -184,6 +184,9 @@ fn facts(manifest: &Manifest) -> Markup {
                 " (errors count inside it)"
             }
             dt { "rendered by" } dd { (manifest.adapter) ", " (manifest.driver) @if manifest.software_driver { " (in software: frame times are a processor's)" } }
+            @if let Some(defect) = &manifest.multiview_defect {
+                dt { "multiview" } dd { "timed view by view, counted as one submission: the driver's cannot be trusted (" (defect) ")" }
+            }
             dt { "measured by" } dd { (manifest.tool) "; baseline " (manifest.baseline) }
         }
     }
