@@ -6,7 +6,10 @@ use thiserror::Error;
 
 pub use crate::cache::Replacement;
 pub use crate::order::Order;
-pub use formats::footprint::{FilterOverride, LodFormula, SamplingOptions as SamplingConfig};
+use formats::footprint::MOST_ANISOTROPY;
+pub use formats::footprint::{
+    AnisotropyModel, FilterOverride, LodFormula, SamplingOptions as SamplingConfig,
+};
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
 
 /// How time passes in a replay.
@@ -288,6 +291,12 @@ impl RunConfig {
             "sampling.lod_bias",
             "-16 to 16",
             self.sampling.lod_bias.to_string(),
+        )?;
+        range(
+            (1..=MOST_ANISOTROPY).contains(&self.sampling.max_anisotropy),
+            "sampling.max_anisotropy",
+            "1 to 16",
+            self.sampling.max_anisotropy.to_string(),
         )?;
         let tmu = &self.tmu;
         range(

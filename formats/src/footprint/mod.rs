@@ -2,12 +2,15 @@
 //! against, so it is written to be read.
 //!
 //! Footprints come in a fixed order: record by record, sample by sample in shader order, the
-//! finer mip level before the coarser one, then lane by lane. Everything that counts or writes
+//! finer mip level before the coarser one, probe by probe where there are several, then lane by lane;
+//! those of an ellipse lane by lane, then row by row. Everything that counts or writes
 //! accesses follows it.
 
+mod aniso;
 mod lod;
 mod options;
 
+pub use aniso::{AnisotropyModel, Ellipse, MOST_ANISOTROPY, Probes, Reach};
 pub use lod::{fast_log2, quad_lod};
 pub use options::{FilterOverride, LodFormula, SamplingOptions};
 
@@ -107,8 +110,7 @@ pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> u32 {
     wrapped as u32
 }
 
-/// Yields the footprints of one sample of a quad record: levels from fine to coarse, lanes
-/// ascending within a level.
+/// Yields the footprints of one sample of a quad record, in the order of the module's description.
 pub fn footprints(
     record: &QuadRecord,
     extent: [u32; 2],
@@ -119,33 +121,66 @@ pub fn footprints(
     mut visit: impl FnMut(Footprint),
 ) {
     let sampler = options.filter.apply(sampler);
-    let lod = quad_lod(record, extent, texture.size, options.lod) + options.lod_bias;
-    let selection = select_levels(lod, &sampler, texture.levels);
-    let mask = if options.helper_lanes {
-        15
-    } else {
-        record.mask
+    let lanes = match options.helper_lanes {
+        true => 15,
+        false => record.mask,
     };
+    let lanes = (0..4).filter(|lane| lanes >> lane & 1 == 1);
+    let footprint = |lane: u32, level: u32, texels: [[i64; 2]; 2]| {
+        let size = texture.level_size(level);
+        let wrapped = |a: usize| {
+            let offset = i64::from(sample.offset[a]);
+            texels[a].map(|texel| wrap_texel(texel + offset, size[a], sampler.wrap[a]))
+        };
+        Footprint {
+            lane: lane as u8,
+            level: level as u8,
+            layer: sample.layer,
+            i: wrapped(0),
+            j: wrapped(1),
+        }
+    };
+    let reach = Reach::of(
+        record,
+        extent,
+        texture.size,
+        texture.levels,
+        &sampler,
+        options,
+    );
+    let (lod, probes) = match reach {
+        Reach::Isotropic => {
+            let lod = quad_lod(record, extent, texture.size, options.lod);
+            (lod + options.lod_bias, None)
+        }
+        Reach::Probes(probes) => (probes.lod, Some(probes)),
+        Reach::Ellipse(ellipse) => {
+            let size = texture.level_size(ellipse.level);
+            for lane in lanes {
+                for [x, y] in ellipse.blocks(record.lane_uv(lane), size, extent) {
+                    visit(footprint(lane, ellipse.level, [[x, x + 1], [y, y + 1]]));
+                }
+            }
+            return;
+        }
+    };
+    let selection = select_levels(lod, &sampler, texture.levels);
     for level in selection.first..selection.first + selection.count {
         let size = texture.level_size(level);
-        for lane in (0..4).filter(|lane| mask >> lane & 1 == 1) {
-            let uv = record.lane_uv(lane);
-            let axis = |a: usize| {
-                let low = texel_before_wrap(uv[a], size[a], extent[a], selection.filter)
-                    + i64::from(sample.offset[a]);
-                let high = match selection.filter {
-                    Filter::Nearest => low,
-                    Filter::Linear => low + 1,
+        for probe in 0..probes.map_or(1, |probes| probes.count) {
+            let from_middle = probes.map_or([0; 2], |probes| probes.offset(probe));
+            for lane in lanes.clone() {
+                let uv = record.lane_uv(lane);
+                let axis = |a: usize| {
+                    let at = uv[a].wrapping_add(from_middle[a]);
+                    let low = texel_before_wrap(at, size[a], extent[a], selection.filter);
+                    match selection.filter {
+                        Filter::Nearest => [low; 2],
+                        Filter::Linear => [low, low + 1],
+                    }
                 };
-                [low, high].map(|texel| wrap_texel(texel, size[a], sampler.wrap[a]))
-            };
-            visit(Footprint {
-                lane: lane as u8,
-                level: level as u8,
-                layer: sample.layer,
-                i: axis(0),
-                j: axis(1),
-            });
+                visit(footprint(lane, level, [axis(0), axis(1)]));
+            }
         }
     }
 }

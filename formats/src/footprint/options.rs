@@ -1,5 +1,6 @@
 //! What replay may change about sampling.
 
+use super::aniso::AnisotropyModel;
 use crate::texture::{Filter, MipFilter, Sampler};
 use serde::{Deserialize, Serialize};
 
@@ -51,7 +52,7 @@ pub enum LodFormula {
 }
 
 /// Everything about sampling that is not in the trace.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SamplingOptions {
     /// Filter.
@@ -62,4 +63,32 @@ pub struct SamplingOptions {
     pub lod: LodFormula,
     /// Helper lanes of partly covered quads read, too.
     pub helper_lanes: bool,
+    /// Footprints of a long and narrow pixel at most, 2 to 16; 1, the default, filters all pixels alike.
+    #[serde(skip_serializing_if = "is_one")]
+    pub max_anisotropy: u32,
+    /// How long and narrow pixels are filtered where `max_anisotropy` is above 1; `"probes"` by default.
+    #[serde(skip_serializing_if = "is_default")]
+    pub anisotropy: AnisotropyModel,
+}
+
+impl Default for SamplingOptions {
+    fn default() -> Self {
+        Self {
+            filter: FilterOverride::default(),
+            lod_bias: 0.0,
+            lod: LodFormula::default(),
+            helper_lanes: false,
+            max_anisotropy: 1,
+            anisotropy: AnisotropyModel::default(),
+        }
+    }
+}
+
+// What is not used is not written: results from before there was anisotropy stay the same.
+fn is_one(value: &u32) -> bool {
+    *value == 1
+}
+
+fn is_default(model: &AnisotropyModel) -> bool {
+    *model == AnisotropyModel::default()
 }

@@ -1,8 +1,8 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
 use crate::config::{
-    Assign, BlockOrder, FilterOverride, Hsr, LodFormula, Mode, Order, Replacement, RunConfig,
-    TextureOrder,
+    AnisotropyModel, Assign, BlockOrder, FilterOverride, Hsr, LodFormula, Mode, Order, Replacement,
+    RunConfig, TextureOrder,
 };
 use crate::size::{format_bytes, parse_bytes};
 use anyhow::{Context, Result, anyhow, ensure};
@@ -103,6 +103,13 @@ pub struct ConfigArgs {
         help_heading = "Sampling"
     )]
     lod_bias: Option<f32>,
+    /// Footprints of a long and narrow pixel at most, 1 to 16
+    #[arg(long, value_name = "N", help_heading = "Sampling")]
+    max_anisotropy: Option<u32>,
+    /// How long and narrow pixels are filtered: probes (several footprints along the longer axis),
+    /// ellipse (all texels of the pixel's ellipse)
+    #[arg(long, value_name = "MODEL", value_parser = named::<AnisotropyModel>, help_heading = "Sampling")]
+    anisotropy: Option<AnisotropyModel>,
     /// Count the helper lanes of partly covered quads, too
     #[arg(long, help_heading = "Sampling")]
     helper_lanes: bool,
@@ -203,6 +210,8 @@ impl ConfigArgs {
         set(&mut config.sampling.filter, self.filter);
         set(&mut config.sampling.lod, self.lod);
         set(&mut config.sampling.lod_bias, self.lod_bias);
+        set(&mut config.sampling.max_anisotropy, self.max_anisotropy);
+        set(&mut config.sampling.anisotropy, self.anisotropy);
         config.sampling.helper_lanes |= self.helper_lanes;
         set(&mut config.layout.texel_format, self.texel_format.map(Some));
         set(&mut config.layout.block_order, self.block_order);

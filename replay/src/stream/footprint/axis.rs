@@ -95,6 +95,16 @@ impl Axis {
         })
     }
 
+    /// Texels of the level.
+    pub fn texels(&self) -> u32 {
+        self.size as u32
+    }
+
+    /// Byte offsets of a texel and the next, before the sample's offset and wrapping.
+    pub fn pair_at(&self, texel: i64) -> [u32; 2] {
+        self.pair(texel + self.offset)
+    }
+
     #[inline(always)]
     fn pair(&self, first: i64) -> [u32; 2] {
         [self.byte(first), self.byte(first + 1)]

@@ -14,7 +14,7 @@ pub use bundle::Bundle;
 use super::StreamError;
 use crate::config::{RunConfig, SamplingConfig};
 use axis::Axis;
-use formats::footprint::{LodFormula, fast_log2, quad_lod, select_levels};
+use formats::footprint::{LodFormula, Reach, fast_log2, quad_lod, select_levels};
 use formats::textrace::{QuadRecord, Tables};
 use formats::texture::{Filter, Sampler};
 use std::sync::Arc;
@@ -34,6 +34,8 @@ pub struct Scratch {
     /// By kind of texture: its one or two levels.
     bundles: Vec<[Bundle; 2]>,
     both: Vec<bool>,
+    /// By kind of texture, where pixels may be long and narrow: all there is.
+    many: Vec<Vec<Bundle>>,
 }
 
 /// Footprint generator of a trace under one sampling and layout.
@@ -98,6 +100,7 @@ impl Footprints {
         Scratch {
             bundles: vec![[Bundle::default(); 2]; kinds],
             both: vec![false; kinds],
+            many: vec![Vec::new(); kinds],
         }
     }
 
@@ -108,7 +111,7 @@ impl Footprints {
     }
 
     /// Calls `emit` for every sample and level of a quad: records, then samples in shader order,
-    /// then levels.
+    /// then levels; where pixels may be long and narrow, several times a level.
     #[inline(always)]
     pub fn for_quad(
         &self,
@@ -118,6 +121,10 @@ impl Footprints {
         mut emit: impl FnMut(SampleRef, &Bundle),
     ) {
         let groups = &self.draws[draw as usize];
+        if self.sampling.max_anisotropy > 1 {
+            self.for_long_quad(groups, records, scratch, &mut emit);
+            return;
+        }
         for record in records {
             let Some(group) = groups.get(usize::from(record.group)) else {
                 // NO_GROUP: nothing is sampled.
@@ -132,6 +139,89 @@ impl Footprints {
                 emit(sample, first);
                 if scratch.both[slot] {
                     emit(sample, second);
+                }
+            }
+        }
+    }
+
+    /// [`Self::for_quad`] where pixels may be long and narrow.
+    #[inline(never)]
+    fn for_long_quad(
+        &self,
+        groups: &[Group],
+        records: &[QuadRecord],
+        scratch: &mut Scratch,
+        emit: &mut dyn FnMut(SampleRef, &Bundle),
+    ) {
+        for record in records {
+            let Some(group) = groups.get(usize::from(record.group)) else {
+                continue;
+            };
+            for (kind, many) in group.kinds.iter().zip(&mut scratch.many) {
+                self.long(kind, record, many);
+            }
+            for &(slot, sample) in &group.samples {
+                for bundle in &scratch.many[slot] {
+                    emit(sample, bundle);
+                }
+            }
+        }
+    }
+
+    /// Footprints of a record in one kind of texture, however long and narrow its pixels are.
+    fn long(&self, kind: &Kind, record: &QuadRecord, out: &mut Vec<Bundle>) {
+        out.clear();
+        let lanes = if self.helper_lanes {
+            15
+        } else {
+            record.mask & 15
+        };
+        let uv = [0, 1, 2, 3].map(|lane| record.lane_uv(lane));
+        let levels = kind.levels.len() as u32;
+        match Reach::of(
+            record,
+            kind.extent,
+            kind.size,
+            levels,
+            &kind.sampler,
+            &self.sampling,
+        ) {
+            Reach::Isotropic => {
+                let mut bundles = [Bundle::default(); 2];
+                let both = self.bundles(kind, record, &mut bundles);
+                out.extend(&bundles[..1 + usize::from(both)]);
+            }
+            Reach::Probes(probes) => {
+                let chosen = select_levels(probes.lod, &kind.sampler, levels);
+                for level in chosen.first..chosen.first + chosen.count {
+                    for probe in 0..probes.count {
+                        let [u, v] = probes.offset(probe);
+                        let at = uv.map(|[s, t]| [s.wrapping_add(u), t.wrapping_add(v)]);
+                        let mut bundle = Bundle::default();
+                        self.fill(kind, level, chosen.filter, lanes, &at, &mut bundle);
+                        out.push(bundle);
+                    }
+                }
+            }
+            Reach::Ellipse(ellipse) => {
+                let Level { base_bytes, u, v } = &kind.levels[ellipse.level as usize];
+                let base = base_bytes + kind.skew_bytes;
+                let line = |offset: u32| (base + offset) >> self.line_shift;
+                let size = [u.texels(), v.texels()];
+                let blocks =
+                    lanes_of(lanes).flat_map(|lane| ellipse.blocks(uv[lane], size, kind.extent));
+                for (number, [x, y]) in blocks.enumerate() {
+                    if number % 4 == 0 {
+                        out.push(Bundle::default());
+                    }
+                    let Some(bundle) = out.last_mut() else {
+                        continue;
+                    };
+                    if number % 4 == 0 {
+                        bundle.begin(ellipse.level as u8);
+                    }
+                    let ([x0, x1], [y0, y1]) = (u.pair_at(x), v.pair_at(y));
+                    bundle.push([line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)]);
                 }
             }
         }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::config::{BlockOrder, FilterOverride, LayoutConfig, LodFormula};
+use crate::config::{AnisotropyModel, BlockOrder, FilterOverride, LayoutConfig, LodFormula};
 use crate::stream::testing::tables;
 use formats::footprint::record_footprints;
 use formats::layout::Layout;
@@ -125,13 +125,19 @@ fn config() -> impl Strategy<Value = RunConfig> {
             LodFormula::Exact,
         ]),
         any::<bool>(),
+        prop::sample::select(vec![1, 1, 2, 5, 16]),
+        prop::sample::select(vec![AnisotropyModel::Probes, AnisotropyModel::Ellipse]),
     )
-        .prop_map(|(filter, lod_bias, lod, helper_lanes)| SamplingConfig {
-            filter,
-            lod_bias,
-            lod,
-            helper_lanes,
-        });
+        .prop_map(
+            |(filter, lod_bias, lod, helper_lanes, max_anisotropy, anisotropy)| SamplingConfig {
+                filter,
+                lod_bias,
+                lod,
+                helper_lanes,
+                max_anisotropy,
+                anisotropy,
+            },
+        );
     (layout, sampling, prop::sample::select(vec![16_u32, 32, 64])).prop_map(
         |(layout, sampling, line_bytes)| RunConfig {
             layout,
