@@ -175,6 +175,7 @@ impl Pipelines {
             Role::Opaque | Role::Blended => Some("fragment_early"),
             Role::Masked => Some("fragment_masked"),
             Role::MaskedRecord => Some("fragment_masked_record"),
+            Role::Record => Some("fragment_record"),
             Role::Shadow | Role::Depth => None,
             Role::ShadowMasked | Role::DepthMasked => Some("fragment_shadow"),
             Role::Mark => Some("fragment_mark"),
@@ -189,7 +190,7 @@ impl Pipelines {
         let color = [Some(wgpu::ColorTargetState {
             format,
             blend,
-            write_mask: if key.role == Role::MaskedRecord {
+            write_mask: if key.role.only_records() {
                 wgpu::ColorWrites::empty()
             } else {
                 wgpu::ColorWrites::ALL
