@@ -1,15 +1,18 @@
 //! Capture through lavapipe, Mesa's Vulkan driver on llvmpipe.
 
+mod bindings;
 mod compose;
 mod counter;
 pub mod device;
 mod multiview;
 mod pipelines;
+mod readback;
 mod records;
 mod starts;
 mod targets;
 mod upload;
 mod visible;
+mod whole;
 
 use super::backend::{CaptureBackend, Fragments, Marks, Recording, View, Work};
 use super::batches::{Batch, batches};
@@ -24,13 +27,14 @@ use device::Gpu;
 use formats::view::Lens;
 use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
+use readback::Readback;
 use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region};
 use records::RecordBuffers;
 use scene::Scene;
 use starts::{Drawn, Starts};
 use std::sync::Arc;
 use std::time::Instant;
-use targets::{ColorTarget, LayerMask, LayerTarget, Readback, ShadowMaps};
+use targets::{ColorTarget, LayerMask, LayerTarget, ShadowMaps};
 use techniques::Start;
 use techniques::plan::Picture;
 use techniques::start::Opening;
@@ -596,7 +600,7 @@ impl CaptureBackend for Lavapipe {
                     RasterError::Scene(format!("picture {number} has not been composed"))
                 })?,
         };
-        picture.read(&self.gpu, &self.readback)
+        self.readback.texels(&self.gpu, picture.view.texture())
     }
 }
 
@@ -631,13 +635,5 @@ fn bind_view(
         wgpu::BindingResource::Sampler(&sampler),
         buffers.depths.as_entire_binding(),
     ];
-    let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
-        .zip(resources)
-        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("view"),
-        layout: &pipelines.layouts.view,
-        entries: &entries,
-    })
+    bindings::group(gpu, "view", &pipelines.layouts.view, (0..).zip(resources))
 }
