@@ -1,30 +1,44 @@
-//! Hidden-surface removal on captured scenes, against pixels counted from the trace's records.
+//! Hidden-surface removal on captured scenes, against pixels counted from the trace's records and
+//! scenes whose depth complexity is known.
 
 use formats::textrace::{PassKind, Textrace, Tile};
 use parallax_tests::{program, real_scene, refuse, root, run_ok};
+use serde_json::Value;
 use std::collections::HashSet;
+use std::fs;
 use std::path::{Path, PathBuf};
 
-fn capture(scene: &str, folder: &Path) -> PathBuf {
-    let trace = folder.join("trace.textrace");
-    let arguments = ["--size", "160x180", "--no-plain", "-o"];
-    run_ok(
-        program("tracegen")
-            .args(["raster", scene])
-            .args(arguments)
-            .arg(&trace),
-    );
+/// Width and height of an eye's picture.
+const SIZE_PX: [u64; 2] = [160, 180];
+
+/// Captures a scene with its picture beside the trace; the scene's own draws decide what hides what.
+fn capture_as(scene: &str, folder: &Path, hsr: &str) -> PathBuf {
+    let trace = folder.join(format!("{hsr}.textrace"));
+    let size = format!("{}x{}", SIZE_PX[0], SIZE_PX[1]);
+    let mut command = program("tracegen");
+    command.args(["raster", scene, "--no-plain", "--hsr", hsr]);
+    command.args(["--size", &size, "-o"]).arg(&trace);
+    run_ok(command.arg("--image").arg(trace.with_extension("png")));
     trace
 }
 
-/// Fragments that a replay shades.
-fn fragments(trace: &Path, hsr: &str) -> u64 {
+fn capture(scene: &str, folder: &Path) -> PathBuf {
+    capture_as(scene, folder, "early-z")
+}
+
+/// What a replay counts.
+fn replayed(trace: &Path, hsr: &str) -> Value {
     let mut command = program("replay");
     command.arg("run").arg(trace);
     let mode = ["--mode", "functional", "--json", "--hsr", hsr];
     let json = run_ok(command.args(mode)).stdout;
-    let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
-    json["result"]["lanes"].as_u64().expect("a count")
+    let json: Value = serde_json::from_slice(&json).expect("JSON");
+    json["result"].clone()
+}
+
+/// Fragments that a replay shades.
+fn fragments(trace: &Path, hsr: &str) -> u64 {
+    replayed(trace, hsr)["lanes"].as_u64().expect("a count")
 }
 
 /// Pixels that opaque draws cover, and fragments of the other draws.
@@ -97,5 +111,89 @@ fn what_a_trace_does_not_hold_is_refused() {
         );
     };
     run("deferred", "does not tell which draws are opaque");
-    run("none", "captured with the depth test");
+    run("none", "capture with --hsr none");
+}
+
+/// Walls across the whole view at some distances, in the order in which they are drawn.
+fn walls(folder: &Path, distances_m: &[f32]) -> PathBuf {
+    let mut text = String::new();
+    for (number, z) in distances_m.iter().enumerate() {
+        text += &format!("o wall{number}\n");
+        for [x, y] in [[-1, -1], [1, -1], [1, 1], [-1, 1]] {
+            text += &format!("v {} {} {}\n", 100 * x, 100 * y, -z);
+        }
+        text += "f -4 -3 -2 -1\n";
+    }
+    let path = folder.join("walls.obj");
+    fs::write(&path, text).expect("a scene");
+    path
+}
+
+#[test]
+fn each_wall_behind_another_counts_as_often_as_the_removal_lets_it() {
+    let pixels = 2 * SIZE_PX[0] * SIZE_PX[1];
+    // How many of the walls lie before all that were drawn before them.
+    for (distances_m, nearer) in [([5.0, 7.0, 9.0], 1), ([9.0, 5.0, 7.0], 2)] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let scene = walls(folder.path(), &distances_m);
+        let captured = |hsr: &str| {
+            let trace = folder.path().join(format!("{hsr}.textrace"));
+            let mut command = program("tracegen");
+            command.arg("raster").arg(&scene).args(["--hsr", hsr]);
+            command.args(["--eye", "0,0,0", "--target", "0,0,-1"]);
+            let size = format!("{}x{}", SIZE_PX[0], SIZE_PX[1]);
+            run_ok(command.args(["--size", &size, "-o"]).arg(&trace));
+            trace
+        };
+        let (none, early) = (captured("none"), captured("early-z"));
+        assert_eq!(fragments(&none, "none"), 3 * pixels);
+        assert_eq!(fragments(&early, "early-z"), nearer * pixels);
+        assert_eq!(fragments(&early, "deferred"), pixels);
+    }
+}
+
+#[test]
+fn each_step_of_removal_leaves_fewer_quads_and_bytes_and_the_same_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [all, tested] = ["none", "early-z"].map(|hsr| capture_as("atrium", folder.path(), hsr));
+    let picture = |trace: &Path| fs::read(trace.with_extension("png")).expect("a picture");
+    assert!(picture(&all) == picture(&tested));
+    let results = [
+        replayed(&all, "none"),
+        replayed(&tested, "early-z"),
+        replayed(&tested, "deferred"),
+    ];
+    for key in ["quads", "lanes", "external_bytes"] {
+        let [none, early, deferred] =
+            (results.each_ref()).map(|result| result[key].as_u64().expect("a count"));
+        assert!(
+            none > early && early > deferred,
+            "{key} {none} {early} {deferred}"
+        );
+    }
+    for hsr in ["early-z", "deferred"] {
+        let mut command = program("replay");
+        command.arg("run").arg(&all).args(["--hsr", hsr]);
+        refuse(
+            &mut command,
+            &["holds no depths", "without --hsr none", hsr],
+        );
+    }
+}
+
+#[test]
+fn a_capture_of_every_fragment_refuses_techniques_that_leave_some_out_by_depth() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let trace = folder.path().join("none.textrace");
+    for (flags, expected) in [
+        (["--far-field", "2"], "found --far-field"),
+        (["--auto", "flip=0.01"], "found --auto"),
+    ] {
+        let mut command = program("tracegen");
+        command
+            .args(["raster", "teapot", "--hsr", "none", "-o"])
+            .arg(&trace);
+        refuse(command.args(flags), &["--hsr none", expected]);
+    }
+    assert!(!trace.exists());
 }

@@ -1,6 +1,7 @@
 //! Hidden-surface removal: which of a trace's fragments a renderer shades.
 //!
-//! A trace holds, in submission order, what passed the depth test when it was drawn. A deferred
+//! A trace holds, in submission order, what passed the depth test when it was drawn, or all that
+//! the draws cover. Without depth the one does not follow from the other. A deferred
 //! renderer first finds what is seen of a tile and then shades it: of each pixel, the last opaque
 //! fragment, which lies before all earlier ones, and whatever is drawn over it that only shading
 //! tells to be seen or not (alpha-masked and blended draws).
@@ -26,12 +27,12 @@ pub fn shaded<'a>(source: &'a dyn TileSource, hsr: Hsr) -> Result<Shaded<'a>, St
     let tested = surfaces.is_none_or(|s| s.depth_tested);
     let hidden = match (hsr, tested) {
         (Hsr::None, true) => Err(refused(
-            "early-z or deferred, since the trace was captured with the depth test",
+            "early-z or deferred, since the trace was captured with the depth test (for none, capture with --hsr none)",
             "none",
         )),
         (Hsr::None, false) | (Hsr::EarlyZ, true) => Ok(None),
         (Hsr::EarlyZ | Hsr::Deferred, false) => Err(refused(
-            "none, since the trace was captured without the depth test",
+            "none, since the trace was captured without the depth test and holds no depths (for the others, capture without --hsr none)",
             if hsr == Hsr::EarlyZ {
                 "early-z"
             } else {
@@ -280,7 +281,7 @@ mod tests {
             (
                 None,
                 Hsr::None,
-                "hsr: expected early-z or deferred, since the trace was captured with the depth test, found none",
+                "hsr: expected early-z or deferred, since the trace was captured with the depth test (for none, capture with --hsr none), found none",
             ),
             (
                 None,
@@ -290,7 +291,7 @@ mod tests {
             (
                 surfaces(false),
                 Hsr::Deferred,
-                "hsr: expected none, since the trace was captured without the depth test, found deferred",
+                "hsr: expected none, since the trace was captured without the depth test and holds no depths (for the others, capture without --hsr none), found deferred",
             ),
         ];
         for (surfaces, hsr, expected) in cases {

@@ -31,6 +31,25 @@ impl View<'_> {
     }
 }
 
+/// Which fragments of a layer are recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Fragments {
+    /// Those that pass the depth test when they are drawn.
+    #[default]
+    DepthTested,
+    /// All that the draws cover, whatever other draws lie before them. What a layer starts with
+    /// (the far plane, its mask) still bounds them.
+    All,
+}
+
+/// What is recorded of a region, and who takes it.
+pub struct Recording<'s, 't> {
+    /// Which fragments.
+    pub fragments: Fragments,
+    /// Gets every record of the region (see [`record::Capturer::capture`]).
+    pub sink: &'s mut Sink<'t>,
+}
+
 /// Where a draw is visible.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Marks {
@@ -122,17 +141,17 @@ pub trait CaptureBackend {
     /// Driver errors.
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError>;
 
-    /// Renders a region of a layer into the layer's target and, where there is a `sink`, hands it
-    /// every record of the region (see [`record::Capturer::capture`]).
+    /// Renders a region of a layer into the layer's target, and records it where that is asked
+    /// for. The picture is the same either way.
     ///
     /// # Errors
-    /// Driver errors, and what `sink` returns.
+    /// Driver errors, and what the recording's sink returns.
     fn render(
         &mut self,
         draws: &DrawList,
         view: &View<'_>,
         region: Region,
-        sink: Option<&mut Sink<'_>>,
+        recording: Option<Recording<'_, '_>>,
     ) -> Result<Captured, RasterError>;
 
     /// Renders the depth of a view's opaque and masked draws alone, and reads it: row by row, 1 where

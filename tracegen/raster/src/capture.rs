@@ -1,6 +1,6 @@
 //! Captures the frames of a scene into a trace.
 
-use super::backend::{CaptureBackend, View};
+use super::backend::{CaptureBackend, Fragments, Recording, View};
 use super::cascades;
 use super::draws::{DrawCall, DrawList, DrawMode};
 use super::error::RasterError;
@@ -32,6 +32,8 @@ pub struct CaptureJob<'a> {
     pub planner: &'a Planner,
     /// What is left out because nobody sees it.
     pub skips: Skips,
+    /// Which fragments are recorded.
+    pub fragments: Fragments,
 }
 
 /// The pictures of one frame, one an eye: sRGB RGBA8.
@@ -66,8 +68,10 @@ impl CaptureJob<'_> {
     /// The recorder of this job's passes; `tables` are the trace's.
     #[must_use]
     pub fn recorder<'t>(&self, tables: &'t Tables) -> Recorder<'t> {
-        let modes = self.draws.calls.iter().map(|call| call.mode);
-        Recorder::new(tables, modes.map(|mode| mode == DrawMode::Masked).collect())
+        let replayed = |call: &DrawCall| {
+            self.fragments == Fragments::DepthTested && call.mode == DrawMode::Masked
+        };
+        Recorder::new(tables, self.draws.calls.iter().map(replayed).collect())
     }
 
     /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds what each
@@ -149,7 +153,11 @@ impl CaptureJob<'_> {
                     .map(|axis: usize| (layer.size_px[axis] - origin_px[axis]).min(TILE_SIZE_PX)),
             };
             backend.render(self.draws, &view, tile, None)?;
-            backend.render(self.draws, &view, tile, Some(&mut |_| Ok(())))?;
+            let recording = Recording {
+                fragments: self.fragments,
+                sink: &mut |_| Ok(()),
+            };
+            backend.render(self.draws, &view, tile, Some(recording))?;
         }
         if self.planner.settings().multiview {
             // Finds out whether the driver can be trusted.
@@ -222,6 +230,7 @@ impl CaptureJob<'_> {
                 draws: self.draws,
                 view,
                 skip_regions: self.skips.regions,
+                fragments: self.fragments,
             };
             let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
             counts += recorded.counts;
@@ -264,6 +273,7 @@ struct ViewCapturer<'a> {
     draws: &'a DrawList,
     view: View<'a>,
     skip_regions: bool,
+    fragments: Fragments,
 }
 
 impl Capturer for ViewCapturer<'_> {
@@ -284,6 +294,10 @@ impl Capturer for ViewCapturer<'_> {
             visible: &touching,
             ..self.view
         };
-        self.backend.render(self.draws, &view, region, Some(sink))
+        let recording = Recording {
+            fragments: self.fragments,
+            sink,
+        };
+        (self.backend).render(self.draws, &view, region, Some(recording))
     }
 }

@@ -1,6 +1,6 @@
 //! The draws of a scene in submission order, and their entries in the trace's tables.
 
-use super::backend::View;
+use super::backend::{Fragments, View};
 use super::error::RasterError;
 use super::groups::MaterialGroups;
 use formats::textrace::{Draw, Sample, Surfaces, UvGroup};
@@ -120,11 +120,11 @@ pub struct DrawList {
 }
 
 impl DrawList {
-    /// What a trace says of the draws: which of them hide what lies behind.
+    /// What a trace of these fragments says of the draws: which of them hide what lies behind.
     #[must_use]
-    pub fn surfaces(&self) -> Surfaces {
+    pub fn surfaces(&self, fragments: Fragments) -> Surfaces {
         Surfaces {
-            depth_tested: true,
+            depth_tested: fragments == Fragments::DepthTested,
             not_opaque: Surfaces::ranges(self.calls.iter().map(|c| c.mode == DrawMode::Opaque)),
         }
     }
@@ -425,7 +425,7 @@ mod tests {
             (0, DrawMode::Blended, 7),
         ];
         assert_eq!(rows, expected);
-        assert_eq!(draws.surfaces().not_opaque, [[1, 2]]);
+        assert_eq!(draws.surfaces(Fragments::All).not_opaque, [[1, 2]]);
     }
 
     #[test]

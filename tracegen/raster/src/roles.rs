@@ -15,6 +15,8 @@ pub(crate) enum Role {
     Masked,
     /// Records of an alpha-masked draw; writes neither colour nor depth.
     MaskedRecord,
+    /// Records of what lies before the depth there; writes neither colour nor depth.
+    Record,
     /// Depth of a shadow caster.
     Shadow,
     /// Depth of an alpha-masked shadow caster.
@@ -45,6 +47,11 @@ impl Role {
         self.casts() || alone.contains(&self)
     }
 
+    /// It writes nothing but records.
+    pub fn only_records(self) -> bool {
+        matches!(self, Self::Record | Self::MaskedRecord)
+    }
+
     /// It marks draws: fragments as far as the depth count as well.
     pub fn marks(self) -> bool {
         matches!(self, Self::Mark | Self::MarkMasked)
@@ -52,14 +59,19 @@ impl Role {
 
     /// Neither texture nor vertex colour changes what it does.
     fn is_plain(self) -> bool {
-        matches!(self, Self::Shadow | Self::Depth | Self::Mark)
+        matches!(self, Self::Record | Self::Shadow | Self::Depth | Self::Mark)
     }
 
     /// Depth is tested and stays.
     pub fn keeps_depth(self) -> bool {
         matches!(
             self,
-            Self::Blended | Self::MaskedRecord | Self::CountBlended | Self::Mark | Self::MarkMasked
+            Self::Blended
+                | Self::Record
+                | Self::MaskedRecord
+                | Self::CountBlended
+                | Self::Mark
+                | Self::MarkMasked
         )
     }
 }
@@ -71,6 +83,8 @@ pub(crate) enum Purpose {
     Plain,
     /// The picture and the records.
     Capture,
+    /// The records alone, of what lies before the depth that the layer starts with.
+    Record,
     /// A shadow map.
     Shadow,
     /// The additive count of fragments.
@@ -88,6 +102,7 @@ pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
         (DrawMode::Blended, Purpose::Plain | Purpose::Capture) => &[Role::Blended],
         (DrawMode::Masked, Purpose::Plain) => &[Role::Masked],
         (DrawMode::Masked, Purpose::Capture) => &[Role::MaskedRecord, Role::Masked],
+        (_, Purpose::Record) => &[Role::Record],
         (DrawMode::Opaque, Purpose::Shadow) => &[Role::Shadow],
         (DrawMode::Masked, Purpose::Shadow) => &[Role::ShadowMasked],
         (DrawMode::Opaque, Purpose::Count) => &[Role::Count],
@@ -152,8 +167,9 @@ impl PipelineKey {
         cascades: u32,
     ) -> Self {
         // The colour pass of a masked draw records nothing: its records come from a role of their own.
-        let capture = purpose == Purpose::Capture && role != Role::Masked;
-        let lit = matches!(purpose, Purpose::Plain | Purpose::Capture);
+        let records = matches!(purpose, Purpose::Capture | Purpose::Record);
+        let capture = records && role != Role::Masked;
+        let lit = records || purpose == Purpose::Plain;
         Self {
             role,
             capture,

@@ -4,6 +4,7 @@ use super::cache_args::CacheArgs;
 use super::raster;
 use super::scene_args::SceneSetup;
 use crate::study::world::World;
+use ::raster::backend::Fragments;
 use ::raster::draws::DrawList;
 use ::raster::lavapipe::{Lavapipe, device::Gpu};
 use ::raster::lighting::Lighting;
@@ -40,7 +41,15 @@ pub fn prepare(
     }
     let size_px = setup.hmd.eye_size_px;
     let backend = Lavapipe::on(gpu, scene, &draws, &uploads, size_px, record_budget)?;
-    let tables = raster::tables(&setup, spec, &draws, &uploads, &backend, Vec::new());
+    let tables = raster::tables(
+        &setup,
+        spec,
+        &draws,
+        &uploads,
+        &backend,
+        Vec::new(),
+        Fragments::DepthTested,
+    );
     let bounds = scene.bounds().unwrap_or_default();
     let world = World {
         draws,

@@ -11,7 +11,7 @@ use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
 use formats::view::{Eye, FrameViews};
-use raster::backend::{CaptureBackend, Work};
+use raster::backend::{CaptureBackend, Fragments, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
 use raster::error::RasterError;
@@ -59,6 +59,9 @@ pub struct RasterArgs {
     /// Skip the render without capture that times and pictures are compared with.
     #[arg(long)]
     no_plain: bool,
+    /// Hidden-surface removal of the renderer whose texture accesses are captured.
+    #[arg(long, value_enum, default_value_t = Hsr::EarlyZ)]
+    hsr: Hsr,
     /// Memory for raw records; a frame that needs more is captured in parts. The driver's limit is
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
@@ -93,6 +96,24 @@ enum Views {
     Right,
 }
 
+/// Hidden-surface removal while fragments are recorded; the words of `replay run --hsr`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Hsr {
+    /// Every fragment that a draw covers, whatever lies before it; for `replay run --hsr none`.
+    None,
+    /// Fragments that pass the depth test when they are drawn; for `--hsr early-z` and `deferred`.
+    EarlyZ,
+}
+
+impl Hsr {
+    fn fragments(self) -> Fragments {
+        match self {
+            Self::None => Fragments::All,
+            Self::EarlyZ => Fragments::DepthTested,
+        }
+    }
+}
+
 impl Views {
     fn eyes(self) -> &'static [Eye] {
         match self {
@@ -110,6 +131,21 @@ pub(super) fn warn_of_multiview(defect: &str) {
     ));
 }
 
+impl RasterArgs {
+    /// Refuses what leaves fragments out by depth, or is measured with the depth test.
+    fn check_without_depth_test(&self) -> anyhow::Result<()> {
+        ensure!(
+            !self.techniques.has_far_field(),
+            "--hsr none: expected every fragment to be drawn, found --far-field, whose layers hold only what the depth of others leaves open"
+        );
+        ensure!(
+            self.auto.is_none(),
+            "--hsr none: expected techniques by name, found --auto, which measures frames with the depth test"
+        );
+        Ok(())
+    }
+}
+
 /// Runs `tracegen raster`.
 ///
 /// # Errors
@@ -119,6 +155,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     args.threads.start()?;
     args.scene
         .check_outputs(&args.output, args.image.as_deref())?;
+    if args.hsr == Hsr::None {
+        args.check_without_depth_test()?;
+    }
     if let Some(budget) = args.auto {
         return super::raster_auto::run(args, budget);
     }
@@ -161,6 +200,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         &uploads,
         &backend,
         passes,
+        job.fragments,
     );
     let (total, cached, unseen) = (uploads.textures.len(), uploads.cached, uploads.unseen());
     let texels = format!(
@@ -278,6 +318,7 @@ fn job<'a>(
         shadow_range_m: shadow_range_m(setup, bounds),
         planner,
         skips: Skips::without(&args.no_skip),
+        fragments: args.hsr.fragments(),
     }
 }
 
@@ -300,7 +341,7 @@ pub(super) fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Ve
     [near, farthest.min(setup.camera.far).max(2.0 * near)]
 }
 
-/// The tables of a trace of the scene's frames.
+/// The tables of a trace of the scene's frames, of which `fragments` are recorded.
 pub(super) fn tables(
     setup: &SceneSetup,
     spec: &str,
@@ -308,6 +349,7 @@ pub(super) fn tables(
     uploads: &TextureSet,
     backend: &dyn CaptureBackend,
     passes: Vec<Pass>,
+    fragments: Fragments,
 ) -> Tables {
     let textures = draws.textures(uploads);
     let (samplers, draw_table) = draws.tables(&setup.scene, uploads, &textures);
@@ -323,7 +365,7 @@ pub(super) fn tables(
             seed: 0,
             hmd: setup.hmd.clone(),
             frames: setup.frames.clone(),
-            surfaces: Some(draws.surfaces()),
+            surfaces: Some(draws.surfaces(fragments)),
         },
         textures,
         samplers,

@@ -125,6 +125,11 @@ impl FromStr for RatesFlag {
 }
 
 impl TechniqueArgs {
+    /// Far geometry has a layer of its own.
+    pub fn has_far_field(&self) -> bool {
+        self.far_field.is_some()
+    }
+
     /// What is left out or done more coarsely.
     ///
     /// # Errors

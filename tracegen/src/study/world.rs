@@ -2,7 +2,7 @@
 
 use formats::textrace::{Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
-use raster::backend::{CaptureBackend, Work};
+use raster::backend::{CaptureBackend, Fragments, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
 use raster::error::RasterError;
@@ -76,6 +76,7 @@ impl World {
             planner,
             // What is searched for anew in every frame would hide what the techniques find.
             skips: Skips::NONE,
+            fragments: Fragments::DepthTested,
         }
     }
 

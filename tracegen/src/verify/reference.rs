@@ -1,14 +1,14 @@
 //! The brute-force rasteriser.
 
 use glam::{DVec2, DVec4, Vec4};
-use raster::backend::View;
+use raster::backend::{Fragments, View};
 use raster::draws::{DrawCall, DrawList, DrawMode};
 use scene::{Scene, TextureRef};
 
 /// Steps per pixel to which llvmpipe snaps vertices.
 const SNAP: f64 = 256.0;
 
-/// A fragment that survives the depth test.
+/// A fragment that is recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fragment {
     /// Column and row of the pixel.
@@ -43,13 +43,14 @@ struct Projected {
 }
 
 /// Renders a view of `draws`; `alpha_passes` decides the alpha test of masked draws from the
-/// draw and the coordinates. Fragments come in submission order.
+/// draw and the coordinates. The `recorded` fragments come in submission order.
 pub fn render(
     scene: &Scene,
     draws: &DrawList,
     view: &View<'_>,
     size_px: [u32; 2],
     alpha_passes: &dyn Fn(&DrawCall, DVec2) -> bool,
+    recorded: Fragments,
 ) -> Vec<Fragment> {
     let mut fragments = Vec::new();
     let mut depth_buffer = vec![1.0_f32; size_px[0] as usize * size_px[1] as usize];
@@ -103,7 +104,7 @@ pub fn render(
                             DrawMode::Masked => alpha_passes(call, uv),
                             DrawMode::Blended => false,
                         };
-                        if writes {
+                        if writes && recorded == Fragments::DepthTested {
                             *slot = depth;
                         }
                         let top_left = at(quad);

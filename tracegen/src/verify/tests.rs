@@ -6,7 +6,7 @@ use formats::textrace::{SUBTEXELS, Tables, Textrace, TextraceWriter, Tile, Trace
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
-use raster::backend::{CaptureBackend, View, Work};
+use raster::backend::{CaptureBackend, Fragments, View, Work};
 use raster::capture::CaptureJob;
 use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
@@ -20,6 +20,7 @@ use techniques::{Layer, Planner, Settings, Skips};
 use textures::TextureSet;
 
 mod culling;
+mod every_fragment;
 mod far_field;
 mod layers;
 mod motion;
@@ -76,6 +77,7 @@ fn job<'a>(scene: &'a Scene, draws: &'a DrawList, planner: &'a Planner) -> Captu
         shadow_range_m: [0.1, 40.0],
         planner,
         skips: Skips::default(),
+        fragments: Fragments::DepthTested,
     }
 }
 
@@ -105,10 +107,11 @@ fn capture_as(
     plain: bool,
 ) -> Result<Captured, RasterError> {
     let skips = Skips::default();
-    Ok(capture_skipping(planner, scene, cascades, budget, plain, skips)?.0)
+    let tested = Fragments::DepthTested;
+    Ok(capture_skipping(planner, scene, cascades, budget, plain, skips, tested)?.0)
 }
 
-/// As [`capture_as`], with the given skips; also what they left out of the textures and of the frame.
+/// As [`capture_as`], with the given skips and fragments; also what they left out of the textures and of the frame.
 fn capture_skipping(
     planner: &Planner,
     scene: &Scene,
@@ -116,12 +119,14 @@ fn capture_skipping(
     budget: u64,
     plain: bool,
     skips: Skips,
+    fragments: Fragments,
 ) -> Result<(Captured, TextureSet, Skipped), RasterError> {
     let size_px = planner.hmd().eye_size_px;
     let draws = DrawList::new(scene, cascades).unwrap();
     let views = views(scene, size_px);
     let job = CaptureJob {
         skips,
+        fragments,
         ..job(scene, &draws, planner)
     };
     let finest = job.finest_levels(std::slice::from_ref(&views))?;
@@ -141,7 +146,7 @@ fn capture_skipping(
             seed: 0,
             hmd: display(size_px),
             frames: vec![views.clone()],
-            surfaces: None,
+            surfaces: Some(draws.surfaces(fragments)),
         },
         textures,
         samplers,
@@ -207,7 +212,11 @@ fn agreement(
         lighting: &lighting,
         visible: &[],
     };
-    let fragments = reference::render(scene, &draws, &view, size_px, alpha);
+    let recorded = match &captured.tables.meta.surfaces {
+        Some(surfaces) if !surfaces.depth_tested => Fragments::All,
+        _ => Fragments::DepthTested,
+    };
+    let fragments = reference::render(scene, &draws, &view, size_px, alpha, recorded);
     let columns = captured.tables.passes[pass].tiles[0];
     let tiles = (0..)
         .zip(&captured.tiles[pass])

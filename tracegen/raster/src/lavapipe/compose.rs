@@ -1,8 +1,9 @@
 //! What is done with whole layers: masks before their draws, pictures of them after.
 
+use super::bindings;
 use super::device::Gpu;
-use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
 use super::targets::{ColorTarget, LayerTarget};
+use super::whole::Whole;
 use crate::error::RasterError;
 use formats::view::TILE_SIZE_PX;
 use techniques::Mask;
@@ -46,33 +47,27 @@ impl Composer {
                     label: Some("layers"),
                     source: wgpu::ShaderSource::Wgsl(source.into()),
                 });
-            let flags = texture_of(wgpu::TextureSampleType::Uint);
-            let mask_layout = layout(gpu, &[flags]);
-            let uniform = wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Uniform,
-                has_dynamic_offset: false,
-                min_binding_size: None,
+            let flags = bindings::texture(wgpu::TextureSampleType::Uint);
+            let color = bindings::texture(wgpu::TextureSampleType::Float { filterable: false });
+            let layout = |types: &[wgpu::BindingType]| {
+                bindings::fragment_layout(gpu, "layers", (0..).zip(types.iter().copied()))
             };
-            let color = texture_of(wgpu::TextureSampleType::Float { filterable: false });
-            let part_layout = layout(gpu, &[uniform, color, flags]);
-            let depth = wgpu::DepthStencilState {
-                format: DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Always),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
+            let mask_layout = layout(&[flags]);
+            let part_layout = layout(&[bindings::uniform(), color, flags]);
+            let whole = |groups: &[&wgpu::BindGroupLayout], writes_depth, fragment| {
+                let layout = bindings::pipeline_layout(gpu, groups);
+                let whole = Whole {
+                    module: &module,
+                    layout: &layout,
+                    vertex: "vertex_whole",
+                    writes_depth,
+                    multiview_mask: None,
+                };
+                whole.pipeline(gpu, fragment)
             };
-            let compose = |entry_point| {
-                pipeline(
-                    gpu,
-                    &module,
-                    &[&mask_layout, &part_layout],
-                    entry_point,
-                    None,
-                )
-            };
+            let compose = |fragment| whole(&[&mask_layout, &part_layout], false, fragment);
             Self {
-                mask: pipeline(gpu, &module, &[&mask_layout], "fragment_mask", Some(depth)),
+                mask: whole(&[&mask_layout], true, "fragment_mask"),
                 filters: [
                     (Filter::Copy, compose("fragment_copy")),
                     (Filter::Bilinear, compose("fragment_bilinear")),
@@ -91,14 +86,8 @@ impl Composer {
     }
 
     fn mask_bindings(&self, gpu: &Gpu, flags: &wgpu::TextureView) -> wgpu::BindGroup {
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("mask"),
-            layout: &self.mask_layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::TextureView(flags),
-            }],
-        })
+        let flags = wgpu::BindingResource::TextureView(flags);
+        bindings::group(gpu, "mask", &self.mask_layout, [(0, flags)])
     }
 
     /// Makes a picture of parts of layers.
@@ -170,82 +159,8 @@ impl Composer {
             wgpu::BindingResource::TextureView(&layer.color.view),
             wgpu::BindingResource::TextureView(tiles.as_ref().unwrap_or(&self.absent)),
         ];
-        let entries: Vec<_> = (0..)
-            .zip(resources)
-            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-            .collect();
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("part"),
-            layout: &self.part_layout,
-            entries: &entries,
-        })
+        bindings::group(gpu, "part", &self.part_layout, (0..).zip(resources))
     }
-}
-
-fn texture_of(sample_type: wgpu::TextureSampleType) -> wgpu::BindingType {
-    wgpu::BindingType::Texture {
-        sample_type,
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    }
-}
-
-/// What fragments read, binding by binding.
-fn layout(gpu: &Gpu, types: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
-    let entries: Vec<_> = (0..)
-        .zip(types)
-        .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty: *ty,
-            count: None,
-        })
-        .collect();
-    gpu.device
-        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("layers"),
-            entries: &entries,
-        })
-}
-
-/// Draws the fragment entry point over the whole target.
-fn pipeline(
-    gpu: &Gpu,
-    module: &wgpu::ShaderModule,
-    groups: &[&wgpu::BindGroupLayout],
-    entry_point: &str,
-    depth_stencil: Option<wgpu::DepthStencilState>,
-) -> wgpu::RenderPipeline {
-    let groups: Vec<_> = groups.iter().map(|group| Some(*group)).collect();
-    let layout = gpu
-        .device
-        .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &groups,
-            immediate_size: 0,
-        });
-    gpu.device
-        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(entry_point),
-            layout: Some(&layout),
-            vertex: wgpu::VertexState {
-                module,
-                entry_point: Some("vertex_whole"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil,
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module,
-                entry_point: Some(entry_point),
-                compilation_options: Default::default(),
-                targets: &[Some(COLOR_FORMAT.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
 }
 
 /// A texture of a byte a pixel: 1 where the mask is set.

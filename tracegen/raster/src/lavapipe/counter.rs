@@ -3,6 +3,7 @@
 
 use super::Lavapipe;
 use super::pipelines::DEPTH_FORMAT;
+use super::targets::attachment;
 use crate::backend::View;
 use crate::draws::{DrawList, DrawMode};
 use crate::error::RasterError;
@@ -28,33 +29,9 @@ impl Lavapipe {
         );
         let every: Vec<u32> = (0..draws.calls.len() as u32).collect();
         let plan = self.plan(draws, &every, Purpose::Count)?;
-        let [width, height] = view.layer.size_px;
-        let size = wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        };
-        let texture = |format, usage| {
-            self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: None,
-                size,
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
-                view_formats: &[],
-            })
-        };
+        let texture = |format, usage| attachment(&self.gpu, view.layer.size_px, 1, format, usage);
         let counts = texture(wgpu::TextureFormat::R16Float, wgpu::TextureUsages::COPY_SRC);
         let depth = texture(DEPTH_FORMAT, wgpu::TextureUsages::empty());
-        let row_bytes = (width * 2).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let readback = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: u64::from(row_bytes) * u64::from(height),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
         let data = ViewData::of_eye(view, self.buffers.capacity);
         self.gpu
             .queue
@@ -84,73 +61,17 @@ impl Lavapipe {
         pass.set_bind_group(0, &self.eye_bindings, &[]);
         self.issue(&mut pass, draws, &plan);
         drop(pass);
-        encoder.copy_texture_to_buffer(
-            counts.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &readback,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(row_bytes),
-                    rows_per_image: None,
-                },
-            },
-            size,
-        );
         self.gpu.queue.submit([encoder.finish()]);
-        self.gpu.read(&readback, 0..readback.size(), |bytes| {
-            let row = |row: &[u8]| -> Vec<u32> {
-                row.chunks_exact(2)
-                    .take(width as usize)
-                    .map(|h| half_to_integer(u16::from_le_bytes([h[0], h[1]])))
-                    .collect()
-            };
-            Ok(bytes
-                .chunks_exact(row_bytes as usize)
-                .flat_map(row)
-                .collect())
-        })
+        let halves: Vec<u16> = self.readback.texels(&self.gpu, &counts)?;
+        Ok(halves.into_iter().map(half_to_integer).collect())
     }
-}
 
-impl Lavapipe {
     /// Depths of a layer that has been rendered, row by row.
     ///
     /// # Errors
     /// Driver errors.
     pub fn depths(&self, layer: usize) -> Result<Vec<f32>, RasterError> {
-        let texture = self.target(layer)?.depth_view.texture();
-        let size = texture.size();
-        let row_bytes = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let readback = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: u64::from(row_bytes) * u64::from(size.height),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &readback,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(row_bytes),
-                    rows_per_image: None,
-                },
-            },
-            size,
-        );
-        self.gpu.queue.submit([encoder.finish()]);
-        self.gpu.read(&readback, 0..readback.size(), |bytes| {
-            let row = |row: &[u8]| -> Vec<f32> {
-                let texels = row.chunks_exact(4).take(size.width as usize);
-                texels.map(bytemuck::pod_read_unaligned).collect()
-            };
-            Ok(bytes
-                .chunks_exact(row_bytes as usize)
-                .flat_map(row)
-                .collect())
-        })
+        (self.readback).texels(&self.gpu, self.target(layer)?.depth_view.texture())
     }
 }
 

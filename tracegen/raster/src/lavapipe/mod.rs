@@ -1,17 +1,20 @@
 //! Capture through lavapipe, Mesa's Vulkan driver on llvmpipe.
 
+mod bindings;
 mod compose;
 mod counter;
 pub mod device;
 mod multiview;
 mod pipelines;
+mod readback;
 mod records;
 mod starts;
 mod targets;
 mod upload;
 mod visible;
+mod whole;
 
-use super::backend::{CaptureBackend, Marks, View, Work};
+use super::backend::{CaptureBackend, Fragments, Marks, Recording, View, Work};
 use super::batches::{Batch, batches};
 use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
@@ -24,13 +27,14 @@ use device::Gpu;
 use formats::view::Lens;
 use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
-use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region, Sink};
+use readback::Readback;
+use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region};
 use records::RecordBuffers;
 use scene::Scene;
 use starts::{Drawn, Starts};
 use std::sync::Arc;
 use std::time::Instant;
-use targets::{ColorTarget, LayerMask, LayerTarget, Readback, ShadowMaps};
+use targets::{ColorTarget, LayerMask, LayerTarget, ShadowMaps};
 use techniques::Start;
 use techniques::plan::Picture;
 use techniques::start::Opening;
@@ -399,14 +403,9 @@ impl CaptureBackend for Lavapipe {
         draws: &DrawList,
         view: &View<'_>,
         region: Region,
-        sink: Option<&mut Sink<'_>>,
+        recording: Option<Recording<'_, '_>>,
     ) -> Result<Captured, RasterError> {
-        let purpose = if sink.is_some() {
-            Purpose::Capture
-        } else {
-            Purpose::Plain
-        };
-        if let (Purpose::Capture, Some(what)) = (purpose, &self.gpu.no_capture) {
+        if let (Some(_), Some(what)) = (&recording, &self.gpu.no_capture) {
             return Err(RasterError::Unsupported {
                 driver: self.gpu.driver.clone(),
                 what: what.clone(),
@@ -418,7 +417,17 @@ impl CaptureBackend for Lavapipe {
         let Some(region) = self.target(view.target)?.open_part(region) else {
             return Ok(Captured::Complete);
         };
-        let plan = self.plan(draws, view.visible, purpose)?;
+        // All fragments are recorded before any draw writes depth.
+        let fragments = recording.as_ref().map(|recording| recording.fragments);
+        let purposes: &[Purpose] = match fragments {
+            None => &[Purpose::Plain],
+            Some(Fragments::DepthTested) => &[Purpose::Capture],
+            Some(Fragments::All) => &[Purpose::Record, Purpose::Plain],
+        };
+        let plan = (purposes.iter())
+            .map(|purpose| self.plan(draws, view.visible, *purpose))
+            .collect::<Result<Vec<_>, _>>()?
+            .concat();
         self.work.regions += 1;
         self.work.bytes_uploaded += size_of::<ViewData>() as u64 + 4;
         if view.layer.start != Start::Sky && self.starts.is_none() {
@@ -486,7 +495,7 @@ impl CaptureBackend for Lavapipe {
             gpu.queue.submit([encoder.finish()]);
         })?;
         self.work.state_changes += state_changes(draws, &plan);
-        let Some(sink) = sink else {
+        let Some(Recording { fragments, sink }) = recording else {
             let submitted = Instant::now();
             gpu.wait("rendering a layer")?;
             self.work.submitting += submitted - start;
@@ -500,7 +509,8 @@ impl CaptureBackend for Lavapipe {
             return Ok(Captured::Overflow { needed });
         }
         if needed > 0 {
-            let depths = if buffers.has_depths {
+            // Without the depth test, that of masked draws is not replayed either.
+            let depths = if buffers.has_depths && fragments == Fragments::DepthTested {
                 needed * DEPTH_BYTES
             } else {
                 0
@@ -590,7 +600,7 @@ impl CaptureBackend for Lavapipe {
                     RasterError::Scene(format!("picture {number} has not been composed"))
                 })?,
         };
-        picture.read(&self.gpu, &self.readback)
+        self.readback.texels(&self.gpu, picture.view.texture())
     }
 }
 
@@ -625,13 +635,5 @@ fn bind_view(
         wgpu::BindingResource::Sampler(&sampler),
         buffers.depths.as_entire_binding(),
     ];
-    let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
-        .zip(resources)
-        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("view"),
-        layout: &pipelines.layouts.view,
-        entries: &entries,
-    })
+    bindings::group(gpu, "view", &pipelines.layouts.view, (0..).zip(resources))
 }

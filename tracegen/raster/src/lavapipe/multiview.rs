@@ -5,6 +5,8 @@
 
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, Pipelines, VIEW_COUNT, VIEWS};
+use super::readback::Readback;
+use super::targets::attachment;
 use super::{Lavapipe, bind_view, state_changes};
 use crate::backend::{CaptureBackend, View};
 use crate::draws::DrawList;
@@ -119,8 +121,8 @@ impl Lavapipe {
     fn both_pictures(&self, views: &[View<'_>; 2]) -> Result<Vec<u8>, RasterError> {
         let mut both = Vec::new();
         for view in views {
-            let color = &self.target(view.target)?.color;
-            both.extend(color.read(&self.gpu, &self.readback)?);
+            let color = &self.target(view.target)?.color.view;
+            both.extend(self.readback.texels::<u8>(&self.gpu, color.texture())?);
         }
         Ok(both)
     }
@@ -244,22 +246,7 @@ impl Multiview {
 
 impl Targets {
     fn new(gpu: &Gpu, size_px: [u32; 2]) -> Self {
-        let texture = |format, usage| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("both views"),
-                size: wgpu::Extent3d {
-                    width: size_px[0],
-                    height: size_px[1],
-                    depth_or_array_layers: VIEW_COUNT,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
-                view_formats: &[],
-            })
-        };
+        let texture = |format, usage| attachment(gpu, size_px, VIEW_COUNT, format, usage);
         let view = |texture: &wgpu::Texture| {
             texture.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2Array),
@@ -354,9 +341,9 @@ pub fn differing_px(gpu: &Gpu) -> Result<u32, RasterError> {
         gpu.queue.submit([encoder.finish()]);
         targets
     })?;
-    let [both, alone] = [both, alone].map(|targets| read(gpu, &targets.color));
-    let (both, alone) = (both?, alone?);
-    Ok(differing(&both, &alone))
+    let readback = Readback::default();
+    let read = |targets: &Targets| readback.texels::<u8>(gpu, &targets.color);
+    Ok(differing(&read(&both)?, &read(&alone)?))
 }
 
 /// Pixels in which two pictures differ.
@@ -416,31 +403,4 @@ fn pipeline(
             multiview_mask,
             cache: None,
         })
-}
-
-/// Both layers of the known scene's picture.
-fn read(gpu: &Gpu, color: &wgpu::Texture) -> Result<Vec<u8>, RasterError> {
-    // A row of 64 pixels is as long as copies want it.
-    let row_bytes = 4 * EDGE_PX;
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: u64::from(row_bytes * EDGE_PX * VIEW_COUNT),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    encoder.copy_texture_to_buffer(
-        color.as_image_copy(),
-        wgpu::TexelCopyBufferInfo {
-            buffer: &buffer,
-            layout: wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(row_bytes),
-                rows_per_image: Some(EDGE_PX),
-            },
-        },
-        color.size(),
-    );
-    gpu.queue.submit([encoder.finish()]);
-    gpu.read(&buffer, 0..buffer.size(), |bytes| Ok(bytes.to_vec()))
 }

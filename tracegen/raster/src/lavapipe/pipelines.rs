@@ -1,6 +1,8 @@
 //! The pipelines that a scene's draws need, all from one shader source.
 
+use super::bindings;
 use super::device::Gpu;
+use super::whole::Whole;
 use crate::error::RasterError;
 use crate::roles::{PipelineKey, Role};
 use crate::shader::{self, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
@@ -80,27 +82,18 @@ impl Pipelines {
                     source: wgpu::ShaderSource::Wgsl(source.into()),
                 });
             let layouts = Layouts {
-                view: gpu
-                    .device
-                    .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                        label: Some("view"),
-                        entries: &view_entries(),
-                    }),
-                material: gpu
-                    .device
-                    .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                        label: Some("material"),
-                        entries: &material_entries(),
-                    }),
+                view: bindings::layout(gpu, "view", view_bindings()),
+                material: bindings::fragment_layout(gpu, "material", material_bindings()),
             };
-            let layout = gpu
-                .device
-                .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                    label: None,
-                    bind_group_layouts: &[Some(&layouts.view), Some(&layouts.material)],
-                    immediate_size: 0,
-                });
-            let background = background(gpu, &module, &layout, multiview_mask);
+            let layout = bindings::pipeline_layout(gpu, &[&layouts.view, &layouts.material]);
+            let background = Whole {
+                module: &module,
+                layout: &layout,
+                vertex: "vertex_background",
+                writes_depth: true,
+                multiview_mask,
+            };
+            let background = background.pipeline(gpu, "fragment_background");
             Self {
                 layouts,
                 background,
@@ -175,6 +168,7 @@ impl Pipelines {
             Role::Opaque | Role::Blended => Some("fragment_early"),
             Role::Masked => Some("fragment_masked"),
             Role::MaskedRecord => Some("fragment_masked_record"),
+            Role::Record => Some("fragment_record"),
             Role::Shadow | Role::Depth => None,
             Role::ShadowMasked | Role::DepthMasked => Some("fragment_shadow"),
             Role::Mark => Some("fragment_mark"),
@@ -189,7 +183,7 @@ impl Pipelines {
         let color = [Some(wgpu::ColorTargetState {
             format,
             blend,
-            write_mask: if key.role == Role::MaskedRecord {
+            write_mask: if key.role.only_records() {
                 wgpu::ColorWrites::empty()
             } else {
                 wgpu::ColorWrites::ALL
@@ -250,76 +244,18 @@ impl Pipelines {
     }
 }
 
-fn background(
-    gpu: &Gpu,
-    module: &wgpu::ShaderModule,
-    layout: &wgpu::PipelineLayout,
-    multiview_mask: Option<NonZeroU32>,
-) -> wgpu::RenderPipeline {
-    gpu.device
-        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("background"),
-            layout: Some(layout),
-            vertex: wgpu::VertexState {
-                module,
-                entry_point: Some("vertex_background"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Always),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
-            }),
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module,
-                entry_point: Some("fragment_background"),
-                compilation_options: Default::default(),
-                targets: &[Some(COLOR_FORMAT.into())],
-            }),
-            multiview_mask,
-            cache: None,
-        })
-}
-
-fn entry(
-    binding: u32,
-    visibility: wgpu::ShaderStages,
-    ty: wgpu::BindingType,
-) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility,
-        ty,
-        count: None,
-    }
-}
-
-fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
-    wgpu::BindingType::Buffer {
-        ty,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    }
-}
-
 /// In the order of [`shader::VIEW_BINDINGS`].
-fn view_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
+fn view_bindings() -> impl Iterator<Item = (u32, wgpu::ShaderStages, wgpu::BindingType)> {
     let fragment = wgpu::ShaderStages::FRAGMENT;
-    let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
+    let storage = |read_only| bindings::buffer(wgpu::BufferBindingType::Storage { read_only });
     let shadow_map = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Depth,
         view_dimension: wgpu::TextureViewDimension::D2Array,
         multisampled: false,
     };
-    let view = buffer(wgpu::BufferBindingType::Uniform);
     let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
-    let entries: [_; shader::VIEW_BINDINGS.len()] = [
-        (wgpu::ShaderStages::VERTEX_FRAGMENT, view),
+    let read: [_; shader::VIEW_BINDINGS.len()] = [
+        (wgpu::ShaderStages::VERTEX_FRAGMENT, bindings::uniform()),
         (wgpu::ShaderStages::VERTEX, storage(true)),
         (fragment, storage(false)),
         (fragment, storage(false)),
@@ -328,24 +264,17 @@ fn view_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
         (fragment, storage(false)),
     ];
     (0..)
-        .zip(entries)
-        .map(|(binding, (visibility, ty))| entry(binding, visibility, ty))
-        .collect()
+        .zip(read)
+        .map(|(binding, (stages, ty))| (binding, stages, ty))
 }
 
-fn material_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    let fragment = wgpu::ShaderStages::FRAGMENT;
-    let texture = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
+fn material_bindings() -> impl Iterator<Item = (u32, wgpu::BindingType)> {
+    let texture = bindings::texture(wgpu::TextureSampleType::Float { filterable: true });
     let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    let uniform = buffer(wgpu::BufferBindingType::Uniform);
     let textures = TEXTURES_BINDING..SAMPLERS_BINDING;
     let samplers = SAMPLERS_BINDING..SAMPLERS_BINDING + textures.len() as u32;
-    let mut entries = vec![entry(MATERIAL_BINDING, fragment, uniform)];
-    entries.extend(textures.map(|binding| entry(binding, fragment, texture)));
-    entries.extend(samplers.map(|binding| entry(binding, fragment, sampler)));
-    entries
+    [(MATERIAL_BINDING, bindings::uniform())]
+        .into_iter()
+        .chain(textures.map(move |binding| (binding, texture)))
+        .chain(samplers.map(move |binding| (binding, sampler)))
 }

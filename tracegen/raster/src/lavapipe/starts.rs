@@ -1,8 +1,9 @@
 //! What a layer holds before its draws, where that is not the sky.
 
+use super::bindings;
 use super::device::Gpu;
-use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
 use super::targets::LayerTarget;
+use super::whole::Whole;
 use crate::error::RasterError;
 use glam::{Mat3, Mat4};
 use techniques::start::{Composition, Opening};
@@ -129,69 +130,18 @@ impl Pipeline {
         entry_point: &'static str,
         textures: &[(u32, wgpu::TextureSampleType)],
     ) -> Self {
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
+        let textures_bound = (textures.iter())
+            .map(|(binding, sample_type)| (*binding, bindings::texture(*sample_type)));
+        let bound = [(0, bindings::uniform())].into_iter().chain(textures_bound);
+        let layout = bindings::fragment_layout(gpu, entry_point, bound);
+        let whole = Whole {
+            module,
+            layout: &bindings::pipeline_layout(gpu, &[&layout]),
+            vertex: "vertex_whole",
+            writes_depth: true,
+            multiview_mask: None,
         };
-        let uniform = wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        };
-        let texture = |&(binding, sample_type): &(u32, wgpu::TextureSampleType)| {
-            let ty = wgpu::BindingType::Texture {
-                sample_type,
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            };
-            entry(binding, ty)
-        };
-        let mut entries = vec![entry(0, uniform)];
-        entries.extend(textures.iter().map(texture));
-        let layout = gpu
-            .device
-            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some(entry_point),
-                entries: &entries,
-            });
-        let whole = gpu
-            .device
-            .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(entry_point),
-                bind_group_layouts: &[Some(&layout)],
-                immediate_size: 0,
-            });
-        let pipeline = gpu
-            .device
-            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(entry_point),
-                layout: Some(&whole),
-                vertex: wgpu::VertexState {
-                    module,
-                    entry_point: Some("vertex_whole"),
-                    compilation_options: Default::default(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: DEPTH_FORMAT,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::Always),
-                    stencil: wgpu::StencilState::default(),
-                    bias: wgpu::DepthBiasState::default(),
-                }),
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module,
-                    entry_point: Some(entry_point),
-                    compilation_options: Default::default(),
-                    targets: &[Some(COLOR_FORMAT.into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            });
+        let pipeline = whole.pipeline(gpu, entry_point);
         Self {
             pipeline,
             layout,
@@ -214,21 +164,13 @@ impl Pipeline {
                 contents: bytemuck::bytes_of(data),
                 usage: wgpu::BufferUsages::UNIFORM,
             });
-        let mut entries = vec![wgpu::BindGroupEntry {
-            binding: 0,
-            resource: uniform.as_entire_binding(),
-        }];
-        for (binding, texture) in self.textures.iter().zip(textures) {
-            entries.push(wgpu::BindGroupEntry {
-                binding: *binding,
-                resource: wgpu::BindingResource::TextureView(texture),
-            });
-        }
-        let bindings = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("start"),
-            layout: &self.layout,
-            entries: &entries,
-        });
+        let textures = (self.textures.iter().copied())
+            .zip(textures)
+            .map(|(binding, texture)| (binding, wgpu::BindingResource::TextureView(texture)));
+        let bound = [(0, uniform.as_entire_binding())]
+            .into_iter()
+            .chain(textures);
+        let bindings = bindings::group(gpu, "start", &self.layout, bound);
         Drawn {
             pipeline: &self.pipeline,
             bindings,

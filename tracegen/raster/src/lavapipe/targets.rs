@@ -5,7 +5,6 @@ use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
 use crate::draws::SHADOW_SIZE;
 use crate::error::RasterError;
 use record::Region;
-use std::cell::RefCell;
 use std::sync::Arc;
 use techniques::Mask;
 
@@ -13,8 +12,6 @@ use techniques::Mask;
 pub struct ColorTarget {
     /// Width and height in pixels.
     pub size_px: [u32; 2],
-    /// The picture.
-    texture: wgpu::Texture,
     /// View of the picture.
     pub view: wgpu::TextureView,
 }
@@ -139,66 +136,8 @@ impl ColorTarget {
             Self {
                 size_px,
                 view: texture.create_view(&Default::default()),
-                texture,
             }
         })
-    }
-
-    /// Reads the picture: RGBA8 rows without padding.
-    ///
-    /// # Errors
-    /// Driver errors.
-    pub fn read(&self, gpu: &Gpu, readback: &Readback) -> Result<Vec<u8>, RasterError> {
-        let [width, height] = self.size_px;
-        let row_bytes = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let bytes = u64::from(row_bytes) * u64::from(height);
-        let buffer = readback.of_size(gpu, bytes);
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_texture_to_buffer(
-            self.texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(row_bytes),
-                    rows_per_image: None,
-                },
-            },
-            wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-        );
-        gpu.queue.submit([encoder.finish()]);
-        gpu.read(&buffer, 0..bytes, |bytes| {
-            Ok(bytes
-                .chunks_exact(row_bytes as usize)
-                .flat_map(|row| row.iter().take(width as usize * 4))
-                .copied()
-                .collect())
-        })
-    }
-}
-
-/// A buffer for pictures on their way back, kept between them.
-#[derive(Default)]
-pub struct Readback(RefCell<Option<wgpu::Buffer>>);
-
-impl Readback {
-    /// A buffer of at least `bytes` bytes.
-    fn of_size(&self, gpu: &Gpu, bytes: u64) -> wgpu::Buffer {
-        let mut kept = self.0.borrow_mut();
-        kept.take_if(|buffer| buffer.size() < bytes);
-        let buffer = kept.get_or_insert_with(|| {
-            gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("picture on its way back"),
-                size: bytes,
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        });
-        buffer.clone()
     }
 }
 
@@ -242,7 +181,8 @@ impl ShadowMaps {
     }
 }
 
-fn attachment(
+/// A texture that is rendered into.
+pub fn attachment(
     gpu: &Gpu,
     size_px: [u32; 2],
     layers: u32,

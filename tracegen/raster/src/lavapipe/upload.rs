@@ -1,5 +1,6 @@
 //! The scene in the driver's memory: vertex and index buffers, textures, materials, instances.
 
+use super::bindings;
 use super::device::Gpu;
 use super::pipelines::Layouts;
 use crate::draws::DrawList;
@@ -8,7 +9,7 @@ use crate::shader::{MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
 use crate::uniforms::MaterialData;
 use crate::vertices::{self, InstanceData, VERTEX_STRIDE};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
-use scene::{Material, Mesh, Scene};
+use scene::{Material, Mesh, Scene, TextureRef};
 use textures::{CompressedTexture, TextureSet};
 use wgpu::util::DeviceExt;
 
@@ -244,30 +245,15 @@ fn bind_material(
             contents: bytemuck::bytes_of(&data),
             usage: wgpu::BufferUsages::UNIFORM,
         });
-    let mut entries = vec![wgpu::BindGroupEntry {
-        binding: MATERIAL_BINDING,
-        resource: uniform.as_entire_binding(),
-    }];
-    for (binding, texture) in (TEXTURES_BINDING..).zip(&textures) {
-        let view = texture
-            .and_then(|t| (*set.of_image.get(t.image)?).and_then(|i| views.get(i)))
-            .unwrap_or(absent);
-        entries.push(wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::TextureView(view),
-        });
-    }
-    for (binding, sampler) in (SAMPLERS_BINDING..).zip(samplers) {
-        entries.push(wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::Sampler(sampler),
-        });
-    }
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("material"),
-        layout: &layouts.material,
-        entries: &entries,
-    })
+    let of_texture = |texture: &Option<TextureRef>| {
+        let view = texture.and_then(|t| (*set.of_image.get(t.image)?).and_then(|i| views.get(i)));
+        wgpu::BindingResource::TextureView(view.unwrap_or(absent))
+    };
+    let bound = [(MATERIAL_BINDING, uniform.as_entire_binding())]
+        .into_iter()
+        .chain((TEXTURES_BINDING..).zip(textures.iter().map(of_texture)))
+        .chain((SAMPLERS_BINDING..).zip(samplers.map(wgpu::BindingResource::Sampler)));
+    bindings::group(gpu, "material", &layouts.material, bound)
 }
 
 /// The samplers made so far, one a state.

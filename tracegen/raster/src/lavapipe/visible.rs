@@ -1,6 +1,7 @@
 //! Depth alone, for occlusion culling, and which draws are visible, by drawing everything.
 
 use super::pipelines::DEPTH_FORMAT;
+use super::targets::attachment;
 use super::{Lavapipe, bind_view};
 use crate::backend::{Marks, View};
 use crate::draws::DrawList;
@@ -21,39 +22,7 @@ impl Lavapipe {
         (self.gpu.queue).write_buffer(&self.buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         let depth = self.depth_texture(view);
         self.draw_alone(draws, view.visible, Purpose::Depth, &depth, None)?;
-        let [width, height] = view.layer.size_px;
-        let row_bytes = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("depth on its way back"),
-            size: u64::from(row_bytes) * u64::from(height),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_texture_to_buffer(
-            depth.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(row_bytes),
-                    rows_per_image: None,
-                },
-            },
-            depth.size(),
-        );
-        self.gpu.queue.submit([encoder.finish()]);
-        self.gpu.read(&buffer, 0..buffer.size(), |bytes| {
-            let row = |row: &[u8]| -> Vec<f32> {
-                (row.chunks_exact(4).take(width as usize))
-                    .map(|texel| f32::from_le_bytes([texel[0], texel[1], texel[2], texel[3]]))
-                    .collect()
-            };
-            Ok(bytes
-                .chunks_exact(row_bytes as usize)
-                .flat_map(row)
-                .collect())
-        })
+        self.readback.texels(&self.gpu, &depth)
     }
 
     /// What is visible of every draw, those left out of the view too.
@@ -101,21 +70,8 @@ impl Lavapipe {
     }
 
     fn depth_texture(&self, view: &View<'_>) -> wgpu::Texture {
-        let [width, height] = view.layer.size_px;
-        self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("depth alone"),
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: DEPTH_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        })
+        let usage = wgpu::TextureUsages::COPY_SRC;
+        attachment(&self.gpu, view.layer.size_px, 1, DEPTH_FORMAT, usage)
     }
 
     /// Draws without colour: depth is cleared first, unless there are marks to be made against it,

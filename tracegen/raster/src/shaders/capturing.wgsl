@@ -12,6 +12,16 @@ fn capture_and_shade(in: Fragment, front: bool, primitive: u32, invocation: u32)
     return shade(in, front, base_color(in), found);
 }
 
+// What a fragment samples, recorded by a draw that shades nothing; tells the index of group 0's record.
+fn record_lit(lane: Lane, in: Fragment, front: bool) -> u32 {
+    let index = record_material(lane, in);
+    if CASCADES > 0u {
+        let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
+        record_shadow(lane, find_cascade(in.world, geometric), in.world, geometric);
+    }
+    return index;
+}
+
 @fragment @early_depth_test(force)
 fn fragment_early(
     in: Fragment,
@@ -20,6 +30,19 @@ fn fragment_early(
     @builtin(subgroup_invocation_id) invocation: u32,
 ) -> @location(0) vec4<f32> {
     return capture_and_shade(in, front, primitive, invocation);
+}
+
+// Records of all of a draw that the pass's depth leaves, in a draw of its own.
+@fragment @early_depth_test(force)
+fn fragment_record(
+    in: Fragment,
+    @builtin(front_facing) front: bool,
+    @builtin(primitive_index) primitive: u32,
+    @builtin(subgroup_invocation_id) invocation: u32,
+) -> @location(0) vec4<f32> {
+    let lane = lane_of(in, primitive, invocation);
+    _ = record_lit(lane, in, front);
+    return vec4(0.0);
 }
 
 // Records of an alpha-masked draw. Forced early depth with a discard would write the depth of
@@ -32,11 +55,7 @@ fn fragment_masked_record(
     @builtin(subgroup_invocation_id) invocation: u32,
 ) -> @location(0) vec4<f32> {
     let lane = lane_of(in, primitive, invocation);
-    let index = record_material(lane, in);
-    if CASCADES > 0u {
-        let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
-        record_shadow(lane, find_cascade(in.world, geometric), in.world, geometric);
-    }
+    let index = record_lit(lane, in, front);
     record_depth(lane, index, base_color(in).a >= material.specular.w, in.position.z);
     return vec4(0.0);
 }

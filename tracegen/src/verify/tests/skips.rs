@@ -65,7 +65,10 @@ fn courtyard() -> Scene {
 fn pictures_and_traces_are_the_same_bytes_with_and_without_each_skip() {
     let scene = courtyard();
     let planner = baseline(SIZE_PX, BOTH);
-    let of = |skips| capture_skipping(&planner, &scene, 4, 1 << 19, true, skips).unwrap();
+    let of = |skips| {
+        let tested = Fragments::DepthTested;
+        capture_skipping(&planner, &scene, 4, 1 << 19, true, skips, tested).unwrap()
+    };
     let (all, set, skipped) = of(Skips::default());
     assert!(all.pictures_match);
     assert_eq!(set.unseen(), 1, "the wall behind");
