@@ -188,5 +188,7 @@ pub fn for_lines(
     most_sets: u32,
     mut visit: impl FnMut(&[u32]),
 ) -> Result<Totals, AddressError> {
-    for_line_blocks(file, line_bytes, most_sets, KindSet::ALL, |block| visit(block.lines))
+    for_line_blocks(file, line_bytes, most_sets, KindSet::ALL, |block| {
+        visit(block.lines)
+    })
 }

@@ -132,7 +132,10 @@ impl AddressArgs {
             "{:.1} M accesses/s ({accesses} accesses in {seconds:.3} s, read as {read_as})",
             accesses as f64 / seconds / 1e6,
         ));
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        let name = path
+            .file_name()
+            .unwrap_or(path.as_os_str())
+            .to_string_lossy();
         super::print(&match (json, self.csv) {
             (true, _) => report::json(&name, &outcome)?,
             (_, true) => report::csv(&outcome),

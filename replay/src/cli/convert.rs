@@ -8,9 +8,7 @@ use crate::stream::{for_quads, shaded};
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
-use formats::interop::plain::{
-    CompressedWriter, Compression, PlainAccess, PlainForm, PlainWriter,
-};
+use formats::interop::plain::{CompressedWriter, Compression, PlainAccess, PlainForm, PlainWriter};
 use formats::interop::{
     AccessSink, CsvWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess, ray_samples,
 };

@@ -33,13 +33,21 @@ fn level<'a, 'r>(
     let key = |end: &str| format!("{key}.{end}");
     let name = |end: &str| format!("{name} {end}");
     [
-        count(key("line_lookups"), name("look-ups"), move |r: &PointRow<'r>| {
-            of(r.point).line_lookups()
+        count(
+            key("line_lookups"),
+            name("look-ups"),
+            move |r: &PointRow<'r>| of(r.point).line_lookups(),
+        ),
+        count(key("line_misses"), name("misses"), move |r| {
+            of(r.point).line_misses()
         }),
-        count(key("line_misses"), name("misses"), move |r| of(r.point).line_misses()),
-        Column::real(key("miss_pct"), name("miss"), "%", 2, move |r: &PointRow<'r>| {
-            100.0 * of(r.point).miss_rate()
-        }),
+        Column::real(
+            key("miss_pct"),
+            name("miss"),
+            "%",
+            2,
+            move |r: &PointRow<'r>| 100.0 * of(r.point).miss_rate(),
+        ),
     ]
 }
 
@@ -82,9 +90,13 @@ fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
     ]);
     columns.extend(level("l2", "L2", |point| &point.l2));
     columns.push(
-        Column::real("external_bytes", "external", "bytes", 0, |r: &PointRow<'r>| {
-            r.point.external_bytes()
-        })
+        Column::real(
+            "external_bytes",
+            "external",
+            "bytes",
+            0,
+            |r: &PointRow<'r>| r.point.external_bytes(),
+        )
         .about("line misses of the L2 times the line size"),
     );
     columns.push(
@@ -187,7 +199,10 @@ pub fn text(input: &str, outcome: &Outcome) -> String {
         text += &format!("{} accesses of other kinds left out\n", of.left_out);
     }
     if of.other_packets > 0 {
-        text += &format!("{} packets that are no accesses left out\n", of.other_packets);
+        text += &format!(
+            "{} packets that are no accesses left out\n",
+            of.other_packets
+        );
     }
     let all = Table::new(&columns(), &rows(outcome)).without_empty_columns();
     let part = |keys: &[&str]| all.picked(keys.iter().copied()).text();

@@ -3,9 +3,9 @@
 use flate2::GzBuilder;
 use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
-use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
-use ruzstd::decoding::FrameDecoder;
 use ruzstd::decoding::BlockDecodingStrategy;
+use ruzstd::decoding::FrameDecoder;
+use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 use std::io::{self, BufRead, Read, Write};
 
@@ -120,7 +120,10 @@ impl<R: BufRead> ZstdReader<R> {
                 length,
                 ..
             })) => {
-                let skipped = io::copy(&mut self.input.by_ref().take(length.into()), &mut io::sink())?;
+                let skipped = io::copy(
+                    &mut self.input.by_ref().take(length.into()),
+                    &mut io::sink(),
+                )?;
                 if skipped < length.into() {
                     return Err(io::ErrorKind::UnexpectedEof.into());
                 }
@@ -203,7 +206,10 @@ impl<W: Write> Write for CompressedWriter<W> {
                 let (now, _) = bytes.split_at(bytes.len().min(room));
                 frame.extend_from_slice(now);
                 if frame.len() == FRAME_BYTES {
-                    out.write_all(&compress_to_vec(frame.as_slice(), CompressionLevel::Fastest))?;
+                    out.write_all(&compress_to_vec(
+                        frame.as_slice(),
+                        CompressionLevel::Fastest,
+                    ))?;
                     frame.clear();
                 }
                 Ok(now.len())

@@ -296,8 +296,8 @@ fn wanted(name: &str, expected: &str, found: &str) -> FormatError {
 fn unreadable(name: &str, compression: Option<Compression>, source: io::Error) -> FormatError {
     let action = match compression {
         None => "read",
-        Some(Compression::Gzip) => "decompress the gzip data of",
-        Some(Compression::Zstd) => "decompress the zstd data of",
+        Some(Compression::Gzip) => "decompress (gzip)",
+        Some(Compression::Zstd) => "decompress (zstd)",
     };
     let source = match source.kind() {
         io::ErrorKind::UnexpectedEof => {

@@ -139,7 +139,10 @@ impl Gem5 {
             .filter(|length| *length <= MOST_RECORD_BYTES / 2)
             .ok_or_else(|| {
                 let most = MOST_RECORD_BYTES / 2;
-                fault(format!("a message of at most {most} bytes"), length.to_string())
+                fault(
+                    format!("a message of at most {most} bytes"),
+                    length.to_string(),
+                )
             })?;
         let Some(message) = cursor.get(..length) else {
             if ended {
@@ -174,12 +177,14 @@ impl Gem5 {
         let Some(kind) = kind_of(command, fields.flags) else {
             return Ok(None);
         };
-        PlainAccess::checked(address, bytes, kind).map(Some).ok_or_else(|| {
-            fault(
-                "at most 1 MiB that ends below 2^64",
-                format!("{bytes} bytes at {address:#x}"),
-            )
-        })
+        PlainAccess::checked(address, bytes, kind)
+            .map(Some)
+            .ok_or_else(|| {
+                fault(
+                    "at most 1 MiB that ends below 2^64",
+                    format!("{bytes} bytes at {address:#x}"),
+                )
+            })
     }
 }
 

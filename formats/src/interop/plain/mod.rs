@@ -11,12 +11,13 @@ mod file;
 mod gem5;
 mod ramulator;
 #[cfg(test)]
+#[allow(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 mod tests;
 mod words;
 mod writer;
 
 pub use champsim::CHAMPSIM_BASE;
-pub use compression::{Compression, CompressedWriter};
+pub use compression::{CompressedWriter, Compression};
 pub use file::{AddressFile, Block, Found};
 pub use writer::{PlainForm, PlainWriter};
 

@@ -55,6 +55,11 @@ impl<W: Write> PlainWriter<W> {
         })
     }
 
+    /// The writer below.
+    pub fn into_inner(self) -> W {
+        self.out
+    }
+
     /// Writes an access.
     ///
     /// # Errors
