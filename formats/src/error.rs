@@ -17,6 +17,14 @@ pub enum Place {
     Directory,
     /// A chunk.
     Chunk(ChunkTag),
+    /// All that a file of plain accesses holds.
+    Contents,
+    /// A line of text, counted from 1.
+    Line(u64),
+    /// An access, counted from 1.
+    Access(u64),
+    /// A gem5 packet, counted from 1.
+    Packet(u64),
 }
 
 impl fmt::Display for Place {
@@ -25,6 +33,10 @@ impl fmt::Display for Place {
             Self::Header => f.write_str("header"),
             Self::Directory => f.write_str("chunk directory"),
             Self::Chunk(tag) => write!(f, "chunk {tag}"),
+            Self::Contents => f.write_str("contents"),
+            Self::Line(number) => write!(f, "line {number}"),
+            Self::Access(number) => write!(f, "access {number}"),
+            Self::Packet(number) => write!(f, "packet {number}"),
         }
     }
 }

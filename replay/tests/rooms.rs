@@ -8,7 +8,7 @@ const FLOORS: [&[&str]; 10] = [
     &["files", "palette", "registry", "result", "size"],
     &["cache", "config", "order"],
     &["paper", "tmu"],
-    &["stream"],
+    &["addresses", "stream"],
     &["engine"],
     &["sgrt"],
     &["experiment"],

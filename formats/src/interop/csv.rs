@@ -25,6 +25,7 @@ impl<W: Write> AccessSink for CsvWriter<W> {
     fn write(&mut self, access: &Access) -> io::Result<()> {
         let Access {
             address,
+            bytes: _,
             pass,
             tile,
             draw,

@@ -1,15 +1,15 @@
-//! Plain accesses for other simulators, texels' and rays': Dinero's din, CSV, JSON Lines.
+//! Accesses for other simulators, texels' and rays': addresses alone ([`plain`], which is read,
+//! too), CSV, JSON Lines.
 //!
 //! What comes out for a record is what replay counts for it, in the order of
 //! [`crate::footprint`]. The order of tiles and primitives is the caller's.
 
 mod csv;
-mod din;
 mod jsonl;
+pub mod plain;
 mod rays;
 
 pub use csv::CsvWriter;
-pub use din::{DinAccess, DinWriter, read_din};
 pub use jsonl::{JsonlWriter, record_to_json};
 pub use rays::{Entry, RayAccess, RaySample, ray_samples};
 
@@ -48,6 +48,9 @@ pub struct Origin {
 pub struct Access {
     /// Byte address.
     pub address: u64,
+    /// Bytes from there on: a line's, or a block's.
+    #[serde(skip)]
+    pub bytes: u32,
     /// Index of the pass.
     pub pass: u32,
     /// Tile of the pass.
@@ -115,7 +118,10 @@ impl Expander<'_> {
                     let Some(mut address) = at.filter(|_| outcome.is_ok()) else {
                         return;
                     };
+                    let texture = self.layout.textures().get(sample.texture as usize);
+                    let mut bytes = texture.map_or(1, |texture| texture.block.bytes);
                     if self.granularity == Granularity::Line {
+                        bytes = self.line_bytes;
                         address -= address % u64::from(self.line_bytes.max(1));
                         if lines.contains(&address) {
                             continue;
@@ -124,6 +130,7 @@ impl Expander<'_> {
                     }
                     outcome = visit(&Access {
                         address,
+                        bytes,
                         pass: origin.pass,
                         tile: origin.tile,
                         draw: origin.draw,

@@ -57,29 +57,6 @@ fn a_quad_without_a_group_reads_nothing() {
 }
 
 #[test]
-fn din_reads_back_what_was_written() {
-    let written = accesses(Granularity::Texel, &record());
-    let mut text = Vec::new();
-    let mut sink = DinWriter(&mut text);
-    for access in &written {
-        sink.write(access).unwrap();
-    }
-    let read: Vec<u64> = read_din(text.as_slice())
-        .map(|access| access.unwrap().address)
-        .collect();
-    assert_eq!(read, written.iter().map(|a| a.address).collect::<Vec<_>>());
-}
-
-#[test]
-fn a_bad_din_line_is_named() {
-    let error = read_din(&b"0 1f\n0 xyz\n"[..]).nth(1).unwrap().unwrap_err();
-    assert!(
-        error.to_string().starts_with("line 2: expected a label"),
-        "{error}"
-    );
-}
-
-#[test]
 fn csv_and_json_lines_hold_the_same_accesses() {
     let written = accesses(Granularity::Line, &record());
     let (mut csv, mut jsonl) = (Vec::new(), Vec::new());

@@ -5,12 +5,12 @@ use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
 use crate::order;
 use crate::stream::{for_quads, shaded};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
+use formats::interop::plain::{CompressedWriter, Compression, PlainAccess, PlainForm, PlainWriter};
 use formats::interop::{
-    AccessSink, CsvWriter, DinWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess,
-    ray_samples,
+    AccessSink, CsvWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess, ray_samples,
 };
 use formats::layout::Layout;
 use formats::raytrace::{RayTile, Raytrace, RaytraceWriter, encode_ray_tile};
@@ -25,6 +25,18 @@ use std::process::ExitCode;
 pub enum Target {
     /// Dinero's text: `0 HEXADDR` a line
     Din,
+    /// Addresses of 32 bits, little-endian
+    U32,
+    /// Addresses of 64 bits
+    U64,
+    /// gem5's packet trace: protocol-buffer messages
+    Gem5,
+    /// Ramulator 2's LoadStoreTrace: `LD 0xADDR` a line
+    Ramulator,
+    /// Ramulator 2's SimpleO3 trace: `0 ADDR` a line, decimal
+    RamulatorO3,
+    /// ChampSim's 64-byte instruction records, a load each; addresses begin at 2^40
+    Champsim,
     /// Comma-separated accesses with texture, level and texel, or ray and node
     Csv,
     /// The same as one JSON object a line
@@ -36,9 +48,36 @@ pub enum Target {
 }
 
 impl Target {
-    fn is_text(self) -> bool {
-        matches!(self, Self::Din | Self::Csv | Self::Jsonl)
+    /// The form, if accesses are written as addresses alone.
+    fn plain(self) -> Option<PlainForm> {
+        Some(match self {
+            Self::Din => PlainForm::Din,
+            Self::U32 => PlainForm::U32,
+            Self::U64 => PlainForm::U64,
+            Self::Gem5 => PlainForm::Gem5,
+            Self::Ramulator => PlainForm::Ramulator,
+            Self::RamulatorO3 => PlainForm::RamulatorO3,
+            Self::Champsim => PlainForm::Champsim,
+            Self::Csv | Self::Jsonl | Self::Textrace | Self::Raytrace => return None,
+        })
     }
+
+    fn is_trace(self) -> bool {
+        matches!(self, Self::Textrace | Self::Raytrace)
+    }
+
+    fn is_text(self) -> bool {
+        !self.is_trace() && self.plain().is_none_or(PlainForm::is_text)
+    }
+}
+
+/// Compressions by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum CompressionName {
+    /// gzip
+    Gzip,
+    /// Zstandard
+    Zstd,
 }
 
 /// Tile encodings by name.
@@ -67,6 +106,7 @@ pub enum GranularityName {
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   replay convert c.textrace --to din --order z2-sta | dineroIV -informat d ...
+  replay convert c.textrace --to u32 --order morton -o c.u32.zst
   replay convert c.textrace --to csv --granularity texel -o c.csv
   replay convert c.textrace --to textrace --encoding raw -o raw.textrace
   replay convert r.raytrace --to csv | head
@@ -81,6 +121,9 @@ pub struct ConvertArgs {
     /// Output file; - is standard output
     #[arg(short, long, value_name = "FILE", default_value = "-")]
     pub output: PathBuf,
+    /// Compress accesses [default: as the output's name asks, .gz or .zst]
+    #[arg(long, value_name = "METHOD")]
+    pub compress: Option<CompressionName>,
     /// What counts as an access
     #[arg(long, value_enum, default_value_t)]
     pub granularity: GranularityName,
@@ -98,7 +141,8 @@ pub struct ConvertArgs {
 /// The trace cannot be read, the configuration is impossible, or the output cannot be written.
 pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     let config = args.machine.resolve()?;
-    let output = if args.to.is_text() {
+    let compression = args.compression()?;
+    let output = if args.to.is_text() && compression.is_none() {
         Output::text("--output", &args.output)
     } else {
         Output::binary("--output", &args.output)
@@ -106,19 +150,39 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     let inputs = [Some(args.trace.as_path()), args.machine.file()];
     shell::check_outputs(&[output], inputs.into_iter().flatten())?;
     let trace = Trace::open(&args.trace)?;
-    if matches!(args.to, Target::Textrace | Target::Raytrace) {
+    if args.to.is_trace() {
         reencode(&trace, args)?;
     } else if is_stdout(&args.output) {
-        let mut out = BufWriter::new(io::stdout().lock());
+        let out = BufWriter::new(io::stdout().lock());
+        let mut out = CompressedWriter::new(compression, out);
         write_accesses(&trace, &config, args, &mut out)?;
-        out.flush()?;
+        out.finish()?.flush()?;
     } else {
         let name = || format!("cannot write {}", args.output.display());
-        let mut out = AtomicFile::create(&args.output).with_context(name)?;
+        let out = AtomicFile::create(&args.output).with_context(name)?;
+        let mut out = CompressedWriter::new(compression, out);
         write_accesses(&trace, &config, args, &mut out).with_context(name)?;
-        out.persist().with_context(name)?;
+        out.finish()?.persist().with_context(name)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+impl ConvertArgs {
+    /// What accesses are compressed by: the flag, or else the name of the output.
+    fn compression(&self) -> Result<Option<Compression>> {
+        if self.to.is_trace() {
+            ensure!(
+                self.compress.is_none(),
+                "--compress: a trace's tiles are packed by --encoding"
+            );
+            return Ok(None);
+        }
+        Ok(match self.compress {
+            Some(CompressionName::Gzip) => Some(Compression::Gzip),
+            Some(CompressionName::Zstd) => Some(Compression::Zstd),
+            None => Compression::of_name(&self.output.to_string_lossy()),
+        })
+    }
 }
 
 fn write_accesses(
@@ -127,16 +191,38 @@ fn write_accesses(
     args: &ConvertArgs,
     out: &mut impl Write,
 ) -> Result<()> {
-    match trace {
-        Trace::Texture(trace) => {
-            let granularity = args.granularity;
-            match args.to {
-                Target::Csv => accesses(trace, config, granularity, &mut CsvWriter::new(out)?),
-                Target::Jsonl => accesses(trace, config, granularity, &mut JsonlWriter(out)),
-                _ => accesses(trace, config, granularity, &mut DinWriter(out)),
-            }
+    if let Trace::Ray(trace) = trace
+        && !trace.tables().meta.has_visits
+    {
+        bail!(
+            "{}: the trace lists no visits, so it has no addresses; `tracegen rays --visits` lists them",
+            trace.container().file()
+        );
+    }
+    match (trace, args.to.plain()) {
+        (Trace::Texture(trace), Some(form)) => {
+            let mut sink = PlainWriter::new(form, out)?;
+            accesses(trace, config, args.granularity, &mut sink)
         }
-        Trace::Ray(trace) => ray_accesses(trace, config, args, out),
+        (Trace::Texture(trace), None) if args.to == Target::Csv => {
+            accesses(trace, config, args.granularity, &mut CsvWriter::new(out)?)
+        }
+        (Trace::Texture(trace), None) => {
+            accesses(trace, config, args.granularity, &mut JsonlWriter(out))
+        }
+        (Trace::Ray(trace), Some(form)) => {
+            let mut out = PlainWriter::new(form, out)?;
+            ray_accesses(trace, config, args, |access| {
+                out.access(&PlainAccess::read(access.address, access.bytes))
+            })
+        }
+        (Trace::Ray(trace), None) if args.to == Target::Csv => {
+            writeln!(out, "{}", RayAccess::CSV_HEADER)?;
+            ray_accesses(trace, config, args, |access| access.write_csv(out))
+        }
+        (Trace::Ray(trace), None) => ray_accesses(trace, config, args, |access| {
+            writeln!(out, "{}", serde_json::to_string(access)?)
+        }),
     }
 }
 
@@ -183,18 +269,9 @@ fn ray_accesses(
     trace: &Raytrace,
     config: &RunConfig,
     args: &ConvertArgs,
-    out: &mut impl Write,
+    mut write: impl FnMut(&RayAccess) -> io::Result<()>,
 ) -> Result<()> {
     let tables = trace.tables();
-    if !tables.meta.has_visits {
-        bail!(
-            "{}: the trace lists no visits, so it has no addresses; `tracegen rays --visits` lists them",
-            trace.container().file()
-        );
-    }
-    if args.to == Target::Csv {
-        writeln!(out, "{}", RayAccess::CSV_HEADER)?;
-    }
     let by_line = args.granularity == GranularityName::Line;
     let mut tile = RayTile::default();
     for (eye, index) in ray_tiles(tables) {
@@ -202,29 +279,20 @@ fn ray_accesses(
         for sample in ray_samples(tables, eye, index, &tile) {
             sample.accesses(&tables.bvh, |access| {
                 if !by_line {
-                    return write_access(args.to, access, out);
+                    return write(access);
                 }
                 let bytes = config.line_bytes;
                 access.lines(bytes).try_for_each(|address| {
-                    let line = RayAccess {
+                    write(&RayAccess {
                         address,
                         bytes,
                         ..*access
-                    };
-                    write_access(args.to, &line, out)
+                    })
                 })
             })?;
         }
     }
     Ok(())
-}
-
-fn write_access(to: Target, access: &RayAccess, out: &mut impl Write) -> io::Result<()> {
-    match to {
-        Target::Csv => access.write_csv(out),
-        Target::Jsonl => writeln!(out, "{}", serde_json::to_string(access)?),
-        _ => writeln!(out, "0 {:x}", access.address),
-    }
 }
 
 /// Writes the trace itself.

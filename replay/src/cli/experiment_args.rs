@@ -198,7 +198,11 @@ pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
     Ok(orders)
 }
 
-fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
+/// L1 and L2 sizes in bytes, from KiB as in `8/128,16/256`.
+///
+/// # Errors
+/// Anything else.
+pub fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
     let kib = |number: &str| {
         number
             .trim()

@@ -1,5 +1,6 @@
 //! The command line, one file a subcommand.
 
+mod addresses;
 mod config_args;
 pub mod convert;
 pub mod diff;

@@ -1,6 +1,7 @@
-//! `replay run`: one trace, one order, one configuration.
+//! `replay run`: one trace, one order, one configuration; or plain addresses through caches.
 
 use super::ConfigArgs;
+use super::addresses::AddressArgs;
 use super::subjects::Traces;
 use crate::experiment::{self, Plan};
 use crate::report::run as report;
@@ -15,14 +16,18 @@ use std::time::Instant;
   replay run c.textrace --order z2-sta
   replay run c.textrace --order z2-lrta --l1 16KiB --l2 256KiB --json
   replay run c.textrace --mode functional --order morton --block-order morton
-  replay run c.textrace --print-config > machine.toml")]
+  replay run c.textrace --print-config > machine.toml
+  replay run --addresses gcc.din.gz --l1 32KiB --l2 256KiB --line 64 --ways 8
+  replay convert c.textrace --to u32 | replay run --addresses - --address-form u32 --caches 8/128,16/256")]
 pub struct Args {
-    /// Texture trace; may be left out with --print-config
-    #[arg(required_unless_present = "print_config")]
+    /// Texture trace; may be left out with --addresses and --print-config
+    #[arg(required_unless_present_any = ["print_config", "addresses"])]
     trace: Option<PathBuf>,
     #[command(flatten)]
     machine: ConfigArgs,
-    /// Print one JSON object (schema replay.run/1)
+    #[command(flatten)]
+    addresses: AddressArgs,
+    /// Print one JSON object (schema replay.run/1, or replay.addresses/1)
     #[arg(long)]
     json: bool,
     /// Also count by tile (in the JSON)
@@ -44,6 +49,10 @@ pub struct Args {
 /// An impossible configuration or an unreadable trace.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut config = args.machine.resolve()?;
+    if let Some(path) = args.addresses.path() {
+        args.threads.start()?;
+        return args.addresses.run(path, &config, args.json);
+    }
     config.tile_maps |= args.tiles;
     let Some(path) = args.trace.clone().filter(|_| !args.print_config) else {
         super::print(&toml::to_string(&config)?)?;

@@ -1,5 +1,6 @@
 //! Prints results: tables, plots, JSON, CSV and pages. What is printed is computed elsewhere.
 
+pub mod addresses;
 pub mod columns;
 pub mod csv;
 pub mod figures;

@@ -5,7 +5,8 @@ use crate::engine::replay;
 use crate::stream::MemoryTrace;
 use crate::stream::synthetic::Synthetic;
 use clap::Parser;
-use formats::interop::read_din;
+use formats::FormatError;
+use formats::interop::plain::{AddressFile, AddressForm, Block};
 use std::collections::HashSet;
 
 #[derive(Parser)]
@@ -41,9 +42,17 @@ fn din(trace: &Trace, config: &RunConfig, granularity: &str) -> Vec<u64> {
     let args = parse(&["--to", "din", "--granularity", granularity]);
     let mut text = Vec::new();
     write_accesses(trace, config, &args, &mut text).unwrap();
-    read_din(text.as_slice())
-        .map(|access| access.unwrap().address)
-        .collect()
+    let mut addresses = Vec::new();
+    AddressFile::of_stream("din".to_owned(), Some(AddressForm::Din), text.as_slice())
+        .unwrap()
+        .for_blocks::<FormatError>(|block| {
+            if let Block::Accesses(accesses) = block {
+                addresses.extend(accesses.iter().map(|access| access.address));
+            }
+            Ok(())
+        })
+        .unwrap();
+    addresses
 }
 
 #[test]

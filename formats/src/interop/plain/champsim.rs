@@ -1,0 +1,28 @@
+//! ChampSim's instruction records (`input_instr` in its `inc/trace_instruction.h`), 64 bytes each,
+//! little-endian: instruction pointer (8), is a branch (1), is taken (1), destination registers (2),
+//! source registers (4), destination addresses (2 x 8), source addresses (4 x 8).
+
+use super::{AccessKind, PlainAccess};
+use std::io::{self, Write};
+
+/// An address of zero means that there is none, so addresses begin here: far above any that a
+/// texture layout gives, and the same to the sets of every cache.
+pub const CHAMPSIM_BASE: u64 = 1 << 40;
+
+/// The instruction that makes all accesses.
+const INSTRUCTION_POINTER: u64 = 0x40_0000;
+
+/// Writes an instruction that makes one access.
+pub(super) fn write(out: &mut impl Write, access: &PlainAccess) -> io::Result<()> {
+    let Some(address) = access.address.checked_add(CHAMPSIM_BASE) else {
+        let found = access.address;
+        let message = format!("champsim: expected addresses below 2^64 - 2^40, found {found:#x}");
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+    };
+    let is_write = access.kind == AccessKind::Write;
+    let (destination, source) = if is_write { (address, 0) } else { (0, address) };
+    let words = [INSTRUCTION_POINTER, 0, destination, 0, source, 0, 0, 0];
+    words
+        .iter()
+        .try_for_each(|word| out.write_all(&word.to_le_bytes()))
+}

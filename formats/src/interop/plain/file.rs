@@ -1,0 +1,320 @@
+//! A file, a pipe or standard input that holds plain accesses.
+
+use super::{AddressForm, Compression, Decoder, MOST_RECORD_BYTES, PlainAccess, din, gem5};
+use crate::error::{FormatError, Place};
+use memmap2::Mmap;
+use std::fs::File;
+use std::io::{self, BufReader, Cursor, IsTerminal, Read};
+use std::path::Path;
+
+/// Bytes that a form is told from.
+const HEAD_BYTES: usize = 4096;
+
+/// Bytes that are read at once.
+const BUFFER_BYTES: usize = 2 * MOST_RECORD_BYTES;
+
+enum Bytes<'a> {
+    Mapped(Mmap),
+    Stream(Box<dyn Read + 'a>),
+}
+
+/// Plain accesses that can be read once.
+pub struct AddressFile<'a> {
+    name: String,
+    form: AddressForm,
+    compression: Option<Compression>,
+    bytes: Bytes<'a>,
+}
+
+/// Accesses that follow one another.
+#[derive(Clone, Copy, Debug)]
+pub enum Block<'a> {
+    /// Addresses of reads, of 4 bytes each.
+    U32(&'a [[u8; 4]]),
+    /// Of 8 bytes each.
+    U64(&'a [[u8; 8]]),
+    /// Accesses with kind and size.
+    Accesses(&'a [PlainAccess]),
+}
+
+/// What a file held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Accesses, at least one.
+    pub accesses: u64,
+    /// Packets that were read over, since they neither read nor write data that caches keep.
+    pub other_packets: u64,
+}
+
+impl AddressFile<'static> {
+    /// Opens a file, a pipe, or standard input if the path is `-`; what is compressed is known by its
+    /// first bytes. Without a `form` it is the one that the name ends with (before .gz or .zst), or
+    /// else the one that the first bytes show.
+    ///
+    /// # Errors
+    /// What cannot be read (a folder, a device, a terminal), what is empty, what has no form.
+    pub fn open(path: &Path, form: Option<AddressForm>) -> Result<Self, FormatError> {
+        let name = path.display().to_string();
+        let io = |action| {
+            let name = name.clone();
+            move |source| FormatError::io(&name, action, source)
+        };
+        if name == "-" {
+            let stdin = io::stdin();
+            if stdin.is_terminal() {
+                return Err(wanted(&name, "a file or a pipe", "a terminal"));
+            }
+            return Self::of_stream("standard input".to_owned(), form, stdin);
+        }
+        let mut file = File::open(path).map_err(io("open"))?;
+        let metadata = file.metadata().map_err(io("read the size of"))?;
+        let kind = metadata.file_type();
+        if kind.is_dir() {
+            return Err(wanted(&name, "a file or a pipe", "a folder"));
+        }
+        if is_device(kind) {
+            return Err(wanted(&name, "a file or a pipe", "a device"));
+        }
+        if !kind.is_file() || metadata.len() == 0 {
+            return Self::of_stream(name, form, file);
+        }
+        let mut magic = Vec::new();
+        Read::take(&mut file, 4)
+            .read_to_end(&mut magic)
+            .map_err(io("read"))?;
+        if Compression::of_content(&magic).is_some() {
+            return Self::of_stream(name, form, Cursor::new(magic).chain(file));
+        }
+        // SAFETY: the map is read only, and programs that write traces do not change them while others
+        // read; this one writes under another name and renames.
+        let map = unsafe { Mmap::map(&file) }.map_err(io("map"))?;
+        let head = map.get(..HEAD_BYTES).unwrap_or(&map);
+        let form = told(&name, form, head, map.len() <= HEAD_BYTES)?;
+        Ok(Self {
+            name,
+            form,
+            compression: None,
+            bytes: Bytes::Mapped(map),
+        })
+    }
+}
+
+impl<'a> AddressFile<'a> {
+    /// Reads a stream as [`Self::open`] does a pipe; `name` stands for it in errors.
+    ///
+    /// # Errors
+    /// As those of [`Self::open`].
+    pub fn of_stream(
+        name: String,
+        form: Option<AddressForm>,
+        stream: impl Read + 'a,
+    ) -> Result<Self, FormatError> {
+        let (magic, stream) = head_of(stream, 4).map_err(|e| FormatError::io(&name, "read", e))?;
+        let compression = Compression::of_content(&magic);
+        let stream: Box<dyn Read + 'a> = match compression {
+            None => Box::new(stream),
+            Some(compression) => compression.reader(BufReader::with_capacity(1 << 16, stream)),
+        };
+        let read = |source| unreadable(&name, compression, source);
+        let (head, stream) = head_of(stream, HEAD_BYTES).map_err(read)?;
+        let form = told(&name, form, &head, head.len() < HEAD_BYTES)?;
+        Ok(Self {
+            name,
+            form,
+            compression,
+            bytes: Bytes::Stream(Box::new(stream)),
+        })
+    }
+
+    /// How errors call it.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its form.
+    #[must_use]
+    pub fn form(&self) -> AddressForm {
+        self.form
+    }
+
+    /// Its compression.
+    #[must_use]
+    pub fn compression(&self) -> Option<Compression> {
+        self.compression
+    }
+
+    /// Hands all accesses to `visit`, in their order, until it fails.
+    ///
+    /// # Errors
+    /// Input that cannot be read or is not of the form, with the place; no access at all; those of
+    /// `visit`.
+    pub fn for_blocks<E: From<FormatError>>(
+        self,
+        mut visit: impl FnMut(Block<'_>) -> Result<(), E>,
+    ) -> Result<Found, E> {
+        let name = self.name.clone();
+        let found = match self.form {
+            AddressForm::U32 => self.words(|words| visit(Block::U32(words))),
+            AddressForm::U64 => self.words(|words| visit(Block::U64(words))),
+            AddressForm::Din => self.records(din::Din::default(), visit),
+            AddressForm::Gem5 => self.records(gem5::Gem5::default(), visit),
+        }?;
+        if found.accesses == 0 {
+            let found = match found.other_packets {
+                0 => "none".to_owned(),
+                others => format!("none among {others} packets"),
+            };
+            return Err(malformed(&name, Place::Contents, 0, "at least one access", found).into());
+        }
+        Ok(found)
+    }
+
+    fn words<const N: usize, E: From<FormatError>>(
+        self,
+        mut visit: impl FnMut(&[[u8; N]]) -> Result<(), E>,
+    ) -> Result<Found, E> {
+        let mut found = Found::default();
+        let name = self.name.clone();
+        self.pieces::<E>(|piece, at, ended| {
+            let (words, rest) = piece.as_chunks::<N>();
+            let taken = piece.len() - rest.len();
+            found.accesses += words.len() as u64;
+            if ended && !rest.is_empty() {
+                let place = Place::Access(found.accesses + 1);
+                let (expected, rest) = (format!("{N} bytes"), rest.len().to_string());
+                return Err(malformed(&name, place, at + taken as u64, &expected, rest).into());
+            }
+            visit(words)?;
+            Ok(taken)
+        })?;
+        Ok(found)
+    }
+
+    fn records<E: From<FormatError>>(
+        self,
+        mut decoder: impl Decoder,
+        mut visit: impl FnMut(Block<'_>) -> Result<(), E>,
+    ) -> Result<Found, E> {
+        let mut found = Found::default();
+        let name = self.name.clone();
+        let mut accesses = Vec::new();
+        self.pieces::<E>(|piece, at, ended| {
+            let mut taken = 0;
+            loop {
+                accesses.clear();
+                let rest = piece.get(taken..).unwrap_or_default();
+                let decoded = decoder.decode(rest, ended, &mut accesses);
+                taken += decoded.map_err(|fault| {
+                    let at = at + (taken + fault.at) as u64;
+                    malformed(&name, fault.place, at, &fault.expected, fault.found)
+                })?;
+                if accesses.is_empty() {
+                    return Ok(taken);
+                }
+                found.accesses += accesses.len() as u64;
+                visit(Block::Accesses(&accesses))?;
+            }
+        })?;
+        found.other_packets = decoder.other_packets();
+        Ok(found)
+    }
+
+    /// Hands over piece after piece with its offset and whether it is the last; `take` says how many
+    /// bytes it used, and gets the others again.
+    fn pieces<E: From<FormatError>>(
+        self,
+        mut take: impl FnMut(&[u8], u64, bool) -> Result<usize, E>,
+    ) -> Result<(), E> {
+        let (name, compression) = (self.name, self.compression);
+        let mut stream = match self.bytes {
+            Bytes::Mapped(map) => return take(&map, 0, true).map(|_| ()),
+            Bytes::Stream(stream) => stream,
+        };
+        let mut buffer = Vec::with_capacity(BUFFER_BYTES);
+        let mut at = 0;
+        loop {
+            let room = (BUFFER_BYTES - buffer.len()) as u64;
+            let read = stream.by_ref().take(room).read_to_end(&mut buffer);
+            let read = read.map_err(|source| unreadable(&name, compression, source))?;
+            let ended = (read as u64) < room;
+            let taken = take(&buffer, at, ended)?;
+            if ended {
+                return Ok(());
+            }
+            buffer.drain(..taken);
+            at += taken as u64;
+        }
+    }
+}
+
+/// Up to `count` first bytes of a stream, and the stream with them.
+fn head_of<R: Read>(mut stream: R, count: usize) -> io::Result<(Vec<u8>, impl Read)> {
+    let mut head = Vec::new();
+    stream.by_ref().take(count as u64).read_to_end(&mut head)?;
+    Ok((head.clone(), Cursor::new(head).chain(stream)))
+}
+
+/// The form: the one given, or else that of the name, or else that of the first bytes.
+fn told(
+    name: &str,
+    given: Option<AddressForm>,
+    head: &[u8],
+    whole: bool,
+) -> Result<AddressForm, FormatError> {
+    let compression = Compression::of_name(name);
+    let plain = compression.and_then(|c| name.strip_suffix(c.extension()));
+    given
+        .or_else(|| AddressForm::of_name(plain.unwrap_or(name)))
+        .or_else(|| AddressForm::of_content(head, whole))
+        .ok_or_else(|| {
+            let found = match head {
+                [] => "nothing".to_owned(),
+                _ => super::shown(head.get(..16).unwrap_or(head)),
+            };
+            let expected = "din text, a gem5 trace, or a name that ends in .u32, .u64, .din or .gem5 \
+                            (--address-form tells)";
+            malformed(name, Place::Contents, 0, expected, found)
+        })
+}
+
+fn malformed(file: &str, place: Place, offset: u64, expected: &str, found: String) -> FormatError {
+    FormatError::Malformed {
+        file: file.to_owned(),
+        place,
+        offset,
+        expected: expected.to_owned(),
+        found,
+    }
+}
+
+fn wanted(name: &str, expected: &str, found: &str) -> FormatError {
+    let message = format!("expected {expected}, found {found}");
+    FormatError::io(name, "read", io::Error::other(message))
+}
+
+fn unreadable(name: &str, compression: Option<Compression>, source: io::Error) -> FormatError {
+    let action = match compression {
+        None => "read",
+        Some(Compression::Gzip) => "decompress (gzip)",
+        Some(Compression::Zstd) => "decompress (zstd)",
+    };
+    let source = match source.kind() {
+        io::ErrorKind::UnexpectedEof => {
+            io::Error::new(source.kind(), "expected more, found the end")
+        }
+        _ => source,
+    };
+    FormatError::io(name, action, source)
+}
+
+#[cfg(unix)]
+fn is_device(kind: std::fs::FileType) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    kind.is_char_device() || kind.is_block_device()
+}
+
+#[cfg(not(unix))]
+fn is_device(_: std::fs::FileType) -> bool {
+    false
+}
