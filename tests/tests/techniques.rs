@@ -242,6 +242,16 @@ fn what_cannot_be_is_refused_with_the_reason() {
         &["at most 8", "found 9"],
     );
     refused(&["--repeats", "0"], &["--repeats"]);
+    let mut tiny = program("tracegen");
+    tiny.args(["techniques", "atrium-plain", "--size", "1x1", "-o"]);
+    refuse(
+        tiny.arg(&folder),
+        &["--size", "0.1 to 1000 pixels per degree"],
+    );
+    refused(
+        &["--lens-center", "9,9"],
+        &["--lens-center", "shows some of the picture"],
+    );
     refused(
         &["--adapter", "no such device"],
         &["'no such device'", "llvmpipe"],

@@ -110,6 +110,9 @@ impl Picture {
     }
 }
 
+/// Pixels per degree that FLIP's filters are made for here: below, a degree is less than a pixel's tenth.
+pub const PIXELS_PER_DEGREE: std::ops::RangeInclusive<f32> = 0.1..=1000.0;
+
 /// Pixels per degree at the centre of an eye's image: `(W/2) / tan(h/2) * pi/180`, with the mean
 /// of the horizontal half-angle tangents where the frustum is off-axis.
 #[must_use]

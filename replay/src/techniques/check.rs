@@ -54,7 +54,7 @@ pub fn check(manifest: &Manifest) -> Checked {
     }
     let ppd = manifest.pixels_per_degree;
     ensure(
-        ppd > 0.1 && ppd <= 1000.0,
+        image_error::PIXELS_PER_DEGREE.contains(&ppd),
         "pixels_per_degree",
         "0.1 to 1000",
         ppd,

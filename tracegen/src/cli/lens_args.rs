@@ -1,7 +1,7 @@
 //! Flags that say what the lenses show.
 
 use super::technique_args::numbers;
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use clap::Args;
 use formats::view::{Hmd, Lens};
 use std::str::FromStr;
@@ -43,7 +43,7 @@ impl LensArgs {
     /// What the lenses show of the left and right eye's picture.
     ///
     /// # Errors
-    /// A radius or a centre out of range.
+    /// A radius or a centre out of range, or a lens that shows nothing.
     pub fn lenses(&self, hmd: &Hmd) -> anyhow::Result<[Lens; 2]> {
         let Center([x, y]) = self.lens_center;
         let mirrored = [-1.0, 1.0];
@@ -53,11 +53,22 @@ impl LensArgs {
                 .lens_radius
                 .unwrap_or_else(|| Lens::of(&hmd.fov[eye]).radius),
         });
-        for lens in &lenses {
+        for (lens, fov) in lenses.iter().zip(&hmd.fov) {
             if let Err(broken) = lens.check() {
                 let (expected, found) = (broken.expected, broken.found);
                 bail!("--lens-radius, --lens-center: expected {expected}, found {found}");
             }
+            // What lies in the picture is seen only if its point next to the centre is.
+            let next = [
+                lens.center[0].clamp(-fov.left, fov.right),
+                lens.center[1].clamp(-fov.down, fov.up),
+            ];
+            ensure!(
+                lens.contains(next),
+                "--lens-radius, --lens-center: expected a lens that shows some of the picture, found one of radius {} around {:?}",
+                lens.radius,
+                lens.center
+            );
         }
         Ok(lenses)
     }

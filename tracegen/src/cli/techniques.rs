@@ -15,6 +15,7 @@ use ::raster::backend::CaptureBackend;
 use ::raster::lavapipe::device;
 use anyhow::{Context, ensure};
 use clap::Args;
+use image_error::PIXELS_PER_DEGREE;
 use scene::LoadOptions;
 use shell::{Progress, Threads, note};
 use std::collections::HashMap;
@@ -113,6 +114,14 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     }
     let cascades = raster::cascades(&setup.scene, args.shadows);
     let lens = args.lens.lenses(&setup.hmd)?;
+    let pixels_per_degree =
+        image_error::pixels_per_degree(setup.hmd.eye_size_px[0], &setup.hmd.fov[0]);
+    ensure!(
+        PIXELS_PER_DEGREE.contains(&pixels_per_degree),
+        "--size: expected {} to {} pixels per degree, which image errors belong to, found {pixels_per_degree}",
+        PIXELS_PER_DEGREE.start(),
+        PIXELS_PER_DEGREE.end()
+    );
     let mut subject = Subject {
         tool: super::tool(),
         scene: args.scene.scene.clone(),
@@ -126,10 +135,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         size_px: setup.hmd.eye_size_px,
         hmd: setup.hmd.clone(),
         lens,
-        pixels_per_degree: image_error::pixels_per_degree(
-            setup.hmd.eye_size_px[0],
-            &setup.hmd.fov[0],
-        ),
+        pixels_per_degree,
         adapter,
         driver: gpu.driver.clone(),
         software_driver: gpu.is_software,
