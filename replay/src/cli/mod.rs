@@ -6,6 +6,7 @@ pub mod diff;
 pub mod dump;
 mod experiment_args;
 pub mod info;
+mod locality;
 mod paper;
 mod report;
 mod reproject;
@@ -71,6 +72,8 @@ enum Command {
     Report(Box<report::Args>),
     /// Hold techniques of stereo rendering against each other: time, image error, caches.
     Techniques(Box<techniques::Args>),
+    /// Reuse distances, working sets, miss-ratio curves, OPT and the 3C split, order by order.
+    Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
     #[command(flatten)]
@@ -93,6 +96,7 @@ pub fn main() -> ExitCode {
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),
             Command::Techniques(args) => techniques::run(&args),
+            Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
             Command::Documents(documents) => documents.run::<Cli>(),
         },

@@ -22,12 +22,12 @@ fn streams() -> impl Strategy<Value = Vec<Access>> {
     let line = prop_oneof![4 => 0..12_u32, 2 => 0..60_u32, 1 => 0..4000_u32];
     let eye = prop_oneof![Just(None), Just(Some(Eye::Left)), Just(Some(Eye::Right))];
     let item = (
-        proptest::collection::vec((line, any::<bool>()), 1..40),
+        proptest::collection::vec((line, any::<bool>()), 1..24),
         any::<bool>(),
         eye,
         prop::bool::weighted(0.15),
     );
-    proptest::collection::vec(item, 1..40).prop_map(|items| {
+    proptest::collection::vec(item, 1..24).prop_map(|items| {
         let (mut stream, mut frame, mut tile) = (Vec::new(), 0, 0);
         for (number, (lines, pair, eye, new_frame)) in (1..).zip(items) {
             frame += u32::from(new_frame);
@@ -99,7 +99,7 @@ fn analysed(stream: &[Access], cache: &CacheConfig) -> Figures {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig::with_cases(100))]
 
     #[test]
     fn every_figure_is_that_of_a_plain_twin(stream in streams(), cache in geometries()) {
