@@ -94,7 +94,13 @@ impl Level {
 
 #[test]
 fn the_causes_of_misses_are_those_of_plain_caches_fed_with_din() {
-    let output = run_ok(program("replay").arg("locality").arg(trace()).args(MACHINE).arg("--json"));
+    let output = run_ok(
+        program("replay")
+            .arg("locality")
+            .arg(trace())
+            .args(MACHINE)
+            .arg("--json"),
+    );
     let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     let (mut l1, mut l2) = (Level::new(256), Level::new(1024));
     for line in lines() {
@@ -122,7 +128,13 @@ fn outputs_are_the_same_whatever_the_number_of_threads() {
             program("replay")
                 .arg("locality")
                 .arg(trace())
-                .args(["--orders", "morton,z2-lrta,z2-sta", "--merged", "--threads", threads])
+                .args([
+                    "--orders",
+                    "morton,z2-lrta,z2-sta",
+                    "--merged",
+                    "--threads",
+                    threads,
+                ])
                 .arg("--html")
                 .arg(at("page.html"))
                 .arg("--csv")
@@ -132,7 +144,12 @@ fn outputs_are_the_same_whatever_the_number_of_threads() {
         for name in ["page.html", "page.json", "page.csv"] {
             files.push(std::fs::read(at(name)).expect(name));
         }
-        for name in ["summary.csv", "curves.csv", "distances.csv", "working-sets.csv"] {
+        for name in [
+            "summary.csv",
+            "curves.csv",
+            "distances.csv",
+            "working-sets.csv",
+        ] {
             files.push(std::fs::read(at("csv").join(name)).expect(name));
         }
         files
@@ -146,11 +163,14 @@ fn outputs_are_the_same_whatever_the_number_of_threads() {
     let distances = String::from_utf8(outputs[0][6].clone()).expect("CSV");
     let of_row = |line: &str| -> u64 {
         let counts = line.split(',').skip(5);
-        counts.map(|count| count.parse::<u64>().expect("a count")).sum()
+        counts
+            .map(|count| count.parse::<u64>().expect("a count"))
+            .sum()
     };
     let rows = distances.lines().filter(|l| l.contains(",morton,l1,"));
     let json: Value = serde_json::from_slice(&outputs[0][2]).expect("JSON");
     let row = &json["rows"][0];
-    let reuses = row["accesses"].as_u64().expect("a count") - row["unique_lines"].as_u64().expect("a count");
+    let reuses =
+        row["accesses"].as_u64().expect("a count") - row["unique_lines"].as_u64().expect("a count");
     assert_eq!(rows.map(of_row).sum::<u64>(), reuses);
 }

@@ -75,10 +75,10 @@ impl Summary<'_> {
         &self.figures.split
     }
 
-    /// Misses, percent of the lines asked for.
+    /// A count, percent of the lines asked for.
     #[must_use]
-    pub fn miss_pct(&self, misses: u64) -> Option<f64> {
-        pct(misses, self.figures.accesses)
+    pub fn share_pct(&self, count: u64) -> Option<f64> {
+        pct(count, self.figures.accesses)
     }
 
     /// Misses of a fully associative cache of the size under OPT.
@@ -159,17 +159,17 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
             .about("of the frames' lines, those that an earlier frame used"),
 
         whole("misses", "misses", |r| r.split().misses()),
-        real("miss_pct", "miss rate", |r| r.miss_pct(r.split().misses())).about("misses of the configured cache, of the lines asked for"),
+        real("miss_pct", "miss rate", |r| r.share_pct(r.split().misses())).about("misses of the configured cache, of the lines asked for"),
         whole("compulsory", "compulsory", |r| r.split().compulsory),
         whole("capacity", "capacity", |r| r.split().capacity.iter().sum()),
         whole("conflict", "conflict", |r| r.split().conflict.iter().sum()),
         whole("spared", "spared", |r| r.split().spared.iter().sum()),
-        real("compulsory_pct", "compulsory", |r| r.miss_pct(r.split().compulsory)).about("first uses"),
-        real("capacity_pct", "capacity", |r| r.miss_pct(r.split().capacity.iter().sum()))
+        real("compulsory_pct", "compulsory", |r| r.share_pct(r.split().compulsory)).about("first uses"),
+        real("capacity_pct", "capacity", |r| r.share_pct(r.split().capacity.iter().sum()))
             .about("further misses where a fully associative LRU cache of the size misses, too"),
-        real("conflict_pct", "conflict", |r| r.miss_pct(r.split().conflict.iter().sum()))
+        real("conflict_pct", "conflict", |r| r.share_pct(r.split().conflict.iter().sum()))
             .about("misses where the fully associative cache hits"),
-        real("spared_pct", "spared", |r| r.miss_pct(r.split().spared.iter().sum()))
+        real("spared_pct", "spared", |r| r.share_pct(r.split().spared.iter().sum()))
             .about("hits where the fully associative cache misses: conflicts that helped"),
         C::real("conflict_net", "conflict, net", "", 0, |r| r.split().misses() as f64 - r.split().fully_associative_misses() as f64)
             .about("conflict less spared: negative where sets help"),
@@ -181,13 +181,13 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
         real("conflict_earlier_frame_pct", "conflict, earlier frame's", |r| share(&r.split().conflict, Origin::EarlierFrame)),
 
         whole("fully_associative_misses", "fully associative", |r| r.split().fully_associative_misses()),
-        real("fully_associative_miss_pct", "full LRU", |r| r.miss_pct(r.split().fully_associative_misses()))
+        real("fully_associative_miss_pct", "full LRU", |r| r.share_pct(r.split().fully_associative_misses()))
             .about("misses of a fully associative LRU cache of the size"),
         whole("opt_misses", "OPT", |r| r.opt_misses()),
-        real("opt_miss_pct", "full OPT", |r| r.miss_pct(r.opt_misses()))
+        real("opt_miss_pct", "full OPT", |r| r.share_pct(r.opt_misses()))
             .about("misses of a fully associative cache of the size under Belady's OPT"),
         whole("opt_ways_misses", "OPT, ways", |r| r.opt_ways_misses()),
-        real("opt_ways_miss_pct", "OPT, ways", |r| r.miss_pct(r.opt_ways_misses()))
+        real("opt_ways_miss_pct", "OPT, ways", |r| r.share_pct(r.opt_ways_misses()))
             .about("misses of the configured sets and ways under OPT"),
     ]);
     for origin in Origin::ALL {

@@ -5,11 +5,13 @@ use super::{LocalityReport, plots};
 use crate::locality::Stream;
 use crate::report::html::{self, Section, figures};
 use crate::report::plots::PlotError;
+use crate::report::plots::stacked::StackedChart;
 use crate::report::table::Table;
 use crate::size::format_bytes;
 use maud::{Markup, html};
 
-/// Keys of the columns that the page's table shows; CSV and JSON have them all.
+/// Keys of the columns that the page's table shows; CSV and JSON have them all. Traces of one frame
+/// have no earlier ones.
 const SHOWN: [&str; 21] = [
     "order",
     "accesses",
@@ -30,8 +32,8 @@ const SHOWN: [&str; 21] = [
     "hits.earlier_frame_pct",
     "reuses.other_eye_pct",
     "reuses.earlier_frame_pct",
-    "tile_lines",
     "capacity_other_eye_pct",
+    "tile_lines",
 ];
 
 impl LocalityReport {
@@ -50,7 +52,9 @@ impl LocalityReport {
             let table = table
                 .only("trace", of.trace)
                 .only("stream", of.stream.key());
-            let body = stream(rows, &table)?;
+            let trace = self.traces.iter().find(|t| t.label == of.trace);
+            let one_frame = trace.is_some_and(|trace| trace.frames < 2);
+            let body = stream(rows, &table, one_frame)?;
             sections.push(Section::new(
                 format!("{}: {}", of.trace, of.stream.title()),
                 body,
@@ -78,22 +82,21 @@ impl LocalityReport {
 }
 
 /// A stream of a trace: its table and plots.
-fn stream(rows: &[Summary], table: &Table) -> Result<Markup, PlotError> {
+fn stream(rows: &[Summary], table: &Table, one_frame: bool) -> Result<Markup, PlotError> {
     let plain = |svg: String| (svg, String::new());
-    let distances = plots::distances(rows)
-        .iter()
-        .zip(rows)
-        .map(|(chart, row)| {
-            let at_once = plots::at_once_pct(row).unwrap_or(0.0);
-            let caption = format!("Not drawn: {at_once:.1} % use the line that was used last.");
-            Ok((chart.svg()?, caption))
-        })
-        .collect::<Result<Vec<_>, PlotError>>()?;
+    // Where a bin begins.
+    let far_from = (rows[0].figures.configured_lines / 8)
+        .max(1)
+        .next_power_of_two();
+    let far = distances(rows, far_from)?;
+    let all = distances(rows, 1)?;
     let ways = rows
         .iter()
         .map(|row| Ok(plain(plots::associativity(row).svg()?)));
     let ways = ways.collect::<Result<Vec<_>, PlotError>>()?;
-    let shown = table.picked(SHOWN).without_empty_columns();
+    let keys = SHOWN.into_iter();
+    let shown = table.picked(keys.filter(|key| !(one_frame && key.contains("earlier"))));
+    let shown = shown.without_empty_columns();
     Ok(html! {
         p { (about(rows)) }
         (shown.markup())
@@ -110,7 +113,12 @@ fn stream(rows: &[Summary], table: &Table) -> Result<Markup, PlotError> {
             (plots::bounds(rows).svg()?, "OPT drops the line whose next use is furthest: no cache of the size that is filled by every miss does better.".to_owned()),
         ]))
         h3 { "Reuse distances" }
-        (figures(&distances))
+        p { "Reuses that a fully associative cache of an eighth of the configured size would miss:" }
+        (figures(&far))
+        details {
+            summary { "nearer reuses, too" }
+            (figures(&all))
+        }
         h3 { "Working sets" }
         (figures(&[
             (plots::working_sets(rows).svg()?, "Two tiles that are rendered together take two tiles' time, and their lines belong to both.".to_owned()),
@@ -121,6 +129,19 @@ fn stream(rows: &[Summary], table: &Table) -> Result<Markup, PlotError> {
             (figures(&ways))
         }
     })
+}
+
+/// A chart an order of the reuses at distances from `from` on.
+fn distances(rows: &[Summary], from: u64) -> Result<Vec<(String, String)>, PlotError> {
+    let charts = plots::distances(rows, from);
+    let figure = |(chart, row): (&StackedChart, &Summary)| {
+        let nearer = plots::nearer_pct(row, from).unwrap_or(0.0);
+        Ok((
+            chart.svg()?,
+            format!("Not drawn: {nearer:.1} % at smaller distances."),
+        ))
+    };
+    charts.iter().zip(rows).map(figure).collect()
 }
 
 fn about(rows: &[Summary]) -> String {

@@ -150,27 +150,28 @@ fn origins() -> Vec<SeriesStyle> {
     Origin::ALL.into_iter().enumerate().map(name).collect()
 }
 
-fn drawn_bins<'a>(row: &Summary<'a>) -> impl Iterator<Item = Reuses<'a>> {
+/// Bins of the distances from `from` on.
+fn bins_from<'a>(row: &Summary<'a>, from: u64) -> impl Iterator<Item = Reuses<'a>> {
     let bins = LocalityReport::distances(row).into_iter();
-    bins.filter(|bin| bin.distances.0 > 0)
+    bins.filter(move |bin| bin.distances.0 >= from)
 }
 
-/// Reuses beyond distance zero, by distance and by where the use before was, one chart an order.
+/// Reuses at the distances from `from` on, by where the use before was, one chart an order.
 #[must_use]
-pub fn distances(rows: &[Summary]) -> Vec<StackedChart> {
+pub fn distances(rows: &[Summary], from: u64) -> Vec<StackedChart> {
     let share =
         |row: &Summary, count: u64| 100.0 * count as f64 / row.figures.accesses.max(1) as f64;
     let highest = rows
         .iter()
-        .flat_map(|row| drawn_bins(row).map(move |bin| share(row, bin.reuses.iter().sum())));
+        .flat_map(|row| bins_from(row, from).map(move |bin| share(row, bin.reuses.iter().sum())));
     let highest = highest.fold(0.0, f64::max);
     let most = rows
         .iter()
-        .map(|row| drawn_bins(row).count())
+        .map(|row| bins_from(row, from).count())
         .max()
         .unwrap_or(0);
     let chart = |row: &Summary| {
-        let mut bars: Vec<(String, Vec<f64>)> = drawn_bins(row)
+        let mut bars: Vec<(String, Vec<f64>)> = bins_from(row, from)
             .map(|bin| {
                 let parts = bin.reuses.iter().map(|&count| share(row, count));
                 (short(bin.distances.0), parts.collect())
@@ -187,7 +188,7 @@ pub fn distances(rows: &[Summary]) -> Vec<StackedChart> {
             bar_label: "distance, distinct lines from".into(),
             series: origins(),
             bars,
-            bar_px: 21.0,
+            bar_px: 26.0,
             highest: (highest > 0.0).then_some(1.05 * highest),
             decimals: None,
         }
@@ -204,10 +205,10 @@ fn short(number: u64) -> String {
     }
 }
 
-/// Reuses of the line that was used last, percent of the lines asked for.
+/// Reuses at smaller distances, percent of the lines asked for. `from` is 1 or begins a bin.
 #[must_use]
-pub fn at_once_pct(row: &Summary) -> Option<f64> {
-    row.miss_pct(row.figures.distances.hits(1).iter().sum())
+pub fn nearer_pct(row: &Summary, from: u64) -> Option<f64> {
+    row.share_pct(row.figures.distances.hits(from).iter().sum())
 }
 
 /// Mean working set by length of the stretch.
@@ -267,7 +268,7 @@ pub fn causes(rows: &[Summary]) -> StackedChart {
         let split = &row.figures.split;
         let sum = |counts: &[u64]| counts.iter().sum();
         let parts = [split.compulsory, sum(&split.capacity), sum(&split.conflict)];
-        let parts = parts.map(|part| row.miss_pct(part).unwrap_or(0.0));
+        let parts = parts.map(|part| row.share_pct(part).unwrap_or(0.0));
         (row.of.order.title().to_owned(), parts.to_vec())
     };
     StackedChart {
@@ -295,7 +296,7 @@ pub fn bounds(rows: &[Summary]) -> BarChart {
             row.opt_ways_misses(),
             row.opt_misses(),
         ]
-        .map(|misses| row.miss_pct(misses))
+        .map(|misses| row.share_pct(misses))
         .to_vec(),
         marks: Vec::new(),
     };
