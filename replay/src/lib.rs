@@ -8,6 +8,7 @@ pub mod config;
 pub mod engine;
 pub mod experiment;
 pub mod files;
+pub mod locality;
 pub mod order;
 mod palette;
 pub mod paper;

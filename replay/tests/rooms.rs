@@ -4,12 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the bottom up. A room may use rooms below it; those on one floor may use each other.
-const FLOORS: [&[&str]; 10] = [
+const FLOORS: [&[&str]; 11] = [
     &["files", "palette", "registry", "result", "size"],
     &["cache", "config", "order"],
     &["paper", "tmu"],
     &["addresses", "stream"],
     &["engine"],
+    &["locality"],
     &["sgrt"],
     &["experiment"],
     &["techniques"],

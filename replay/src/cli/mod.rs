@@ -7,6 +7,7 @@ pub mod diff;
 pub mod dump;
 mod experiment_args;
 pub mod info;
+mod locality;
 mod paper;
 mod report;
 mod reproject;
@@ -72,6 +73,8 @@ enum Command {
     Report(Box<report::Args>),
     /// Hold techniques of stereo rendering against each other: time, image error, caches.
     Techniques(Box<techniques::Args>),
+    /// Reuse distances, working sets, miss-ratio curves, OPT and the 3C split, order by order.
+    Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
     #[command(flatten)]
@@ -94,6 +97,7 @@ pub fn main() -> ExitCode {
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),
             Command::Techniques(args) => techniques::run(&args),
+            Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
             Command::Documents(documents) => documents.run::<Cli>(),
         },

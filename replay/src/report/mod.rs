@@ -5,6 +5,7 @@ pub mod columns;
 pub mod csv;
 pub mod figures;
 pub mod html;
+pub mod locality;
 pub mod picture;
 pub mod plots;
 pub mod run;

@@ -200,7 +200,7 @@ impl BarChart {
 }
 
 /// Breaks a label at spaces, hyphens or slashes into lines no wider than `width_px`.
-fn wrap(label: &str, width_px: f64, size_px: u32) -> Vec<String> {
+pub(super) fn wrap(label: &str, width_px: f64, size_px: u32) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut line = String::new();
     for word in label.split_inclusive([' ', '-', '/']) {

@@ -4,6 +4,7 @@
 use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
+use crate::size::format_bytes;
 use plotters::prelude::{Circle, Color, PathElement};
 use plotters::style::text_anchor::HPos;
 use std::ops::Range;
@@ -28,6 +29,15 @@ pub struct LineSeries {
     pub mark: Mark,
 }
 
+/// What doubles along an axis, and so how its ticks are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doublings {
+    /// Sizes, with binary units.
+    Bytes,
+    /// Numbers.
+    Numbers,
+}
+
 /// An axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
@@ -35,6 +45,8 @@ pub struct Axis {
     pub label: String,
     /// Ends of the axis; `None` takes them from the data.
     pub range: Option<(f64, f64)>,
+    /// Even steps are doublings of this; `None` for a linear axis.
+    pub doublings: Option<Doublings>,
 }
 
 impl Axis {
@@ -43,6 +55,39 @@ impl Axis {
         Self {
             label: label.into(),
             ..Self::default()
+        }
+    }
+
+    /// An axis of doublings, for positive values.
+    pub fn doublings(label: impl Into<String>, of: Doublings) -> Self {
+        Self {
+            label: label.into(),
+            doublings: Some(of),
+            ..Self::default()
+        }
+    }
+
+    /// Where on the axis a value is.
+    fn place(&self, value: f64) -> f64 {
+        match self.doublings {
+            Some(_) => value.log2(),
+            None => value,
+        }
+    }
+
+    /// Writes what is at a place on the axis; nothing between doublings.
+    fn tick(&self, range: &Range<f64>) -> Box<dyn Fn(&f64) -> String> {
+        match self.doublings {
+            None => Box::new(tick_format(range)),
+            Some(of) => Box::new(move |place| {
+                let whole = place.round();
+                let value = whole.exp2();
+                match of {
+                    _ if (place - whole).abs() > 1e-6 => String::new(),
+                    Doublings::Bytes => format_bytes(value as u64),
+                    Doublings::Numbers => theme::group_thousands(&value.to_string()),
+                }
+            }),
         }
     }
 }
@@ -75,7 +120,7 @@ impl LineChart {
     pub fn svg(&self) -> Result<String, PlotError> {
         for series in &self.series {
             for &(x, y) in &series.points {
-                if !x.is_finite() || !y.is_finite() {
+                if !self.x.place(x).is_finite() || !self.y.place(y).is_finite() {
                     return Err(PlotError {
                         title: self.title.clone(),
                         problem: format!(
@@ -86,7 +131,8 @@ impl LineChart {
                 }
             }
         }
-        let points = || self.series.iter().flat_map(|s| &s.points);
+        let place = |&(x, y): &(f64, f64)| (self.x.place(x), self.y.place(y));
+        let points = || self.series.iter().flat_map(|s| s.points.iter().map(place));
         let x = self.x.fit(points().map(|p| p.0));
         let y = self.y.fit(points().map(|p| p.1));
         let named = |mark| {
@@ -118,8 +164,8 @@ impl LineChart {
             themed(&mut chart.configure_mesh())
                 .disable_x_mesh()
                 .x_desc(&self.x.label)
-                .x_label_formatter(&tick_format(&x))
-                .y_label_formatter(&tick_format(&y))
+                .x_label_formatter(&self.x.tick(&x))
+                .y_label_formatter(&self.y.tick(&y))
                 .draw()?;
             for LineSeries {
                 style,
@@ -129,18 +175,19 @@ impl LineChart {
             {
                 match mark {
                     Mark::Line => {
-                        let line = PathElement::new(points.clone(), style.color);
+                        let line: Vec<_> = points.iter().map(place).collect();
+                        let line = PathElement::new(line, style.color);
                         chart.plotting_area().draw(&line)?;
                     }
                     Mark::Dots => {
-                        let dot = |&at| Circle::new(at, DOT_PX, style.color.filled());
+                        let dot = |at| Circle::new(place(at), DOT_PX, style.color.filled());
                         chart.draw_series(points.iter().map(dot))?;
                     }
                 }
             }
             let last = |s: &LineSeries| s.points.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
             let ends: Vec<(&SeriesStyle, (i32, i32))> = named(Mark::Line)
-                .filter_map(|s| Some((&s.style, chart.backend_coord(&last(s)?))))
+                .filter_map(|s| Some((&s.style, chart.backend_coord(&place(&last(s)?)))))
                 .collect();
             let wishes: Vec<f64> = ends.iter().map(|(_, (_, y))| f64::from(*y)).collect();
             let top = f64::from(TOP_PX);
@@ -174,7 +221,7 @@ impl Axis {
             0.0 => (0.04 * high.abs()).max(0.5),
             room => room,
         };
-        let from_zero = low >= 0.0 && low < 0.35 * high;
+        let from_zero = self.doublings.is_none() && low >= 0.0 && low < 0.35 * high;
         (if from_zero { 0.0 } else { low - room })..high + room
     }
 }
@@ -223,6 +270,18 @@ mod tests {
         let svg = chart().svg().unwrap();
         assert!(svg.contains("L1 size, KiB") && svg.contains("L1 miss rate, %"));
         assert!(svg.contains("\n16\n") && svg.contains("\n20\n"), "ticks");
+    }
+
+    #[test]
+    fn an_axis_of_doublings_has_its_points_at_even_steps() {
+        let mut chart = chart();
+        chart.x = Axis::doublings("L1 size", Doublings::Bytes);
+        chart.series[0].points = vec![(8.0, 1.0), (16.0, 1.0), (32.0, 1.0), (2048.0, 1.0)];
+        let svg = chart.svg().unwrap();
+        let at = ["16 B", "64 B", "256 B"].map(|tick| text_at(&svg, tick).0);
+        assert!((at[1] - at[0] - (at[2] - at[1])).abs() <= 1.0, "{at:?}");
+        chart.series[0].points[0].0 = 0.0;
+        assert!(chart.svg().unwrap_err().to_string().contains("(0, 1)"));
     }
 
     #[test]

@@ -1,0 +1,127 @@
+//! `replay locality`: reuse distances and what follows from them, order beside order.
+
+use super::ConfigArgs;
+use super::experiment_args::{page_outputs, parse_orders};
+use super::subjects::Traces;
+use crate::config::RunConfig;
+use crate::experiment::frame_count;
+use crate::files::{self, write_atomically};
+use crate::locality::analyse;
+use crate::report::locality::{LocalityReport, TraceFigures};
+use crate::stream::TileSource;
+use anyhow::{Context, Result, ensure};
+use shell::{Output, Progress, is_stdout};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `replay locality`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  replay locality c.textrace
+  replay locality c.textrace --orders all --html locality.html
+  replay locality c.textrace --orders morton,z2-sta --l1 16KiB --json
+  replay locality c.textrace --csv tables
+docs/locality.md defines every figure.")]
+pub struct Args {
+    /// Texture traces
+    #[arg(required = true, value_name = "TRACE")]
+    traces: Vec<PathBuf>,
+    #[command(flatten)]
+    machine: ConfigArgs,
+    /// Orders to compare, comma-separated, or `all`
+    #[arg(
+        long,
+        value_name = "ORDERS",
+        default_value = "morton,z2-lrta,z2-sta,z2-sta-merge"
+    )]
+    orders: String,
+    /// Also analyse what all cores ask for as one stream
+    #[arg(long)]
+    merged: bool,
+    /// Print one JSON object (schema replay.locality/1)
+    #[arg(long)]
+    json: bool,
+    /// Also write the tables as CSV files into this folder, with the exact count of every distance
+    #[arg(long, value_name = "DIR")]
+    csv: Option<PathBuf>,
+    /// Also write a page with plots, with JSON and CSV beside it
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    #[command(flatten)]
+    threads: shell::Threads,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// An impossible configuration, an unreadable trace, an output that cannot be written.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    args.threads.start()?;
+    let config = args.machine.resolve()?;
+    ensure!(
+        config.order == RunConfig::default().order,
+        "--order is varied here; use --orders"
+    );
+    let orders = parse_orders(&args.orders)?;
+    let prints = check_outputs(args)?;
+    let traces = Traces::open(&args.traces)?;
+    let subjects = traces.subjects();
+    let frames = |source: &dyn TileSource| u64::from(frame_count(source.tables()));
+    let steps: u64 = subjects.iter().map(|s| frames(s.source)).sum();
+    let progress = Progress::new("analysing", steps * orders.len() as u64, "frames");
+    let mut figures = Vec::new();
+    for subject in &subjects {
+        let done = |steps| progress.advance(steps);
+        let orders = analyse(subject.source, &config, &orders, args.merged, &done)
+            .with_context(|| subject.label.clone())?;
+        figures.push(TraceFigures {
+            label: subject.label.clone(),
+            id: subject.id.clone(),
+            frames: frame_count(subject.source.tables()),
+            orders,
+        });
+    }
+    drop(progress);
+    let report = LocalityReport {
+        traces: figures,
+        config,
+    };
+    if let Some(folder) = &args.csv {
+        for (name, text) in report.csv_files() {
+            write_atomically(&folder.join(name), text.as_bytes())?;
+        }
+    }
+    if let Some(path) = &args.html {
+        let page = report.page()?;
+        if !is_stdout(path) {
+            let json = report.json()? + "\n";
+            write_atomically(&path.with_extension("json"), json.as_bytes())?;
+            write_atomically(&path.with_extension("csv"), report.csv().as_bytes())?;
+        }
+        write_atomically(path, page.as_bytes())?;
+    }
+    if prints {
+        super::print(&if args.json {
+            report.json()?
+        } else {
+            report.text()
+        })?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Checks the outputs; true where standard output is left for the result.
+fn check_outputs(args: &Args) -> Result<bool> {
+    let csv: Vec<PathBuf> = args
+        .csv
+        .iter()
+        .flat_map(|folder| LocalityReport::CSV_FILES.map(|name| folder.join(name)))
+        .collect();
+    let mut outputs: Vec<Output> = csv.iter().map(|path| Output::text("--csv", path)).collect();
+    let pages = args.html.iter();
+    outputs.extend(pages.flat_map(|path| page_outputs("--html", path)));
+    outputs.extend(args.json.then(|| Output::result("--json")));
+    let inputs = args.traces.iter().map(PathBuf::as_path);
+    files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
+    Ok(!args.html.iter().any(|path| is_stdout(path)))
+}

@@ -1,0 +1,86 @@
+//! What the analysis of a stream of lines yields.
+
+use super::distances::Distances;
+use super::place::{ByOrigin, add};
+use super::set_associative::CacheHits;
+use super::split::MissSplit;
+use super::working_set::WorkingSet;
+
+/// Figures of the lines that a cache is asked for; those of several caches of a level are sums.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Figures {
+    /// Lines asked for; first uses and reuses.
+    pub accesses: u64,
+    /// Distinct lines.
+    pub unique_lines: u64,
+    /// Tiles in which lines were asked for.
+    pub tiles: u64,
+    /// Distinct lines of every frame, summed over frames.
+    pub frame_lines: u64,
+    /// Of those, lines that both eyes' tiles of the frame use.
+    pub frame_lines_of_both_eyes: u64,
+    /// Of those, lines that an earlier frame used.
+    pub frame_lines_of_earlier_frames: u64,
+    /// Reuses by LRU stack distance.
+    pub distances: Distances,
+    /// The configured cache.
+    pub split: MissSplit,
+    /// LRU caches of some sizes and ways.
+    pub lru: Vec<CacheHits>,
+    /// Fully associative caches of some sizes under OPT, ascending.
+    pub opt: Vec<CacheHits>,
+    /// Capacity of the configured cache in lines.
+    pub configured_lines: u64,
+    /// Hits of the configured geometry under OPT.
+    pub opt_of_geometry: ByOrigin,
+    /// By length.
+    pub working_sets: Vec<WorkingSet>,
+}
+
+impl Figures {
+    /// Adds the figures of another cache of the level.
+    pub fn add(&mut self, other: &Self) {
+        self.accesses += other.accesses;
+        self.unique_lines += other.unique_lines;
+        self.tiles += other.tiles;
+        self.frame_lines += other.frame_lines;
+        self.frame_lines_of_both_eyes += other.frame_lines_of_both_eyes;
+        self.frame_lines_of_earlier_frames += other.frame_lines_of_earlier_frames;
+        self.distances.add(&other.distances);
+        self.split.add(&other.split);
+        let lists = [(&mut self.lru, &other.lru), (&mut self.opt, &other.opt)];
+        for (to, from) in lists {
+            debug_assert_eq!(to.len(), from.len(), "caches of one level");
+            for (to, from) in to.iter_mut().zip(from) {
+                add(&mut to.hits, &from.hits);
+            }
+        }
+        add(&mut self.opt_of_geometry, &other.opt_of_geometry);
+        // A core with less to do has fewer lengths.
+        for (index, other) in other.working_sets.iter().enumerate() {
+            match self.working_sets.get_mut(index) {
+                Some(own) => own.add(other),
+                None => self.working_sets.push(*other),
+            }
+        }
+    }
+
+    /// Reuses by where the use before was: hits of a cache that forgets nothing.
+    #[must_use]
+    pub fn reuses(&self) -> ByOrigin {
+        self.distances.total()
+    }
+
+    /// Misses of a cache with these hits.
+    #[must_use]
+    pub fn misses(&self, hits: &ByOrigin) -> u64 {
+        self.accesses - hits.iter().sum::<u64>()
+    }
+
+    /// Hits under OPT of a fully associative cache of the configured size.
+    #[must_use]
+    pub fn opt_of_size(&self) -> ByOrigin {
+        let own = self.opt.iter().find(|p| p.lines == self.configured_lines);
+        own.map_or(ByOrigin::default(), |point| point.hits)
+    }
+}

@@ -1,0 +1,28 @@
+//! Locality: how far apart the uses of lines lie, and what that means for caches of every size.
+//!
+//! [`Profile`] analyses one stream of lines, which it is told line by line, each with its place;
+//! [`analyse`] makes the streams of a trace, one pass an order. `docs/locality.md` defines every
+//! figure.
+
+mod axis;
+mod distances;
+mod figures;
+mod last_use;
+mod opt;
+mod orders;
+mod place;
+mod profile;
+mod set_associative;
+mod split;
+#[cfg(test)]
+mod tests;
+mod working_set;
+
+pub use distances::{DistanceBin, Distances};
+pub use figures::Figures;
+pub use orders::{OrderFigures, Stream, analyse};
+pub use place::{ByOrigin, Origin, Place};
+pub use profile::{Profile, StreamCache};
+pub use set_associative::CacheHits;
+pub use split::MissSplit;
+pub use working_set::WorkingSet;

@@ -1,0 +1,297 @@
+//! The analysis of a trace: one pass over its lines an order.
+
+use super::figures::Figures;
+use super::place::Place;
+use super::profile::{Profile, StreamCache};
+use crate::config::{ConfigError, Order, RunConfig};
+use crate::engine::ReplayError;
+use crate::order::{self, Phase};
+use crate::stream::{
+    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, shaded,
+};
+use formats::textrace::Pass;
+use formats::view::Eye;
+use rayon::prelude::*;
+
+/// A stream of lines in a machine without latencies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stream {
+    /// What each core asks its L1 for; figures are sums over the cores.
+    L1,
+    /// What misses the configured L1 caches, in the order in which it reaches the L2.
+    L2,
+    /// What all cores ask for, as one L1 that they share would see it.
+    Merged,
+}
+
+impl Stream {
+    /// Name in columns.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::L1 => "l1",
+            Self::L2 => "l2",
+            Self::Merged => "merged",
+        }
+    }
+
+    /// Name in headings.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::L1 => "L1",
+            Self::L2 => "L2",
+            Self::Merged => "all cores as one",
+        }
+    }
+}
+
+/// What an order makes of the locality of a trace.
+#[derive(Clone, Debug)]
+pub struct OrderFigures {
+    /// The order.
+    pub order: Order,
+    /// Figures of each stream.
+    pub streams: Vec<(Stream, Figures)>,
+}
+
+/// Analyses a trace in every order, in parallel. Of `config` the order and latencies do not matter.
+/// `done` is told of every frame of every order.
+///
+/// # Errors
+/// An impossible configuration, or a trace that cannot be read.
+pub fn analyse(
+    trace: &dyn TileSource,
+    config: &RunConfig,
+    orders: &[Order],
+    merged: bool,
+    done: &(dyn Fn(u64) + Sync),
+) -> Result<Vec<OrderFigures>, ReplayError> {
+    config.validate()?;
+    let passes = &trace.tables().passes;
+    let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
+    frames.sort_unstable();
+    frames.dedup();
+    // What is known of the lines is kept from frame to frame, so only as many orders as run at the
+    // same time share an expansion of several frames.
+    let together = match frames.len() {
+        0 | 1 => orders.len(),
+        _ => rayon::current_num_threads(),
+    };
+    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+    let shaded = shaded(trace, config.hsr)?;
+    let mut figures = Vec::new();
+    for orders in orders.chunks(together.max(1)) {
+        let expander = Expander::new(&shaded, config)?;
+        let mut counts = TraceCounts::new(expander.bins());
+        let analyses: Result<Vec<Option<Analysis>>, ConfigError> = orders
+            .iter()
+            .map(|_| {
+                (frames.len() != 1)
+                    .then(|| Analysis::new(config, merged))
+                    .transpose()
+            })
+            .collect();
+        let mut analyses = analyses?;
+        let mut finished: Vec<Option<OrderFigures>> = orders.iter().map(|_| None).collect();
+        for &number in &frames {
+            let frame = expander.frame(number, &memory, &mut counts)?;
+            let last = frames.last() == Some(&number);
+            let run = |((&order, kept), finished): (
+                (&Order, &mut Option<Analysis>),
+                &mut Option<OrderFigures>,
+            )| {
+                let phases = order::plan_frame(&*order.build(config.seed), passes, number);
+                let mut analysis = match kept.take() {
+                    Some(analysis) => analysis,
+                    None => Analysis::new(config, merged)?,
+                };
+                let places = Places::new(passes, number, &phases, expander.bins().first_tiles());
+                analysis.begin_frame(places);
+                let mut cores = Cores::new(&frame, config.cores as usize);
+                interleave(&mut cores, &phases, config.assign, &mut analysis)?;
+                if last {
+                    *finished = Some(analysis.finish(order));
+                } else {
+                    *kept = Some(analysis);
+                }
+                done(1);
+                Ok::<(), ReplayError>(())
+            };
+            let orders = orders.par_iter().zip(&mut analyses).zip(&mut finished);
+            orders.with_max_len(1).try_for_each(run)?;
+        }
+        let empty = orders.iter().zip(analyses);
+        for ((order, analysis), finished) in empty.zip(finished) {
+            let of_no_frame = analysis.map(|analysis| analysis.finish(*order));
+            figures.extend(finished.or(of_no_frame));
+        }
+    }
+    Ok(figures)
+}
+
+/// Where the tiles of a frame are, in an order.
+struct Places {
+    /// Number of the first tile.
+    first: usize,
+    /// Work item by tile, counted from 1, and whether it has two tiles.
+    items: Vec<(u32, bool)>,
+    /// First tile of each pass of the frame and its eye.
+    passes: Vec<(usize, Option<Eye>)>,
+}
+
+impl Places {
+    fn new(passes: &[Pass], frame: u32, phases: &[Phase], first_tiles: &[usize]) -> Self {
+        let of_frame = || {
+            let all = passes.iter().zip(first_tiles);
+            all.filter(|(pass, _)| pass.frame == frame)
+        };
+        let first = of_frame().map(|(_, &first)| first).min().unwrap_or(0);
+        let ends = of_frame().map(|(pass, &first)| first + pass.tile_count() as usize);
+        let tiles = ends.max().unwrap_or(0) - first;
+        let mut items = vec![(0, false); tiles];
+        for (number, item) in (1..).zip(phases.iter().flatten()) {
+            let pair = item.tiles().count() > 1;
+            for at in item.tiles() {
+                let tile = first_tiles[at.pass as usize] + at.tile as usize;
+                items[tile - first] = (number, pair);
+            }
+        }
+        Self {
+            first,
+            items,
+            passes: of_frame().map(|(pass, &first)| (first, pass.eye)).collect(),
+        }
+    }
+
+    fn of(&self, tile: usize) -> Place {
+        let (item, pair) = self.items[tile - self.first];
+        let pass = self.passes.iter().rfind(|(first, _)| *first <= tile);
+        Place {
+            tile: tile as u32,
+            eye: pass.and_then(|(_, eye)| *eye),
+            item,
+            tiles: 1 + u32::from(pair),
+        }
+    }
+}
+
+/// The machine: analyses in place of caches.
+struct Analysis {
+    l1: Vec<Core>,
+    l2: Shared,
+    merged: Option<Shared>,
+    places: Option<Places>,
+}
+
+/// A core's analysis, and where the core is.
+struct Core {
+    profile: Profile,
+    tile: Option<usize>,
+    place: Place,
+}
+
+/// The analysis of what several cores share, and the tile that it was told of.
+struct Shared {
+    profile: Profile,
+    tile: Option<usize>,
+}
+
+impl Shared {
+    #[inline(always)]
+    fn access(&mut self, tile: usize, place: &Place, line: u32) {
+        if self.tile != Some(tile) {
+            self.tile = Some(tile);
+            self.profile.at(place);
+        }
+        self.profile.access(line);
+    }
+}
+
+impl Analysis {
+    fn new(config: &RunConfig, merged: bool) -> Result<Self, ConfigError> {
+        // Seeds as in a replay.
+        let profile = |level: &'static str, cache, number: u32| {
+            Profile::new(StreamCache {
+                cache,
+                level,
+                line_bytes: config.line_bytes,
+                seed: config.seed.wrapping_add(number.into()),
+            })
+        };
+        let shared = |profile| Shared {
+            profile,
+            tile: None,
+        };
+        let core = |number| {
+            profile("L1", &config.l1, number).map(|profile| Core {
+                profile,
+                tile: None,
+                place: Place::default(),
+            })
+        };
+        let merged = merged.then(|| profile("L1", &config.l1, 1)).transpose()?;
+        Ok(Self {
+            l1: (1..=config.cores).map(core).collect::<Result<_, _>>()?,
+            l2: shared(profile("L2", &config.l2, 0)?),
+            merged: merged.map(shared),
+            places: None,
+        })
+    }
+
+    fn begin_frame(&mut self, places: Places) {
+        self.places = Some(places);
+        for core in &mut self.l1 {
+            core.tile = None;
+            core.profile.begin_frame();
+        }
+        for shared in [Some(&mut self.l2), self.merged.as_mut()]
+            .into_iter()
+            .flatten()
+        {
+            shared.tile = None;
+            shared.profile.begin_frame();
+        }
+    }
+
+    fn finish(self, order: Order) -> OrderFigures {
+        let mut l1 = Figures::default();
+        for (number, core) in self.l1.into_iter().enumerate() {
+            match number {
+                0 => l1 = core.profile.finish(),
+                _ => l1.add(&core.profile.finish()),
+            }
+        }
+        let mut streams = vec![(Stream::L1, l1), (Stream::L2, self.l2.profile.finish())];
+        let merged = self.merged.map(|shared| shared.profile.finish());
+        streams.extend(merged.map(|figures| (Stream::Merged, figures)));
+        OrderFigures { order, streams }
+    }
+}
+
+impl Consumer for Analysis {
+    fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
+        let Some(places) = &self.places else { return };
+        if quad.lines.is_empty() {
+            return;
+        }
+        let (core, tile) = (&mut self.l1[core], quad.tile());
+        if core.tile != Some(tile) {
+            core.tile = Some(tile);
+            core.place = places.of(tile);
+            core.profile.at(&core.place);
+        }
+        for footprint in quad.footprints() {
+            for _ in 0..=footprint.repeats {
+                for &line in footprint.lines {
+                    if !core.profile.access(line) {
+                        self.l2.access(tile, &core.place, line);
+                    }
+                    if let Some(merged) = &mut self.merged {
+                        merged.access(tile, &core.place, line);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Where an access comes from, and what that makes of a reuse.
+
+use formats::view::Eye;
+
+/// Where an access comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// Number of the tile, below [`Place::MOST_TILES`].
+    pub tile: u32,
+    /// The eye that the tile is of.
+    pub eye: Option<Eye>,
+    /// Number of the work item (a tile, or tiles rendered together): later items have larger ones.
+    pub item: u32,
+    /// Tiles of the work item: 1 or 2.
+    pub tiles: u32,
+}
+
+impl Place {
+    /// Tiles that can be told apart.
+    pub const MOST_TILES: u32 = 1 << 30;
+}
+
+/// Tile and eye in a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TileOfEye(u32);
+
+impl TileOfEye {
+    pub(super) const NONE: Self = Self(0);
+
+    pub(super) fn of(place: &Place) -> Self {
+        let eye = match place.eye {
+            None => 0,
+            Some(Eye::Left) => 1,
+            Some(Eye::Right) => 2,
+        };
+        Self(place.tile << 2 | eye)
+    }
+
+    /// 0 for the left eye, 1 for the right.
+    #[inline(always)]
+    pub(super) fn eye(self) -> Option<usize> {
+        (self.0 & 3).checked_sub(1).map(|eye| eye as usize)
+    }
+}
+
+/// Where the use before a reuse was. The first that fits counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// In an earlier frame.
+    EarlierFrame,
+    /// In this frame, in a tile of the other eye.
+    OtherEye,
+    /// In this frame, in another tile.
+    OtherTile,
+    /// In the same tile.
+    SameTile,
+}
+
+impl Origin {
+    /// All of them, in the order of [`ByOrigin`].
+    pub const ALL: [Self; 4] = [
+        Self::SameTile,
+        Self::OtherTile,
+        Self::OtherEye,
+        Self::EarlierFrame,
+    ];
+
+    /// Name in columns.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::SameTile => "same_tile",
+            Self::OtherTile => "other_tile",
+            Self::OtherEye => "other_eye",
+            Self::EarlierFrame => "earlier_frame",
+        }
+    }
+
+    /// Index into [`ByOrigin`].
+    #[inline(always)]
+    #[must_use]
+    pub fn index(self) -> usize {
+        match self {
+            Self::SameTile => 0,
+            Self::OtherTile => 1,
+            Self::OtherEye => 2,
+            Self::EarlierFrame => 3,
+        }
+    }
+
+    /// What a use at `before`, in this frame or not, makes of a reuse at `now`.
+    #[inline(always)]
+    pub(super) fn of(before: TileOfEye, in_this_frame: bool, now: TileOfEye) -> Self {
+        if !in_this_frame {
+            Self::EarlierFrame
+        } else if before == now {
+            Self::SameTile
+        } else {
+            match (before.eye(), now.eye()) {
+                (Some(before), Some(now)) if before != now => Self::OtherEye,
+                _ => Self::OtherTile,
+            }
+        }
+    }
+}
+
+/// Counts by where the use before was; see [`Origin::index`].
+pub type ByOrigin = [u64; 4];
+
+/// Adds counts.
+pub(super) fn add(to: &mut ByOrigin, from: &ByOrigin) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to += from;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tile(tile: u32, eye: Option<Eye>) -> TileOfEye {
+        TileOfEye::of(&Place {
+            tile,
+            eye,
+            ..Place::default()
+        })
+    }
+
+    #[test]
+    fn an_earlier_frame_counts_before_the_other_eye_and_that_before_another_tile() {
+        let (left, right) = (Some(Eye::Left), Some(Eye::Right));
+        let now = tile(7, right);
+        for (before, in_this_frame, expected) in [
+            (now, true, Origin::SameTile),
+            (now, false, Origin::EarlierFrame),
+            (tile(6, right), true, Origin::OtherTile),
+            (tile(3, left), true, Origin::OtherEye),
+            (tile(3, left), false, Origin::EarlierFrame),
+            (tile(3, None), true, Origin::OtherTile),
+        ] {
+            assert_eq!(Origin::of(before, in_this_frame, now), expected);
+        }
+    }
+
+    #[test]
+    fn indexes_follow_the_list() {
+        for (index, origin) in Origin::ALL.into_iter().enumerate() {
+            assert_eq!(origin.index(), index);
+        }
+    }
+}

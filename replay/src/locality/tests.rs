@@ -1,0 +1,226 @@
+//! The analysis against plain twins that know the whole stream: lists, sets and full look-ahead.
+
+mod plain;
+
+use super::*;
+use crate::config::{CacheConfig, Order, Replacement, RunConfig};
+use crate::engine::replay;
+use crate::stream::synthetic::Synthetic;
+use formats::view::Eye;
+use proptest::prelude::*;
+
+/// A line asked for, with all that is known of it.
+#[derive(Clone, Copy, Debug)]
+struct Access {
+    frame: u32,
+    place: Place,
+    line: u32,
+}
+
+/// Items one after another, some of them pairs whose tiles alternate, in some frames.
+fn streams() -> impl Strategy<Value = Vec<Access>> {
+    let line = prop_oneof![4 => 0..12_u32, 2 => 0..60_u32, 1 => 0..4000_u32];
+    let eye = prop_oneof![Just(None), Just(Some(Eye::Left)), Just(Some(Eye::Right))];
+    let item = (
+        proptest::collection::vec((line, any::<bool>()), 1..24),
+        any::<bool>(),
+        eye,
+        prop::bool::weighted(0.15),
+    );
+    proptest::collection::vec(item, 1..24).prop_map(|items| {
+        let (mut stream, mut frame, mut tile) = (Vec::new(), 0, 0);
+        for (number, (lines, pair, eye, new_frame)) in (1..).zip(items) {
+            frame += u32::from(new_frame);
+            for (line, second) in lines {
+                let second = pair && second;
+                let eye = match (pair, second) {
+                    (false, _) => eye,
+                    (true, false) => Some(Eye::Left),
+                    (true, true) => Some(Eye::Right),
+                };
+                stream.push(Access {
+                    frame,
+                    line,
+                    place: Place {
+                        // Frames show the same tiles again.
+                        tile: (tile + u32::from(second)) % 16,
+                        eye,
+                        item: number,
+                        tiles: 1 + u32::from(pair),
+                    },
+                });
+            }
+            tile += 1 + u32::from(pair);
+        }
+        stream
+    })
+}
+
+fn geometries() -> impl Strategy<Value = CacheConfig> {
+    let ways = prop_oneof![Just(1_u32), Just(2), Just(3), Just(4), Just(8)];
+    let policy = proptest::sample::select(Replacement::all().collect::<Vec<_>>());
+    (0..5_u32, ways, policy)
+        .prop_map(|(sets, ways, replacement)| CacheConfig {
+            size_bytes: (u64::from(ways) << sets) * 16,
+            ways: if replacement == Replacement::TREE_PLRU && ways == 3 {
+                1
+            } else {
+                ways
+            },
+            replacement,
+        })
+        .prop_filter("sets are powers of two", |cache| {
+            cache.sets("L1", 16).is_ok()
+        })
+}
+
+fn of(cache: &CacheConfig) -> StreamCache<'_> {
+    StreamCache {
+        cache,
+        level: "L1",
+        line_bytes: 16,
+        seed: 3,
+    }
+}
+
+/// The analysis of a stream, on an axis so short that it is numbered anew all the time.
+fn analysed(stream: &[Access], cache: &CacheConfig) -> Figures {
+    let mut profile = Profile::with_axis(of(cache), 64).unwrap();
+    let mut frame = None;
+    for access in stream {
+        if frame.is_some_and(|frame| frame != access.frame) {
+            profile.begin_frame();
+        }
+        frame = Some(access.frame);
+        profile.at(&access.place);
+        profile.access(access.line);
+    }
+    profile.finish()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    #[test]
+    fn every_figure_is_that_of_a_plain_twin(stream in streams(), cache in geometries()) {
+        let figures = analysed(&stream, &cache);
+        let lines: Vec<u32> = stream.iter().map(|access| access.line).collect();
+        let origins = plain::origins(&stream);
+        let count = |hits: &[bool]| plain::by_origin(&origins, hits);
+
+        let distances = plain::distances(&lines);
+        for (distance, reuses) in figures.distances.iter() {
+            let here: Vec<bool> = distances.iter().map(|d| *d == Some(distance)).collect();
+            prop_assert_eq!(*reuses, count(&here), "distance {}", distance);
+        }
+        let reused = distances.iter().flatten().count() as u64;
+        prop_assert_eq!(figures.reuses().iter().sum::<u64>(), reused);
+        prop_assert_eq!(figures.accesses, lines.len() as u64);
+        prop_assert_eq!(figures.unique_lines, figures.accesses - reused);
+
+        let (sets, ways) = (cache.sets("L1", 16).unwrap(), cache.ways);
+        for point in &figures.lru {
+            let ways = point.ways.unwrap();
+            let sets = point.lines as u32 / ways;
+            prop_assert_eq!(point.hits, count(&plain::lru(&lines, sets, ways)), "{:?}", point);
+        }
+        for point in &figures.opt {
+            let hits = plain::opt(&lines, 1, point.lines as u32);
+            prop_assert_eq!(point.hits, count(&hits), "{:?}", point);
+        }
+        let opt = plain::opt(&lines, sets, ways);
+        prop_assert_eq!(figures.opt_of_geometry, count(&opt));
+
+        let own = plain::policy(&lines, of(&cache));
+        let all = plain::lru(&lines, 1, sets * ways);
+        let split = plain::split(&origins, &own, &all);
+        prop_assert_eq!(figures.split, split);
+
+        let sets = plain::working_sets(&stream);
+        prop_assert_eq!(&figures.working_sets, &sets);
+        prop_assert_eq!(
+            [
+                figures.frame_lines,
+                figures.frame_lines_of_both_eyes,
+                figures.frame_lines_of_earlier_frames,
+            ],
+            plain::frame_lines(&stream)
+        );
+    }
+
+    #[test]
+    fn sums_and_bounds_hold(stream in streams(), cache in geometries()) {
+        let figures = analysed(&stream, &cache);
+        let sum = |counts: &ByOrigin| counts.iter().sum::<u64>();
+        let split = figures.split;
+        prop_assert_eq!(sum(&split.hits()) + split.misses(), figures.accesses);
+        let lines = figures.configured_lines;
+        let full = figures.distances.hits(lines);
+        prop_assert_eq!(figures.misses(&full), split.fully_associative_misses());
+        // The forest and the histogram: a cache of one set is fully associative.
+        for point in figures.lru.iter().filter(|p| p.ways.map(u64::from) == Some(p.lines)) {
+            prop_assert_eq!(point.hits, figures.distances.hits(point.lines));
+        }
+        for point in &figures.opt {
+            prop_assert!(sum(&point.hits) >= sum(&figures.distances.hits(point.lines)));
+        }
+        prop_assert!(sum(&figures.opt_of_geometry) >= sum(&split.hits()));
+        prop_assert!(sum(&figures.opt_of_size()) >= sum(&figures.opt_of_geometry));
+        let infinite = figures.distances.hits(figures.distances.enough_lines());
+        prop_assert_eq!(figures.misses(&infinite), figures.unique_lines);
+    }
+}
+
+/// Both levels of every order miss as in a replay, whatever the policy and the number of cores.
+#[test]
+fn misses_are_those_of_a_replay() {
+    let trace = Synthetic {
+        size_px: [160, 128],
+        patch_px: 48,
+        layers: 2,
+        ..Synthetic::default()
+    }
+    .generate();
+    let orders: Vec<Order> = Order::all().collect();
+    let machines = [
+        (2, Replacement::LRU, 4, crate::config::Assign::FirstIdle),
+        (3, Replacement::FIFO, 2, crate::config::Assign::Static),
+        (1, Replacement::RANDOM, 4, crate::config::Assign::FirstIdle),
+    ];
+    for (cores, replacement, ways, assign) in machines {
+        let cache = |size_bytes| CacheConfig {
+            size_bytes,
+            ways,
+            replacement,
+        };
+        let config = RunConfig {
+            mode: crate::config::Mode::Functional,
+            cores,
+            assign,
+            l1: cache(2 << 10),
+            l2: cache(16 << 10),
+            ..RunConfig::default()
+        };
+        let figures = analyse(&trace, &config, &orders, true, &|_| ()).unwrap();
+        for of_order in figures {
+            let order = of_order.order;
+            let result = replay(&trace, &RunConfig { order, ..config }).unwrap();
+            for (stream, figures) in &of_order.streams {
+                let level = match stream {
+                    Stream::L1 => &result.l1,
+                    Stream::L2 => &result.l2,
+                    Stream::Merged => {
+                        assert_eq!(figures.accesses, result.l1.counters.line_lookups);
+                        continue;
+                    }
+                };
+                let name = format!("{} of {} cores, {}", stream.title(), cores, order.name());
+                assert_eq!(figures.accesses, level.counters.line_lookups, "{name}");
+                assert_eq!(figures.split.misses(), level.counters.line_misses, "{name}");
+            }
+            let (_, merged) = &of_order.streams[2];
+            assert_eq!(merged.unique_lines, result.unique_lines);
+            assert_eq!(of_order.streams[1].1.unique_lines, result.unique_lines);
+        }
+    }
+}

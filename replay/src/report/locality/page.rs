@@ -1,0 +1,178 @@
+//! The page: plots and tables of every trace and stream.
+
+use super::columns::Summary;
+use super::{LocalityReport, plots};
+use crate::locality::Stream;
+use crate::report::html::{self, Section, figures};
+use crate::report::plots::PlotError;
+use crate::report::plots::stacked::StackedChart;
+use crate::report::table::Table;
+use crate::size::format_bytes;
+use maud::{Markup, html};
+
+/// Keys of the columns that the page's table shows; CSV and JSON have them all. Traces of one frame
+/// have no earlier ones.
+const SHOWN: [&str; 21] = [
+    "order",
+    "accesses",
+    "unique_lines",
+    "both_eyes_pct",
+    "earlier_frames_pct",
+    "miss_pct",
+    "compulsory_pct",
+    "capacity_pct",
+    "conflict_pct",
+    "spared_pct",
+    "fully_associative_miss_pct",
+    "opt_miss_pct",
+    "opt_ways_miss_pct",
+    "hits.same_tile_pct",
+    "hits.other_tile_pct",
+    "hits.other_eye_pct",
+    "hits.earlier_frame_pct",
+    "reuses.other_eye_pct",
+    "reuses.earlier_frame_pct",
+    "capacity_other_eye_pct",
+    "tile_lines",
+];
+
+impl LocalityReport {
+    /// The page.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn.
+    pub fn page(&self) -> Result<String, PlotError> {
+        let (rows, table) = (self.summaries(), self.table());
+        let mut sections = Vec::new();
+        let same = |a: &Summary, b: &Summary| {
+            (a.of.trace, a.of.stream.key()) == (b.of.trace, b.of.stream.key())
+        };
+        for rows in rows.chunk_by(same) {
+            let of = rows[0].of;
+            let table = table
+                .only("trace", of.trace)
+                .only("stream", of.stream.key());
+            let trace = self.traces.iter().find(|t| t.label == of.trace);
+            let one_frame = trace.is_some_and(|trace| trace.frames < 2);
+            let body = stream(rows, &table, one_frame)?;
+            sections.push(Section::new(
+                format!("{}: {}", of.trace, of.stream.title()),
+                body,
+            ));
+        }
+        sections.push(Section::new(
+            "Machine",
+            html::folded(
+                "configuration (TOML)",
+                &toml::to_string(&self.config).unwrap_or_default(),
+            ),
+        ));
+        let names: Vec<&str> = self.traces.iter().map(|t| t.label.as_str()).collect();
+        let lead = html! {
+            p {
+                "How far apart the uses of cache lines lie in " (names.join(", ")) ", in each tile order, and what that means for caches of every size, without latencies. "
+                "The JSON file beside this page has every number of the plots, the CSV file the tables."
+            }
+            p {
+                "A reuse belongs to where the use before it was: in the same tile, in another tile, in a tile of the other eye, or in an earlier frame."
+            }
+        };
+        Ok(html::page("Parallax: locality", &lead, &sections))
+    }
+}
+
+/// A stream of a trace: its table and plots.
+fn stream(rows: &[Summary], table: &Table, one_frame: bool) -> Result<Markup, PlotError> {
+    let plain = |svg: String| (svg, String::new());
+    // Where a bin begins.
+    let far_from = (rows[0].figures.configured_lines / 8)
+        .max(1)
+        .next_power_of_two();
+    let far = distances(rows, far_from)?;
+    let all = distances(rows, 1)?;
+    let ways = rows
+        .iter()
+        .map(|row| Ok(plain(plots::associativity(row).svg()?)));
+    let ways = ways.collect::<Result<Vec<_>, PlotError>>()?;
+    let keys = SHOWN.into_iter();
+    let shown = table.picked(keys.filter(|key| !(one_frame && key.contains("earlier"))));
+    let shown = shown.without_empty_columns();
+    Ok(html! {
+        p { (about(rows)) }
+        (shown.markup())
+        (meanings(&shown))
+        h3 { "Misses by size" }
+        (figures(&[
+            plain(plots::miss_ratio(rows).svg()?),
+            plain(plots::other_eye(rows).svg()?),
+            plain(plots::above_opt(rows).svg()?),
+        ]))
+        h3 { "The configured cache" }
+        (figures(&[
+            (plots::causes(rows).svg()?, "Compulsory: first uses. Conflict: a fully associative cache of the size hits. Capacity: it misses, too.".to_owned()),
+            (plots::bounds(rows).svg()?, "OPT drops the line whose next use is furthest: no cache of the size that is filled by every miss does better.".to_owned()),
+        ]))
+        h3 { "Reuse distances" }
+        p { "Reuses that a fully associative cache of an eighth of the configured size would miss:" }
+        (figures(&far))
+        details {
+            summary { "nearer reuses, too" }
+            (figures(&all))
+        }
+        h3 { "Working sets" }
+        (figures(&[
+            (plots::working_sets(rows).svg()?, "Two tiles that are rendered together take two tiles' time, and their lines belong to both.".to_owned()),
+            plain(plots::shared_working_sets(rows).svg()?),
+        ]))
+        details {
+            summary { "miss ratio by size and ways, order by order" }
+            (figures(&ways))
+        }
+    })
+}
+
+/// A chart an order of the reuses at distances from `from` on.
+fn distances(rows: &[Summary], from: u64) -> Result<Vec<(String, String)>, PlotError> {
+    let charts = plots::distances(rows, from);
+    let figure = |(chart, row): (&StackedChart, &Summary)| {
+        let nearer = plots::nearer_pct(row, from).unwrap_or(0.0);
+        Ok((
+            chart.svg()?,
+            format!("Not drawn: {nearer:.1} % at smaller distances."),
+        ))
+    };
+    charts.iter().zip(rows).map(figure).collect()
+}
+
+fn about(rows: &[Summary]) -> String {
+    let (of, cache) = (rows[0].of, rows[0].cache);
+    let sees = match of.stream {
+        Stream::L1 => {
+            "What each core asks its own L1 for; counts are sums over the cores, and a size is that of each core's cache"
+        }
+        Stream::L2 => {
+            "What misses the configured L1 caches, in the order in which it reaches the L2 that the cores share"
+        }
+        Stream::Merged => "What all cores ask for, as one L1 that they share would see it",
+    };
+    let (size, line) = (
+        format_bytes(cache.size_bytes),
+        format_bytes(of.line_bytes.into()),
+    );
+    let (ways, policy) = (cache.ways, cache.replacement.name());
+    format!("{sees}. The configured cache: {size}, {ways} ways, {policy}, lines of {line}.")
+}
+
+/// What the columns are.
+fn meanings(table: &Table) -> Markup {
+    html! {
+        details {
+            summary { "what the columns are" }
+            dl.note {
+                @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
+                    dt { (h.name) @if !h.unit.is_empty() { ", " (h.unit) } } dd { (h.about) }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! `replay locality` against plain caches fed with what `replay convert` writes, and its outputs.
+
+use parallax_tests::{program, root, run_ok};
+use serde_json::Value;
+use std::collections::HashSet;
+
+const LINE_BYTES: u64 = 16;
+
+/// One core, and caches so small that all kinds of misses occur.
+const MACHINE: [&str; 8] = [
+    "--orders", "z2-sta", "--cores", "1", "--l1", "4KiB", "--l2", "16KiB",
+];
+
+fn trace() -> std::path::PathBuf {
+    root().join("traces/atrium-shadows.textrace")
+}
+
+/// The lines of the trace in that order.
+fn lines() -> Vec<u64> {
+    let output = run_ok(
+        program("replay")
+            .args(["convert", "--to", "din", "--order", "z2-sta", "-o", "-"])
+            .arg(trace()),
+    );
+    let text = String::from_utf8(output.stdout).expect("din is text");
+    let line = |line: &str| u64::from_str_radix(&line[2..], 16).expect("an address") / LINE_BYTES;
+    text.lines().map(line).collect()
+}
+
+/// An LRU cache: a list a set, most recent first.
+struct Lru {
+    sets: Vec<Vec<u64>>,
+    ways: usize,
+}
+
+impl Lru {
+    fn new(sets: usize, ways: usize) -> Self {
+        Self {
+            sets: vec![Vec::new(); sets],
+            ways,
+        }
+    }
+
+    fn access(&mut self, line: u64) -> bool {
+        let set = line as usize % self.sets.len();
+        let set = &mut self.sets[set];
+        let found = set.iter().position(|&other| other == line);
+        match found {
+            Some(at) => set[..=at].rotate_right(1),
+            None => {
+                set.truncate(self.ways - 1);
+                set.insert(0, line);
+            }
+        }
+        found.is_some()
+    }
+}
+
+/// A level beside a fully associative one of its size and an infinite one.
+struct Level {
+    own: Lru,
+    full: Lru,
+    seen: HashSet<u64>,
+    /// Compulsory, capacity, conflict, spared.
+    counts: [u64; 4],
+}
+
+impl Level {
+    fn new(lines: usize) -> Self {
+        Self {
+            own: Lru::new(lines / 4, 4),
+            full: Lru::new(1, lines),
+            seen: HashSet::new(),
+            counts: [0; 4],
+        }
+    }
+
+    fn access(&mut self, line: u64) -> bool {
+        let (hit, full, first) = (
+            self.own.access(line),
+            self.full.access(line),
+            self.seen.insert(line),
+        );
+        match (hit, full, first) {
+            (false, _, true) => self.counts[0] += 1,
+            (false, false, false) => self.counts[1] += 1,
+            (false, true, false) => self.counts[2] += 1,
+            (true, false, _) => self.counts[3] += 1,
+            (true, true, _) => {}
+        }
+        hit
+    }
+}
+
+#[test]
+fn the_causes_of_misses_are_those_of_plain_caches_fed_with_din() {
+    let output = run_ok(
+        program("replay")
+            .arg("locality")
+            .arg(trace())
+            .args(MACHINE)
+            .arg("--json"),
+    );
+    let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let (mut l1, mut l2) = (Level::new(256), Level::new(1024));
+    for line in lines() {
+        if !l1.access(line) {
+            l2.access(line);
+        }
+    }
+    for (row, level) in json["rows"].as_array().expect("rows").iter().zip([l1, l2]) {
+        let keys = ["compulsory", "capacity", "conflict", "spared"];
+        let counts = keys.map(|key| row[key].as_u64().expect("a count"));
+        assert_eq!(counts, level.counts, "{}", row["stream"]);
+        assert!(counts.iter().all(|&count| count > 0), "{counts:?}");
+        assert_eq!(row["misses"], counts[..3].iter().sum::<u64>());
+        assert_eq!(row["unique_lines"], level.seen.len());
+        assert!(row["opt_misses"].as_u64() < row["fully_associative_misses"].as_u64());
+    }
+}
+
+#[test]
+fn outputs_are_the_same_whatever_the_number_of_threads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let outputs = ["1", "2"].map(|threads| {
+        let at = |name: &str| folder.path().join(format!("{threads}-{name}"));
+        let output = run_ok(
+            program("replay")
+                .arg("locality")
+                .arg(trace())
+                .args([
+                    "--orders",
+                    "morton,z2-lrta,z2-sta",
+                    "--merged",
+                    "--threads",
+                    threads,
+                ])
+                .arg("--html")
+                .arg(at("page.html"))
+                .arg("--csv")
+                .arg(at("csv")),
+        );
+        let mut files = vec![output.stdout];
+        for name in ["page.html", "page.json", "page.csv"] {
+            files.push(std::fs::read(at(name)).expect(name));
+        }
+        for name in [
+            "summary.csv",
+            "curves.csv",
+            "distances.csv",
+            "working-sets.csv",
+        ] {
+            files.push(std::fs::read(at("csv").join(name)).expect(name));
+        }
+        files
+    });
+    assert!(outputs[0] == outputs[1]);
+    let page = String::from_utf8(outputs[0][1].clone()).expect("a page");
+    for text in ["Miss ratio by size", "all cores as one", "LRU above OPT"] {
+        assert!(page.contains(text), "{text}");
+    }
+    // The exact distances add up to the reuses.
+    let distances = String::from_utf8(outputs[0][6].clone()).expect("CSV");
+    let of_row = |line: &str| -> u64 {
+        let counts = line.split(',').skip(5);
+        counts
+            .map(|count| count.parse::<u64>().expect("a count"))
+            .sum()
+    };
+    let rows = distances.lines().filter(|l| l.contains(",morton,l1,"));
+    let json: Value = serde_json::from_slice(&outputs[0][2]).expect("JSON");
+    let row = &json["rows"][0];
+    let reuses =
+        row["accesses"].as_u64().expect("a count") - row["unique_lines"].as_u64().expect("a count");
+    assert_eq!(rows.map(of_row).sum::<u64>(), reuses);
+}
