@@ -1,7 +1,9 @@
 //! Slurm scripts: a job array of shards, and what follows when all of them are done.
 
+use anyhow::Context;
 use std::borrow::Cow;
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// Work for a Slurm job array.
 #[derive(Clone, Debug)]
@@ -10,10 +12,12 @@ pub struct SlurmArray<'a> {
     pub name: &'a str,
     /// Parts.
     pub shards: u32,
+    /// Processors of each part; what the cluster gives by itself if none.
+    pub cpus: Option<u16>,
     /// Program and arguments, with paths that mean the same on every node.
     pub command: Vec<String>,
-    /// Argument of the job that follows when every part is done, if one does.
-    pub then: Option<&'a str>,
+    /// Arguments of the job that follows when every part is done; none where no job does.
+    pub then: Vec<String>,
 }
 
 impl SlurmArray<'_> {
@@ -32,8 +36,14 @@ impl SlurmArray<'_> {
             })
             .collect();
         let name = name.trim_start_matches('-');
-        let words: Vec<Cow<str>> = self.command.iter().map(|word| quoted(word)).collect();
+        let line = |words: &[String]| -> String {
+            let words: Vec<Cow<str>> = words.iter().map(|word| quoted(word)).collect();
+            words.join(" ")
+        };
         let shards = self.shards;
+        let cpus = self.cpus.map_or_else(String::new, |cpus| {
+            format!("#SBATCH --cpus-per-task={cpus}\n")
+        });
         let mut text = format!(
             "#!/bin/sh\n\
              # Work in {shards} shards. Save this as a file and run `sh FILE [OPTIONS OF sbatch]` to submit it. What is done is\n\
@@ -42,7 +52,7 @@ impl SlurmArray<'_> {
              #SBATCH --array=1-{shards}\n\
              #SBATCH --requeue\n\
              #SBATCH --open-mode=append\n\
-             set -eu\n\
+             {cpus}set -eu\n\
              work() {{\n    {} \"$@\" --threads \"${{SLURM_CPUS_ON_NODE:-1}}\"\n}}\n\
              case \"${{SLURM_ARRAY_TASK_ID-submit}}\" in\n\
              submit)\n\
@@ -50,16 +60,16 @@ impl SlurmArray<'_> {
              \x20   array=$(sbatch --parsable \"$@\" \"$0\")\n\
              \x20   array=${{array%%;*}}\n\
              \x20   echo \"shards: job $array\"\n",
-            words.join(" ")
+            line(&self.command)
         );
-        if self.then.is_some() {
+        if !self.then.is_empty() {
             text += "    after=$(sbatch --parsable \"$@\" --array=0 --dependency=\"afterok:$array\" \\\n\
                      \x20       --kill-on-invalid-dep=yes \"$0\")\n\
                      \x20   echo \"after them: job ${after%%;*}\"\n";
         }
         text += "    ;;\n";
-        if let Some(then) = self.then {
-            let _ = writeln!(text, "0) work {} ;;", quoted(then));
+        if !self.then.is_empty() {
+            let _ = writeln!(text, "0) work {} ;;", line(&self.then));
         }
         let _ = writeln!(
             text,
@@ -67,6 +77,19 @@ impl SlurmArray<'_> {
         );
         text
     }
+}
+
+/// A path that means the same wherever a script is run.
+///
+/// # Errors
+/// It is empty, or no UTF-8.
+pub fn absolute(path: &Path) -> anyhow::Result<String> {
+    let place = || path.display().to_string();
+    let whole = std::path::absolute(path).with_context(place)?;
+    let text = whole.to_str().with_context(place);
+    Ok(text
+        .context("expected a path in UTF-8 for a script")?
+        .to_owned())
 }
 
 /// A word as a shell reads it.
@@ -102,8 +125,9 @@ mod tests {
         let array = SlurmArray {
             name: "-a b\n#SBATCH --x",
             shards: 7,
+            cpus: Some(3),
             command,
-            then: Some("--merge-only"),
+            then: vec!["--merge-only".to_owned()],
         };
         let script = array.script();
         assert_eq!(
@@ -129,8 +153,9 @@ mod tests {
         let array = SlurmArray {
             name: "a",
             shards: 1,
+            cpus: None,
             command: vec!["true".to_owned()],
-            then: None,
+            then: Vec::new(),
         };
         let mut shell = Command::new("sh");
         shell

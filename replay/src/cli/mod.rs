@@ -7,6 +7,7 @@ pub mod dump;
 mod experiment_args;
 pub mod info;
 mod paper;
+mod parquet_arg;
 mod report;
 mod reproject;
 mod run;

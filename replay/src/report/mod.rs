@@ -1,14 +1,15 @@
 //! Prints results: tables, plots, JSON, CSV and pages. What is printed is computed elsewhere.
 
 pub mod columns;
-pub mod csv;
 pub mod figures;
 pub mod html;
+pub mod parquet;
 pub mod picture;
 pub mod plots;
 pub mod run;
 pub mod sgrt;
 pub mod sweep;
+pub mod sweep_plan;
 pub mod table;
 pub mod techniques;
 pub mod theme;
