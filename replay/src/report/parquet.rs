@@ -1,4 +1,5 @@
-//! Tables as Parquet files: typed columns under the names that CSV has, for DuckDB, Polars, pandas.
+//! Tables as Parquet files: typed columns under the names that CSV has, for DuckDB, Polars, pandas;
+//! null is what is empty in CSV.
 
 use super::columns::{Heading, Kind, Value};
 use super::table::Table;
@@ -125,8 +126,13 @@ impl Cells<'_> {
         let mut present = Vec::with_capacity(self.values.len());
         let mut values = Vec::with_capacity(self.values.len());
         for (row, value) in self.values.iter().enumerate() {
-            present.push(i16::from(**value != Value::None));
-            if **value != Value::None {
+            let is_empty = match value {
+                Value::None => true,
+                Value::Text(text) => text.is_empty(),
+                _ => false,
+            };
+            present.push(i16::from(!is_empty));
+            if !is_empty {
                 values.push(of(value).ok_or_else(|| TableError::Cell {
                     column: self.heading.flat_key(),
                     row,
@@ -151,6 +157,7 @@ mod tests {
     use crate::report::columns::Column;
     use ::parquet::file::reader::{FileReader, SerializedFileReader};
     use ::parquet::record::Field;
+    use std::io::Write;
 
     type Cells = (&'static str, Option<f64>, u64, bool);
 
@@ -166,7 +173,9 @@ mod tests {
     }
 
     fn read(bytes: Vec<u8>) -> (Vec<Vec<(String, Field)>>, String) {
-        let reader = SerializedFileReader::new(bytes::Bytes::from(bytes)).unwrap();
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&bytes).unwrap();
+        let reader = SerializedFileReader::new(file).unwrap();
         let rows = reader.get_row_iter(None).unwrap();
         let row = |row: ::parquet::record::Row| {
             let columns = row.get_column_iter();
@@ -207,12 +216,7 @@ mod tests {
                     Field::Long(i64::MAX),
                     Field::Bool(true)
                 ]),
-                named([
-                    Field::Str(String::new()),
-                    Field::Null,
-                    Field::Long(0),
-                    Field::Bool(false)
-                ]),
+                named([Field::Null, Field::Null, Field::Long(0), Field::Bool(false)]),
             ]
         );
         let facts: serde_json::Value = serde_json::from_str(&facts).unwrap();
