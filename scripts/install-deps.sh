@@ -2,7 +2,7 @@
 # Installs what Cargo cannot, where it is missing and apt can be used; otherwise says what to
 # install. Always lavapipe (a Vulkan driver that needs no GPU); with `test` also a C++ compiler,
 # which the reference implementation of FLIP in the tests needs, and Python for the independent
-# trace readers, whose tests are skipped where it cannot be had.
+# trace readers and Slurm for sweeps on a cluster, whose tests are skipped where they cannot be had.
 set -eu
 
 has_lavapipe() {
@@ -25,6 +25,11 @@ wanted="$packages"
 if [ "${1:-}" = test ] && ! command -v python3 >/dev/null 2>&1; then
     packages="$packages python3"
 fi
+slurm=""
+if [ "${1:-}" = test ] && ! command -v slurmctld >/dev/null 2>&1; then
+    slurm=" slurm-wlm munge"
+fi
+packages="$packages$slurm"
 [ -n "$packages" ] || exit 0
 
 # Fails unless all that is missing can be done without.
@@ -44,9 +49,34 @@ else
     give_up "missing, and this user may not install them"
 fi
 echo "installing$packages" >&2
-export DEBIAN_FRONTEND=noninteractive
-# shellcheck disable=SC2086 # a list of packages, split on purpose
-$sudo apt-get install -y -qq $packages >/dev/null 2>&1 || {
-    $sudo apt-get update -qq
-    $sudo apt-get install -y -qq $packages >/dev/null
+
+# Packages, with options of apt-get; its lists are fetched where they are old.
+install() {
+    $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "$@" >/dev/null 2>&1 || {
+        $sudo apt-get update -qq &&
+            $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "$@" >/dev/null
+    }
 }
+
+# Slurm, without its daemons: the tests start their own, on the loopback interface, and end them.
+install_slurm() {
+    policy=/usr/sbin/policy-rc.d
+    ours=""
+    if [ ! -e "$policy" ]; then
+        ours=$policy
+        printf '#!/bin/sh\nexit 101\n' | $sudo tee "$policy" >/dev/null
+        $sudo chmod 755 "$policy"
+    fi
+    code=0
+    install --no-install-recommends slurm-wlm munge || code=$?
+    [ -z "$ours" ] || $sudo rm -f "$ours"
+    return "$code"
+}
+
+if [ "$packages" != "$slurm" ]; then
+    # shellcheck disable=SC2086 # a list of packages, split on purpose
+    install ${packages%"$slurm"}
+fi
+if [ -n "$slurm" ] && ! install_slurm; then
+    echo "cannot install$slurm: the tests of sweeps on a cluster will be skipped" >&2
+fi

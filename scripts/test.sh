@@ -15,4 +15,10 @@ awk '/^test result:/ { passed += $4; failed += $6; ignored += $8 }
      END { printf "%d passed, %d failed, %d skipped\n", passed, failed, ignored }' "$log"
 command -v python3 >/dev/null 2>&1 ||
     echo "skipped: the independent trace readers, since python3 is absent"
+PATH="$PATH:/usr/sbin" command -v slurmctld >/dev/null 2>&1 ||
+    echo "skipped: sweeps on a Slurm cluster, since slurmctld is absent"
+for package in duckdb polars pandas pyarrow; do
+    python3 -c "import $package" >/dev/null 2>&1 ||
+        echo "skipped: the example of docs/analysis.md that needs $package, since Python has none"
+done
 exit "$(cat "$status")"

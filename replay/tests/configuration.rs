@@ -33,6 +33,7 @@ refused. Sizes (`size_bytes`) are numbers of bytes or texts such as `\"16KiB\"`.
 
 At most 100000 points; a point that no machine can have is refused before any is replayed. A sweep that was
 stopped goes on where it stopped: each point's result is a file under `points/` in the output folder.
+[many-machines.md](many-machines.md) tells how to split one over machines.
 
 ## Keys
 ";

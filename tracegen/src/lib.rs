@@ -1,6 +1,7 @@
 //! Scene to trace: loads a scene, renders it for both eyes through Mesa and captures every
 //! texture sample, or traces it and captures every ray.
 
+pub mod captures;
 pub mod cli;
 mod picture;
 pub mod study;

@@ -1,5 +1,5 @@
 //! What the programs do alike at the command line: exit codes, messages, progress, checks of
-//! outputs, signals, threads, completions and manual pages.
+//! outputs, signals, threads, completions and manual pages, and work split over many machines.
 
 mod arguments;
 mod documents;
@@ -7,7 +7,9 @@ mod message;
 mod outputs;
 mod program;
 mod progress;
+mod shards;
 mod signals;
+mod slurm;
 
 pub use arguments::{Threads, lasting_arguments};
 pub use documents::Documents;
@@ -16,3 +18,5 @@ pub use message::{error, note, print, warn};
 pub use outputs::{Output, check_outputs};
 pub use program::{Common, VERSION, run};
 pub use progress::Progress;
+pub use shards::{MOST_SHARDS, Piece, Shard, ShardArgs, balanced};
+pub use slurm::{SlurmArray, absolute, quoted};

@@ -5,6 +5,7 @@ use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 use tempfile::{NamedTempFile, TempPath};
 
 /// Temporary files that a signal handler has to remove. Files are made, renamed and removed with
@@ -201,10 +202,48 @@ fn folder_of(target: &Path) -> &Path {
     }
 }
 
+/// Begin and end of the name of an unfinished file.
+const UNFINISHED_NAME: (&str, &str) = (".", ".part");
+
+/// Removes the unfinished files of a folder that processes which were killed have left there: those
+/// that nobody has written to for `age`. Returns how many there were.
+///
+/// # Errors
+/// The folder cannot be read or written.
+pub fn remove_abandoned(folder: &Path, age: Duration) -> io::Result<usize> {
+    // The folder may be another machine's, with a clock of its own: a new file tells its time.
+    let now = {
+        let _held = unfinished();
+        let clock = temporary(&folder.join("clock"))?;
+        clock.as_file().metadata()?.modified()?
+    };
+    let mut removed = 0;
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let name = name.as_encoded_bytes();
+        let is_unfinished = name.starts_with(UNFINISHED_NAME.0.as_bytes())
+            && name.ends_with(UNFINISHED_NAME.1.as_bytes());
+        if !is_unfinished {
+            continue;
+        }
+        // It may be gone by now: finished, or removed by another process.
+        let Ok(found) = entry.metadata() else {
+            continue;
+        };
+        let written = found.modified()?;
+        let is_old = now.duration_since(written).is_ok_and(|since| since >= age);
+        if found.is_file() && is_old && fs::remove_file(entry.path()).is_ok() {
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
 /// A temporary file on the file system of `target`, with the permissions of any new file.
 fn temporary(target: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".").suffix(".part");
+    builder.prefix(UNFINISHED_NAME.0).suffix(UNFINISHED_NAME.1);
     #[cfg(unix)]
     {
         // Temporary files are private otherwise; the umask still applies.
@@ -284,5 +323,22 @@ mod tests {
         fs::write(&path, "old").unwrap();
         fs::set_permissions(&path, fs::Permissions::from_mode(0o444)).unwrap();
         assert!(refused(&path).ends_with("found a read-only one"));
+    }
+    #[test]
+    fn abandoned_files_are_removed_and_others_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let hour = Duration::from_secs(3600);
+        for name in [".old.part", ".new.part", "old.part", "old.json"] {
+            let file = File::create(at(name)).unwrap();
+            if name.contains("old") {
+                let written = file.metadata().unwrap().modified().unwrap() - 2 * hour;
+                file.set_modified(written).unwrap();
+            }
+        }
+        assert_eq!(remove_abandoned(folder.path(), hour).unwrap(), 1);
+        assert!(!at(".old.part").exists() && at(".new.part").exists());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+        assert!(remove_abandoned(&at("none"), hour).is_err());
     }
 }

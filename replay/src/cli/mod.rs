@@ -9,6 +9,7 @@ mod experiment_args;
 pub mod info;
 mod locality;
 mod paper;
+mod parquet_arg;
 mod report;
 mod reproject;
 mod run;

@@ -1,6 +1,7 @@
 //! `replay paper`: the Z2 paper's experiment as a table.
 
 use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
+use super::parquet_arg::ParquetArg;
 use crate::files::write_atomically;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::tables;
@@ -14,7 +15,7 @@ use std::process::ExitCode;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   replay paper crytek.textrace
-  replay paper *.textrace --orders all --csv table.csv
+  replay paper *.textrace --orders all --csv table.csv --parquet table.parquet
   replay paper mine.textrace --as crytek-sponza --html out/report.html
   replay paper a.textrace --block-order morton --json")]
 pub struct Args {
@@ -29,6 +30,8 @@ pub struct Args {
     /// Also write the rows as CSV; - writes them to standard output in place of the table
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    parquet: ParquetArg,
     /// Also write the report page, with JSON and CSV beside it
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
@@ -51,17 +54,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .iter()
             .flat_map(|path| page_outputs("--html", path)),
     );
+    outputs.extend(args.parquet.output());
     outputs.extend(args.json.then(|| Output::result("--json")));
-    let prints = !args
-        .csv
-        .iter()
-        .chain(&args.html)
-        .any(|path| is_stdout(path));
+    let files = args.csv.iter().chain(&args.html);
+    let prints = !args.parquet.takes_stdout() && !files.into_iter().any(|path| is_stdout(path));
     let functional = args.functional || page;
     args.experiment.run(&outputs, functional, page, |report| {
         if let Some(path) = &args.csv {
             write_atomically(path, report.csv().as_bytes())?;
         }
+        args.parquet.write(|| report.table())?;
         if let Some(path) = &args.html {
             write_page(report, &args.experiment.pictures(report)?, path)?;
         }

@@ -1,6 +1,7 @@
 //! `replay report`: the Z2 paper's experiment as a page.
 
 use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
+use super::parquet_arg::ParquetArg;
 use anyhow::Result;
 use shell::is_stdout;
 use std::path::PathBuf;
@@ -18,6 +19,8 @@ pub struct Args {
     /// The page; JSON and CSV with the same numbers are written beside it
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    #[command(flatten)]
+    parquet: ParquetArg,
 }
 
 /// Runs the subcommand; exit code 1 when the orders replayed different accesses.
@@ -25,10 +28,12 @@ pub struct Args {
 /// # Errors
 /// Wrong arguments, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let outputs = page_outputs("--output", &args.output);
+    let mut outputs = page_outputs("--output", &args.output);
+    outputs.extend(args.parquet.output());
     args.experiment.run(&outputs, true, true, |report| {
         write_page(report, &args.experiment.pictures(report)?, &args.output)?;
-        if !is_stdout(&args.output) {
+        args.parquet.write(|| report.table())?;
+        if !is_stdout(&args.output) && !args.parquet.takes_stdout() {
             super::print(&args.output.display().to_string())?;
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! `replay reproject`: ray traces through the model of a ray-tracing GPU that reuses the left
 //! image for the right one.
 
+use super::parquet_arg::ParquetArg;
 use crate::files::{self, write_atomically};
 use crate::paper::sgrt as paper;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
@@ -57,6 +58,8 @@ pub struct ReprojectArgs {
     /// Prints CSV: a row for the rule and one for plain reuse, per file.
     #[arg(long)]
     csv: bool,
+    #[command(flatten)]
+    parquet: ParquetArg,
     /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
     /// [default: the scene that a built-in one of the paper's stands for].
     #[arg(long = "as", value_name = "SCENE")]
@@ -122,6 +125,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.html {
         write_atomically(path, report::page(&entries)?.as_bytes())?;
     }
+    args.parquet.write(|| report::rows(&entries))?;
     let reports = entries.iter().map(|e| &e.report);
     let text = if args.json {
         let lines: Result<Vec<String>, _> = match entries.len() {
@@ -145,6 +149,7 @@ fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
     let outputs = [
         args.image.as_deref().map(|p| Output::binary("--image", p)),
         args.html.as_deref().map(|p| Output::text("--html", p)),
+        args.parquet.output(),
         args.json.then(|| Output::result("--json")),
         args.csv.then(|| Output::result("--csv")),
     ];

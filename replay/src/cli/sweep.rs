@@ -1,12 +1,14 @@
-//! `replay sweep`: the points of an experiment file.
+//! `replay sweep`: the points of an experiment file, here or on many machines.
 
 use super::config_args::read_toml;
+use super::parquet_arg::ParquetArg;
 use super::subjects::Traces;
-use crate::experiment::{self, ExperimentFile, Point, Store};
+use crate::experiment::{self, ExperimentFile, Outcome, Plan, Point, Split, Store, Subject};
 use crate::files::{self, write_atomically};
 use crate::report::sweep::SweepReport;
+use crate::report::sweep_plan;
 use anyhow::{Context, Result, ensure};
-use shell::{Output, Progress};
+use shell::{Output, Progress, Shard, ShardArgs, SlurmArray};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -15,6 +17,9 @@ use std::process::ExitCode;
 #[command(after_help = "Examples:
   replay sweep replay/experiments/caches.toml crytek.textrace --out out/caches
   replay sweep replay/experiments/open-choices.toml *.textrace --out out/open-choices --json
+  replay sweep caches.toml --out out/caches --shard 3/8
+  replay sweep caches.toml --out out/caches --merge-only
+  replay sweep caches.toml --out out/caches --emit-slurm 8 > caches.sh && sh caches.sh
 
 A sweep that was stopped goes on where it stopped when it is started again with the same --out.")]
 pub struct Args {
@@ -25,69 +30,220 @@ pub struct Args {
     /// Folder for results.json, results.csv, report.html and points/ [default: out/NAME]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print one JSON object (schema replay.sweep/1)
-    #[arg(long)]
+    /// Print one JSON object (schema replay.sweep/1, with --plan replay.plan/1)
+    #[arg(long, conflicts_with_all = ["emit_slurm"])]
     json: bool,
-    /// Print the points and stop
-    #[arg(long, conflicts_with_all = ["json", "out"])]
+    #[command(flatten)]
+    parquet: ParquetArg,
+    /// Print the points and stop; with --json also their keys and costs, and which are done
+    #[arg(long, conflicts_with_all = ["emit_slurm", "merge_only"])]
     plan: bool,
     #[command(flatten)]
+    shards: ShardArgs,
+    /// Replay nothing: put together what shards have kept, or list what is missing
+    #[arg(long, conflicts_with_all = ["shard", "emit_slurm"], help_heading = "Many machines")]
+    merge_only: bool,
+    #[command(flatten)]
     threads: shell::Threads,
+}
+
+impl Args {
+    /// Refuses flags that say nothing together.
+    fn check(&self) -> Result<()> {
+        let sharded = self.shards.shard.is_some();
+        ensure!(
+            self.json || !self.plan || self.out.is_none(),
+            "--plan --out: the folder says what is done, which --json tells; add --json"
+        );
+        ensure!(
+            self.json || !self.plan || !sharded,
+            "--plan --shard: shards are of traces and points, which --json tells; add --json"
+        );
+        ensure!(
+            self.plan || !self.json || !sharded,
+            "--shard --json: a shard writes points alone; --merge-only prints the results"
+        );
+        ensure!(
+            self.parquet.path.is_none() || !sharded && !self.plan,
+            "--parquet: expected results, found {}",
+            if sharded {
+                "--shard, which writes points alone"
+            } else {
+                "--plan"
+            }
+        );
+        Ok(())
+    }
 }
 
 /// Runs the subcommand.
 ///
 /// # Errors
-/// A bad experiment file, an unreadable trace, an output that cannot be written.
+/// A bad experiment file, an unreadable trace, an output that cannot be written, a point that is
+/// to be merged and not there.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    args.check()?;
     args.threads.start()?;
     let name = args.experiment.display();
     let file = ExperimentFile::parse(&read_toml(&args.experiment)?);
     let file = file.with_context(|| name.to_string())?;
     let plan = file.plan().with_context(|| name.to_string())?;
-    if args.plan {
+    if args.plan && !args.json {
         let titles: Vec<String> = plan.points.iter().map(Point::title).collect();
         super::print(&titles.join("\n"))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let paths = trace_paths(args, &file);
-    ensure!(
-        !paths.is_empty(),
-        "{name}: no traces: name them in `traces` or on the command line"
-    );
-    let stem = args.experiment.file_stem().unwrap_or_default();
-    let out = args
-        .out
-        .clone()
-        .unwrap_or_else(|| Path::new("out").join(stem));
-    let outputs = ["results.json", "results.csv", "report.html"].map(|name| out.join(name));
-    let inputs = paths.iter().chain([&args.experiment]).map(PathBuf::as_path);
-    let checked = outputs.each_ref().map(|path| Output::text("--out", path));
-    files::check_outputs(&checked, inputs)?;
-    let traces = Traces::open(&paths)?;
-    let subjects = traces.subjects();
-
-    let points = subjects.len() * plan.points.len();
-    let progress = Progress::new("replaying", points as u64, "points");
-    let store = Store::new(&out);
-    let done = |done| progress.advance(done);
-    let outcome = experiment::run(&plan, &subjects, Some(&store), &done)?;
-    drop(progress);
-    shell::note(&outcome.shared());
-
-    let report = SweepReport::new(&file, &outcome);
-    let json = report.json()?;
-    let page = report.page(&format!("Parallax sweep: {}", stem.to_string_lossy()))?;
-    let contents = [format!("{json}\n"), report.csv(), page];
-    for (path, text) in outputs.iter().zip(contents) {
-        write_atomically(path, text.as_bytes())?;
-    }
-    super::print(&if args.json {
-        json
+    let sweep = Sweep::open(args, file, plan)?;
+    let subjects = sweep.traces.subjects();
+    if let Some(shards) = args.shards.emit_slurm {
+        sweep.check_outputs()?;
+        super::print(&sweep.slurm_script(shards)?)?;
+    } else if args.plan {
+        let tasks = sweep.split().tasks(&sweep.plan, args.shards.shard);
+        let text = sweep_plan::json(&sweep.plan, &subjects, &tasks, &sweep.store)?;
+        super::print(&text)?;
+    } else if let Some(shard) = args.shards.shard {
+        sweep.run_shard(shard, &subjects)?;
     } else {
-        report.table().text()
-    })?;
+        sweep.check_outputs()?;
+        let outcome = if args.merge_only {
+            experiment::merge(&sweep.plan, &subjects, &sweep.store)
+                .with_context(|| sweep.out.display().to_string())?
+        } else {
+            let points = subjects.len() * sweep.plan.points.len();
+            let progress = Progress::new("replaying", points as u64, "points");
+            let done = |done| progress.advance(done);
+            experiment::run(&sweep.plan, &subjects, Some(&sweep.store), &done)?
+        };
+        shell::note(&outcome.shared());
+        sweep.write(&outcome)?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A sweep that is ready to run.
+struct Sweep<'a> {
+    args: &'a Args,
+    file: ExperimentFile,
+    plan: Plan,
+    paths: Vec<PathBuf>,
+    traces: Traces,
+    out: PathBuf,
+    store: Store,
+}
+
+impl<'a> Sweep<'a> {
+    fn open(args: &'a Args, file: ExperimentFile, plan: Plan) -> Result<Self> {
+        let paths = trace_paths(args, &file);
+        ensure!(
+            !paths.is_empty(),
+            "{}: no traces: name them in `traces` or on the command line",
+            args.experiment.display()
+        );
+        let usual = || Path::new("out").join(args.experiment.file_stem().unwrap_or_default());
+        let out = args.out.clone().unwrap_or_else(usual);
+        Ok(Self {
+            traces: Traces::open(&paths)?,
+            store: Store::new(&out),
+            args,
+            file,
+            plan,
+            paths,
+            out,
+        })
+    }
+
+    fn split(&self) -> Split {
+        Split::new(&self.plan, &self.traces.records())
+    }
+
+    /// JSON, CSV and page.
+    fn outputs(&self) -> [PathBuf; 3] {
+        ["results.json", "results.csv", "report.html"].map(|name| self.out.join(name))
+    }
+
+    fn check_outputs(&self) -> Result<()> {
+        let outputs = self.outputs();
+        let outputs = outputs.iter().map(|path| Output::text("--out", path));
+        let mut outputs: Vec<Output> = outputs.chain(self.args.parquet.output()).collect();
+        outputs.extend(self.args.json.then(|| Output::result("--json")));
+        let inputs = self.paths.iter().chain([&self.args.experiment]);
+        files::check_outputs(&outputs, inputs.map(PathBuf::as_path))?;
+        Ok(())
+    }
+
+    /// Replays a shard's points, and writes nothing but them.
+    fn run_shard(&self, shard: Shard, subjects: &[Subject]) -> Result<()> {
+        let split = self.split();
+        let tasks = split.tasks(&self.plan, Some(shard));
+        if let Some(task) = tasks.first() {
+            let config = &self.plan.points[task.point].config;
+            let point = self.store.path(&subjects[task.subject].id, config);
+            files::check_outputs(&[Output::text("--out", &point)], [])?;
+        }
+        let wanted = split.shard(shard);
+        let progress = Progress::new("replaying", tasks.len() as u64, "points");
+        let done = |done| progress.advance(done);
+        let work = experiment::run_part(&self.plan, subjects, &self.store, &wanted, &done)?;
+        drop(progress);
+        shell::note(&format!(
+            "shard {}/{}: {}",
+            shard.number,
+            shard.count,
+            work.told(tasks.len())
+        ));
+        Ok(())
+    }
+
+    /// Writes and prints the results.
+    fn write(&self, outcome: &Outcome) -> Result<()> {
+        let report = SweepReport::new(&self.file, outcome);
+        let stem = self.args.experiment.file_stem().unwrap_or_default();
+        let json = report.json()?;
+        let page = report.page(&format!("Parallax sweep: {}", stem.to_string_lossy()))?;
+        let contents = [format!("{json}\n"), report.csv(), page];
+        for (path, text) in self.outputs().iter().zip(contents) {
+            write_atomically(path, text.as_bytes())?;
+        }
+        self.args.parquet.write(|| report.rows())?;
+        self.store.tidy();
+        if self.args.parquet.takes_stdout() {
+            return Ok(());
+        }
+        super::print(&if self.args.json {
+            json
+        } else {
+            report.table().text()
+        })
+    }
+
+    /// The same sweep as a Slurm job array.
+    fn slurm_script(&self, shards: u32) -> Result<String> {
+        let program = std::env::current_exe().context("the program's own path")?;
+        let mut command = vec![shell::absolute(&program)?, "sweep".to_owned()];
+        command.push(shell::absolute(&self.args.experiment)?);
+        for trace in &self.args.traces {
+            command.push(shell::absolute(trace)?);
+        }
+        command.extend(["--out".to_owned(), shell::absolute(&self.out)?]);
+        let name = self.args.experiment.file_stem().unwrap_or_default();
+        let mut then = vec!["--merge-only".to_owned()];
+        if let Some(path) = &self.args.parquet.path {
+            ensure!(
+                !shell::is_stdout(path),
+                "--parquet -: expected a file for the script to write"
+            );
+            then.extend(["--parquet".to_owned(), shell::absolute(path)?]);
+        }
+        let array = SlurmArray {
+            name: &name.to_string_lossy(),
+            shards,
+            cpus: self.args.threads.count,
+            command,
+            then,
+        };
+        Ok(array.script())
+    }
 }
 
 /// The command line's traces, or the file's, which are relative to it.

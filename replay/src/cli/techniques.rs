@@ -2,6 +2,7 @@
 
 use super::ConfigArgs;
 use super::experiment_args::{page_outputs, parse_orders};
+use super::parquet_arg::ParquetArg;
 use super::subjects::Traces;
 use crate::config::{Mode, Order, RunConfig};
 use crate::experiment::{self, Plan, ResultRow, frame_count};
@@ -46,6 +47,8 @@ pub struct Args {
     /// Also write the rows as CSV; - writes them to standard output in place of the table
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    #[command(flatten)]
+    parquet: ParquetArg,
     /// Also write a page with plots and pictures, with JSON and CSV beside it
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
@@ -106,6 +109,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = &args.csv {
         write_atomically(path, report.csv().as_bytes())?;
     }
+    args.parquet.write(|| report.table())?;
     if let Some(path) = &args.html {
         let scenes = folders.iter().zip(&pictures).enumerate();
         let scenes = scenes
@@ -141,6 +145,7 @@ fn check_outputs(args: &Args, folders: &[Folder]) -> Result<bool> {
             .iter()
             .flat_map(|path| page_outputs("--html", path)),
     );
+    outputs.extend(args.parquet.output());
     outputs.extend(args.json.then(|| Output::result("--json")));
     let mut inputs: Vec<PathBuf> = args.machine.file().map(PathBuf::from).into_iter().collect();
     for folder in folders {
@@ -152,7 +157,7 @@ fn check_outputs(args: &Args, folders: &[Folder]) -> Result<bool> {
         .iter()
         .chain(&args.html)
         .any(|path| is_stdout(path));
-    Ok(!to_stdout)
+    Ok(!to_stdout && !args.parquet.takes_stdout())
 }
 
 /// Names of the folders' scenes; those of one scene go by their folders' names, too.

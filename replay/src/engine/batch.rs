@@ -42,6 +42,23 @@ impl Work {
         self.passes += other.passes;
         self.expansions += other.expansions;
     }
+
+    /// What was shared and skipped of so many points, for whoever waited for them.
+    #[must_use]
+    pub fn told(&self, points: usize) -> String {
+        let Self {
+            replays,
+            passes,
+            expansions,
+        } = self;
+        let mut text = format!(
+            "{points} points: {replays} replayed in {passes} passes over {expansions} expanded traces"
+        );
+        if let skipped @ 1.. = points.saturating_sub(*replays) {
+            text += &format!(", {skipped} known or equal to one of these");
+        }
+        text
+    }
 }
 
 /// What a machine yields for one configuration.
@@ -110,6 +127,17 @@ pub fn replay_all(
     let outcomes: Vec<_> = waves.into_par_iter().map(run).collect();
     outcomes.into_iter().collect::<Result<(), _>>()?;
     Ok(work)
+}
+
+/// Who shares what: by stream, the passes that its configurations, by index, are answered in.
+#[must_use]
+pub fn sharing(configs: &[RunConfig]) -> Vec<Vec<Vec<usize>>> {
+    let streams = grouped(0..configs.len(), |&index| stream_key(&configs[index]));
+    let points = |stream| passes(configs, stream).into_iter().map(|pass| pass.points);
+    streams
+        .into_iter()
+        .map(|stream| points(stream).collect())
+        .collect()
 }
 
 /// Groups of equal keys, each in the order of its first member.

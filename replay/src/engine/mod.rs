@@ -9,7 +9,7 @@ mod summary;
 mod tests;
 mod timed;
 
-pub use batch::{Work, replay_all};
+pub use batch::{Work, replay_all, sharing};
 
 use crate::config::{Assign, ConfigError, RunConfig};
 use crate::order::Phase;

@@ -7,7 +7,6 @@ use crate::engine::Work;
 use crate::paper::z2::{self, PublishedRow};
 use crate::result::RunResult;
 use std::collections::HashMap;
-use std::fmt::Write as _;
 
 /// What a plan yields.
 pub struct Outcome<'a> {
@@ -71,20 +70,7 @@ impl<'a> Outcome<'a> {
     /// What the results share, for whoever waited for them.
     #[must_use]
     pub fn shared(&self) -> String {
-        let Work {
-            replays,
-            passes,
-            expansions,
-        } = self.work;
-        let skipped = self.results.len() - replays;
-        let mut text = format!(
-            "{} points: {replays} replayed in {passes} passes over {expansions} expanded traces",
-            self.results.len()
-        );
-        if skipped > 0 {
-            let _ = write!(text, ", {skipped} known or equal to one of these");
-        }
-        text
+        self.work.told(self.results.len())
     }
 
     /// A row for every point of every trace, in that order.

@@ -1,12 +1,14 @@
 //! Replays the points of a plan on every trace.
 
-use super::{Outcome, Plan, Point, Store, Subject};
+use super::store::Absent;
+use super::{Outcome, Plan, Point, Store, Subject, point_key};
 use crate::config::RunConfig;
 use crate::engine::{ReplayError, Work, replay_all};
 use crate::result::RunResult;
 use crate::stream::LineMemory;
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A point failed.
@@ -42,25 +44,138 @@ pub fn run<'a>(
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
     let one = |subject| replayed(plan, &groups, subject, store, &memory, done);
     let answers: Vec<Result<_, RunError>> = subjects.par_iter().map(one).collect();
-    let mut results = Vec::with_capacity(subjects.len() * plan.points.len());
+    let mut results = Vec::with_capacity(subjects.len());
     let mut work = Work::default();
     for answer in answers {
         let (of_groups, of_subject) = answer?;
         work.add(&of_subject);
+        results.push(of_groups);
+    }
+    Ok(outcome(plan, subjects, &groups, &results, work))
+}
+
+/// Replays the points that are wanted and not in the store, and keeps them there; `wanted[subject]`
+/// are the distinct configurations, as [`super::Split`] numbers them.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_part(
+    plan: &Plan,
+    subjects: &[Subject],
+    store: &Store,
+    wanted: &[Vec<usize>],
+    done: &(dyn Fn(u64) + Sync),
+) -> Result<Work, RunError> {
+    let all = groups(&plan.points);
+    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+    let one = |(subject, wanted): (_, &Vec<usize>)| {
+        let groups: Vec<Vec<usize>> = wanted.iter().map(|&group| all[group].clone()).collect();
+        replayed(plan, &groups, subject, Some(store), &memory, done).map(|(_, work)| work)
+    };
+    let answers: Vec<Result<Work, RunError>> = subjects.par_iter().zip(wanted).map(one).collect();
+    let mut work = Work::default();
+    for answer in answers {
+        work.add(&answer?);
+    }
+    Ok(work)
+}
+
+/// The outcome of a plan whose every point is in the store.
+///
+/// # Errors
+/// All points that are not.
+pub fn merge<'a>(
+    plan: &'a Plan,
+    subjects: &'a [Subject<'a>],
+    store: &Store,
+) -> Result<Outcome<'a>, Incomplete> {
+    let groups = groups(&plan.points);
+    let mut results = Vec::with_capacity(subjects.len());
+    let mut absent = Vec::new();
+    for subject in subjects {
+        let find = |group: &Vec<usize>| store.find(&subject.id, &plan.points[group[0]].config);
+        let found: Vec<_> = groups.par_iter().map(find).collect();
+        let mut of_groups = Vec::with_capacity(groups.len());
+        for (group, found) in groups.iter().zip(found) {
+            let point = &plan.points[group[0]];
+            match found {
+                Ok(result) => of_groups.push(result),
+                Err(why) => absent.push(AbsentPoint {
+                    name: format!("{}, {}", subject.label, point.title()),
+                    key: point_key(&subject.id, &point.config),
+                    why,
+                }),
+            }
+        }
+        results.push(of_groups);
+    }
+    if !absent.is_empty() {
+        let expected = groups.len() * subjects.len();
+        return Err(Incomplete { expected, absent });
+    }
+    Ok(outcome(plan, subjects, &groups, &results, Work::default()))
+}
+
+/// Hands every point its group's result; `results[subject]` has one a group.
+fn outcome<'a>(
+    plan: &'a Plan,
+    subjects: &'a [Subject<'a>],
+    groups: &[Vec<usize>],
+    results: &[Vec<RunResult>],
+    work: Work,
+) -> Outcome<'a> {
+    let mut of_all = Vec::with_capacity(subjects.len() * plan.points.len());
+    for of_groups in results {
         let mut of_points = vec![RunResult::default(); plan.points.len()];
-        for (group, result) in groups.iter().zip(&of_groups) {
+        for (group, result) in groups.iter().zip(of_groups) {
             for &point in group {
                 of_points[point].clone_from(result);
             }
         }
-        results.append(&mut of_points);
+        of_all.append(&mut of_points);
     }
-    Ok(Outcome::new(plan, subjects, results, work))
+    Outcome::new(plan, subjects, of_all, work)
+}
+
+/// Points of a plan that the store lacks.
+#[derive(Debug, thiserror::Error)]
+pub struct Incomplete {
+    /// Distinct points of the plan.
+    pub expected: usize,
+    /// Those that are not there.
+    pub absent: Vec<AbsentPoint>,
+}
+
+/// A point that the store lacks.
+#[derive(Debug)]
+pub struct AbsentPoint {
+    /// Trace and settings.
+    pub name: String,
+    /// Name of its file.
+    pub key: String,
+    /// Why.
+    pub why: Absent,
+}
+
+impl fmt::Display for Incomplete {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        /// More than these nobody reads; `--plan --json` has them all.
+        const LISTED: usize = 50;
+        let (expected, found) = (self.expected, self.absent.len());
+        write!(f, "{found} of {expected} points are not there:")?;
+        for AbsentPoint { name, key, why } in self.absent.iter().take(LISTED) {
+            write!(f, "\n  {name}: points/{key}.json: {why}")?;
+        }
+        match found.checked_sub(LISTED) {
+            Some(more @ 1..) => write!(f, "\n  and {more} more (--plan --json lists all)"),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Points, by index, that one replay of a trace answers together: those with the same
 /// configuration (a change may try the value that the base has).
-fn groups(points: &[Point]) -> Vec<Vec<usize>> {
+pub(super) fn groups(points: &[Point]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
     for (index, point) in points.iter().enumerate() {
@@ -84,7 +199,7 @@ fn replayed(
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<(Vec<RunResult>, Work), RunError> {
     let config = |group: &Vec<usize>| plan.points[group[0]].config;
-    let load = |group| store.and_then(|store| store.load(&subject.id, &config(group)));
+    let load = |group| store.and_then(|store| store.find(&subject.id, &config(group)).ok());
     let kept: Vec<Option<RunResult>> = groups.par_iter().map(load).collect();
     let missing: Vec<usize> = (0..groups.len()).filter(|&g| kept[g].is_none()).collect();
     let points = |groups: &mut dyn Iterator<Item = &Vec<usize>>| -> u64 {

@@ -4,7 +4,9 @@ use crate::config::RunConfig;
 use crate::files::write_atomically;
 use crate::result::{RunResult, TOOL, TraceId};
 use serde::{Deserialize, Serialize};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Schema of a stored point.
 pub const POINT_SCHEMA: &str = "replay.point/1";
@@ -22,6 +24,28 @@ pub struct StoredPoint {
     pub config: RunConfig,
     /// Result.
     pub result: RunResult,
+}
+
+/// Writing a point takes milliseconds: an unfinished file as old as this has no writer.
+const ABANDONED_AFTER: Duration = Duration::from_secs(600);
+
+/// Why a point's result cannot be taken from its file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Absent {
+    /// There is no file.
+    #[error("missing")]
+    Missing,
+    /// It cannot be read, or holds something else.
+    #[error("damaged: {0}")]
+    Damaged(String),
+    /// Another version made it.
+    #[error("expected {POINT_SCHEMA} of {TOOL}, found {schema} of {tool}")]
+    Foreign {
+        /// Program and version.
+        tool: String,
+        /// Schema.
+        schema: String,
+    },
 }
 
 /// The points under one folder.
@@ -56,22 +80,47 @@ impl Store {
         }
     }
 
-    fn path(&self, trace: &TraceId, config: &RunConfig) -> PathBuf {
+    /// The file of a point.
+    #[must_use]
+    pub fn path(&self, trace: &TraceId, config: &RunConfig) -> PathBuf {
         self.folder
             .join(point_key(trace, config))
             .with_extension("json")
     }
 
-    /// A point's result, if it was computed before; a damaged or foreign file counts as none.
-    #[must_use]
-    pub fn load(&self, trace: &TraceId, config: &RunConfig) -> Option<RunResult> {
-        let bytes = std::fs::read(self.path(trace, config)).ok()?;
-        let point: StoredPoint = serde_json::from_slice(&bytes).ok()?;
-        let same = point.schema == POINT_SCHEMA
-            && point.tool == TOOL
-            && point.trace.checksum == trace.checksum
-            && point.config == *config;
-        same.then_some(point.result)
+    /// A point's result, if it was computed before.
+    ///
+    /// # Errors
+    /// Why its file cannot be taken: there is none, or it is damaged or foreign.
+    pub fn find(&self, trace: &TraceId, config: &RunConfig) -> Result<RunResult, Absent> {
+        /// What every version's files have.
+        #[derive(Deserialize)]
+        struct Header {
+            schema: String,
+            tool: String,
+        }
+        let bytes =
+            std::fs::read(self.path(trace, config)).map_err(|error| match error.kind() {
+                ErrorKind::NotFound => Absent::Missing,
+                _ => Absent::Damaged(error.to_string()),
+            })?;
+        let damaged = |error: serde_json::Error| Absent::Damaged(error.to_string());
+        let header: Header = serde_json::from_slice(&bytes).map_err(damaged)?;
+        if header.tool != TOOL || header.schema != POINT_SCHEMA {
+            let Header { schema, tool } = header;
+            return Err(Absent::Foreign { tool, schema });
+        }
+        let point: StoredPoint = serde_json::from_slice(&bytes).map_err(damaged)?;
+        if point.trace.checksum != trace.checksum || point.config != *config {
+            return Err(Absent::Damaged("holds another point".to_owned()));
+        }
+        Ok(point.result)
+    }
+
+    /// Removes what killed processes left behind; what others are writing now stays.
+    pub fn tidy(&self) {
+        // Nobody reads those files, so what cannot be removed does no harm.
+        let _left = formats::container::remove_abandoned(&self.folder, ABANDONED_AFTER);
     }
 
     /// Keeps a point's result and returns it as it will be read back, so that a first run and a
@@ -120,14 +169,15 @@ mod tests {
             access_hash: "ab".into(),
             ..RunResult::default()
         };
-        assert_eq!(store.load(&trace(), &config), None);
+        assert_eq!(store.find(&trace(), &config), Err(Absent::Missing));
         store.save(&trace(), &config, &result).unwrap();
-        assert_eq!(store.load(&trace(), &config), Some(result));
-        assert_eq!(store.load(&trace(), &RunConfig { seed: 2, ..config }), None);
+        assert_eq!(store.find(&trace(), &config), Ok(result));
+        let other = RunConfig { seed: 2, ..config };
+        assert_eq!(store.find(&trace(), &other), Err(Absent::Missing));
     }
 
     #[test]
-    fn a_cut_file_counts_as_none() {
+    fn what_is_no_point_is_not_taken_and_says_why() {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::new(folder.path());
         let config = RunConfig::default();
@@ -137,7 +187,22 @@ mod tests {
         let path = store.path(&trace(), &config);
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-        assert_eq!(store.load(&trace(), &config), None);
+        let found = store.find(&trace(), &config).unwrap_err().to_string();
+        assert!(found.starts_with("damaged: EOF"), "{found}");
+        // A file under another point's name, and one of a version that may have other fields.
+        let other = RunConfig { seed: 2, ..config };
+        std::fs::write(store.path(&trace(), &other), &bytes).unwrap();
+        let found = store.find(&trace(), &other).unwrap_err().to_string();
+        assert_eq!(found, "damaged: holds another point");
+        std::fs::write(
+            &path,
+            r#"{"schema":"replay.point/0","tool":"replay 0.0.1"}"#,
+        )
+        .unwrap();
+        assert_eq!(
+            store.find(&trace(), &config).unwrap_err().to_string(),
+            format!("expected replay.point/1 of {TOOL}, found replay.point/0 of replay 0.0.1")
+        );
     }
 
     #[test]

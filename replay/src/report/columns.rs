@@ -24,34 +24,53 @@ pub enum Value {
     Real(f64),
 }
 
-impl From<String> for Value {
-    fn from(text: String) -> Self {
-        Self::Text(text)
-    }
+/// What a column's values are, whether or not a row has one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Text.
+    Text,
+    /// Yes or no.
+    Flag,
+    /// Counts.
+    Whole,
+    /// Measures.
+    Real,
 }
 
-impl From<&str> for Value {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
-    }
+/// What a column's function may return: its type says the column's.
+pub trait Cell: Into<Value> {
+    /// The column's kind.
+    const KIND: Kind;
 }
 
-impl From<bool> for Value {
-    fn from(flag: bool) -> Self {
-        Self::Flag(flag)
-    }
+/// Implements [`Cell`] for a type.
+macro_rules! cell {
+    ($type:ty, $kind:ident, $value:expr) => {
+        impl From<$type> for Value {
+            fn from(value: $type) -> Self {
+                $value(value)
+            }
+        }
+
+        impl Cell for $type {
+            const KIND: Kind = Kind::$kind;
+        }
+    };
 }
 
-impl From<u64> for Value {
-    fn from(count: u64) -> Self {
-        Self::Whole(count)
-    }
+cell!(String, Text, Value::Text);
+cell!(&str, Text, |text: &str| Value::Text(text.to_owned()));
+cell!(bool, Flag, Value::Flag);
+cell!(u64, Whole, Value::Whole);
+cell!(f64, Real, Value::Real);
+
+/// A name and its title.
+impl Cell for Value {
+    const KIND: Kind = Kind::Text;
 }
 
-impl From<f64> for Value {
-    fn from(measure: f64) -> Self {
-        Self::Real(measure)
-    }
+impl<T: Cell> Cell for Option<T> {
+    const KIND: Kind = T::KIND;
 }
 
 impl<T: Into<Self>> From<Option<T>> for Value {
@@ -145,6 +164,8 @@ pub struct Heading {
     pub name: Cow<'static, str>,
     /// Unit, empty where there is none.
     pub unit: &'static str,
+    /// What the values are.
+    pub kind: Kind,
     /// How a table writes the values.
     pub show: Show,
     /// What the figure is, for charts and for the page's notes; may be empty.
@@ -154,6 +175,12 @@ pub struct Heading {
 }
 
 impl Heading {
+    /// Name in files of columns.
+    #[must_use]
+    pub fn flat_key(&self) -> String {
+        self.key.replace('.', "_")
+    }
+
     /// What the figure is, with its unit, for the axis of a chart.
     #[must_use]
     pub fn axis_label(&self) -> String {
@@ -170,7 +197,7 @@ pub struct Column<'a, R: ?Sized> {
 
 impl<'a, R: ?Sized> Column<'a, R> {
     /// A column; `show` and `unit` say how numbers are written.
-    pub fn new<V: Into<Value>>(
+    pub fn new<V: Cell>(
         key: impl Into<Cow<'static, str>>,
         name: impl Into<Cow<'static, str>>,
         unit: &'static str,
@@ -182,6 +209,7 @@ impl<'a, R: ?Sized> Column<'a, R> {
                 key: key.into(),
                 name: name.into(),
                 unit,
+                kind: V::KIND,
                 show,
                 about: "",
                 published: false,
@@ -191,7 +219,7 @@ impl<'a, R: ?Sized> Column<'a, R> {
     }
 
     /// A column of text.
-    pub fn text<V: Into<Value>>(
+    pub fn text<V: Cell>(
         key: impl Into<Cow<'static, str>>,
         name: impl Into<Cow<'static, str>>,
         value: impl Fn(&R) -> V + 'a,
@@ -200,7 +228,7 @@ impl<'a, R: ?Sized> Column<'a, R> {
     }
 
     /// A column of measures with this many decimals.
-    pub fn real<V: Into<Value>>(
+    pub fn real<V: Cell>(
         key: impl Into<Cow<'static, str>>,
         name: impl Into<Cow<'static, str>>,
         unit: &'static str,
@@ -214,6 +242,13 @@ impl<'a, R: ?Sized> Column<'a, R> {
     #[must_use]
     pub fn about(mut self, about: &'static str) -> Self {
         self.heading.about = about;
+        self
+    }
+
+    /// Says what the values are where their type does not.
+    #[must_use]
+    pub fn kind(mut self, kind: Kind) -> Self {
+        self.heading.kind = kind;
         self
     }
 

@@ -2,15 +2,16 @@
 
 pub mod addresses;
 pub mod columns;
-pub mod csv;
 pub mod figures;
 pub mod html;
 pub mod locality;
+pub mod parquet;
 pub mod picture;
 pub mod plots;
 pub mod run;
 pub mod sgrt;
 pub mod sweep;
+pub mod sweep_plan;
 pub mod table;
 pub mod techniques;
 pub mod theme;

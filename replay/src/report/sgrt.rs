@@ -9,7 +9,7 @@ use crate::report::plots::{PlotError, data_uri};
 use crate::sgrt::result::Report;
 use maud::{Markup, html};
 
-pub use tables::csv;
+pub use tables::{csv, rows};
 
 /// Longest edge of a picture on the page.
 pub const THUMBNAIL_PX: u32 = 560;

@@ -1,6 +1,6 @@
 //! A sweep's results: rows, table, CSV and page.
 
-use super::columns::{Column, Record};
+use super::columns::{Column, Kind, Record, Value as Cell};
 use super::figures::{Figure, figure, figures, number};
 use super::html::{self, Section, folded};
 use super::plots::bars::{BarChart, BarGroup};
@@ -9,11 +9,14 @@ use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
 use super::theme;
 use crate::config::{Order, RunConfig};
-use crate::experiment::{ExperimentFile, Outcome, ResultRow, Setting, plain, point_key};
+use crate::experiment::{
+    Axis, ExperimentFile, Outcome, Point, ResultRow, Setting, plain, point_key,
+};
 use crate::palette;
 use crate::result::{TOOL, TraceId};
 use maud::html;
 use serde::Serialize;
+use std::collections::HashMap;
 use toml::Value;
 
 /// Schema of a sweep's JSON.
@@ -37,14 +40,14 @@ struct Document<'a, 'r> {
     /// Labels and traces.
     traces: Vec<(&'a str, &'a TraceId)>,
     base: RunConfig,
-    axes: &'a [crate::experiment::Axis],
-    one_at_a_time: &'a [crate::experiment::Axis],
-    rows: Vec<Point<'a, 'r>>,
+    axes: &'a [Axis],
+    one_at_a_time: &'a [Axis],
+    rows: Vec<PointRow<'a, 'r>>,
 }
 
 /// A point of a trace in JSON.
 #[derive(Serialize)]
-struct Point<'a, 'r> {
+struct PointRow<'a, 'r> {
     scene: &'a str,
     /// Values of the axes, in their order.
     settings: &'a [Setting],
@@ -61,6 +64,45 @@ fn change_title(change: Option<&Setting>) -> String {
         || "base".to_owned(),
         |(key, value)| format!("{key} = {}", plain(value)),
     )
+}
+
+/// The cells of an axis by its values in the file, all of one kind.
+fn resolved_values(points: &[Point], i: usize, axis: &Axis) -> (HashMap<String, Cell>, Kind) {
+    let pointer = format!("/{}", axis.key.replace('.', "/"));
+    let mut cells: HashMap<String, Cell> = HashMap::new();
+    // Changes, which may overrule an axis, come after all points without one.
+    for point in points.iter().filter(|point| point.change.is_none()) {
+        let Some((_, value)) = point.settings.get(i) else {
+            continue;
+        };
+        let resolve = || {
+            let config = serde_json::to_string(&point.config).unwrap_or_default();
+            let config: serde_json::Value = serde_json::from_str(&config).unwrap_or_default();
+            match config.pointer(&pointer) {
+                Some(serde_json::Value::Bool(flag)) => Cell::Flag(*flag),
+                Some(serde_json::Value::Number(number)) => match number.as_u64() {
+                    Some(count) => Cell::Whole(count),
+                    None => number.as_f64().map_or(Cell::None, Cell::Real),
+                },
+                _ => Cell::Text(plain(value)),
+            }
+        };
+        cells.entry(value.to_string()).or_insert_with(resolve);
+    }
+    let all = |fits: fn(&Cell) -> bool| cells.values().all(fits);
+    let kind = if all(|cell| matches!(cell, Cell::Whole(_))) {
+        Kind::Whole
+    } else if all(|cell| cell.number().is_some()) {
+        Kind::Real
+    } else if all(|cell| matches!(cell, Cell::Flag(_))) {
+        Kind::Flag
+    } else {
+        Kind::Text
+    };
+    for cell in cells.values_mut().filter(|_| kind == Kind::Text) {
+        *cell = Cell::Text(cell.exact());
+    }
+    (cells, kind)
 }
 
 impl<'a> SweepReport<'a> {
@@ -82,7 +124,7 @@ impl<'a> SweepReport<'a> {
         let columns = figures();
         let mut rows = Vec::with_capacity(self.rows.len());
         for row in &self.rows {
-            rows.push(Point {
+            rows.push(PointRow {
                 scene: &row.subject.label,
                 settings: &row.point.settings,
                 change: row.point.change.as_ref(),
@@ -105,37 +147,55 @@ impl<'a> SweepReport<'a> {
         })
     }
 
-    /// The trace, the axes and the change.
-    fn identity(&self) -> Vec<Figure<'a>> {
+    /// The trace, the axes and the change; `axis` makes an axis' column.
+    fn identity(&self, axis: impl Fn(usize, &Axis) -> Figure<'a>) -> Vec<Figure<'a>> {
         let mut columns = vec![Figure::text("scene", "scene", |r| r.subject.label.clone())];
-        for (i, axis) in self.file.axes.iter().enumerate() {
-            columns.push(Column::text(
-                axis.key.clone(),
-                axis.key.clone(),
-                move |r: &ResultRow| r.point.settings.get(i).map(|(_, value)| plain(value)),
-            ));
-        }
+        let axes = self.file.axes.iter().enumerate();
+        columns.extend(axes.map(|(i, of)| axis(i, of)));
         columns.push(Figure::text("change", "change", |r| {
             change_title(r.point.change.as_ref())
         }));
         columns
     }
 
+    /// Values of an axis as the file has them.
+    fn written(i: usize, axis: &Axis) -> Figure<'a> {
+        Column::text(axis.key.clone(), axis.key.clone(), move |r: &ResultRow| {
+            r.point.settings.get(i).map(|(_, value)| plain(value))
+        })
+    }
+
+    /// Values of an axis as configurations have them: `8KiB` is 8192.
+    fn resolved(&self, i: usize, axis: &Axis) -> Figure<'a> {
+        let (values, kind) = resolved_values(&self.outcome.plan.points, i, axis);
+        let column = Column::text(axis.key.clone(), axis.key.clone(), move |r: &ResultRow| {
+            let (_, value) = r.point.settings.get(i)?;
+            values.get(&value.to_string()).cloned()
+        });
+        column.kind(kind)
+    }
+
     /// The rows in full precision.
     #[must_use]
-    pub fn csv(&self) -> String {
-        let mut columns = self.identity();
+    pub fn rows(&self) -> Table {
+        let mut columns = self.identity(|i, axis| self.resolved(i, axis));
         columns.push(Figure::text("point", "point", |r| {
             point_key(&r.subject.id, &r.point.config)
         }));
         columns.extend(figures());
-        Table::new(&columns, &self.rows).csv()
+        Table::new(&columns, &self.rows)
+    }
+
+    /// The rows as CSV.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        self.rows().csv()
     }
 
     /// The rows as a table; sets rows of a trace and a change apart.
     #[must_use]
     pub fn table(&self) -> Table {
-        let mut columns = self.identity();
+        let mut columns = self.identity(Self::written);
         if self.file.one_at_a_time.is_empty() {
             columns.pop();
         } else {

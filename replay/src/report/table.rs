@@ -170,7 +170,7 @@ impl Table {
     #[must_use]
     pub fn csv(&self) -> String {
         let mut csv = csv::Writer::from_writer(Vec::new());
-        let keys = self.headings.iter().map(|h| h.key.replace('.', "_"));
+        let keys = self.headings.iter().map(Heading::flat_key);
         let rows = self.rows.iter().map(|row| row.iter().map(Value::exact));
         // Writing to memory cannot fail, and every row has a cell a heading.
         let _ = csv.write_record(keys);

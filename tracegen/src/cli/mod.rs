@@ -9,6 +9,7 @@ mod raster_auto;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;
+pub mod sweep;
 mod technique_args;
 pub mod techniques;
 
@@ -23,6 +24,7 @@ Examples:
   tracegen raster atrium -o atrium.textrace --image atrium.png
   tracegen raster sponza.gltf --camera gallery --shadows -o sponza.textrace
   tracegen techniques atrium --path head -o atrium-techniques
+  tracegen sweep captures.toml -o traces
   tracegen rays chess -o chess.raytrace --image chess.png";
 
 /// Renders a scene for both eyes and captures every texture sample or every ray into a trace.
@@ -43,6 +45,8 @@ enum Command {
     Raster(Box<raster::RasterArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
     Techniques(Box<techniques::TechniquesArgs>),
+    /// Capture every combination of a manifest's scenes, cameras and displays; goes on where it stopped.
+    Sweep(sweep::SweepArgs),
     /// Trace a stereo frame and capture its rays into a .raytrace file.
     Rays(Box<rays::RaysArgs>),
     #[command(flatten)]
@@ -59,6 +63,7 @@ pub fn main() -> ExitCode {
                 Command::Scenes(args) => scenes::run(args)?,
                 Command::Raster(args) => raster::run(&args)?,
                 Command::Techniques(args) => techniques::run(&args)?,
+                Command::Sweep(args) => sweep::run(&args)?,
                 Command::Rays(args) => rays::run(&args)?,
                 Command::Documents(documents) => return documents.run::<Cli>(),
             }

@@ -85,6 +85,23 @@ pub struct RasterArgs {
     threads: Threads,
 }
 
+impl RasterArgs {
+    /// Pixels of all frames, as far as they can be told without the scene.
+    ///
+    /// # Errors
+    /// A display that cannot be.
+    pub(super) fn pixels(&self) -> anyhow::Result<u64> {
+        let [width, height] = self
+            .scene
+            .hmd
+            .resolve(None, None)?
+            .eye_size_px
+            .map(u64::from);
+        let views = self.views.eyes().len() as u64;
+        Ok(width * height * views * u64::from(self.frames))
+    }
+}
+
 /// Views of a frame.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Views {

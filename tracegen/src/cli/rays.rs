@@ -66,6 +66,18 @@ enum Tree {
     Bvh8,
 }
 
+impl RaysArgs {
+    /// Samples of both eyes, as far as they can be told without the scene.
+    ///
+    /// # Errors
+    /// A display that cannot be.
+    pub(super) fn samples(&self) -> anyhow::Result<u64> {
+        let hmd = self.scene.hmd.resolve(Some(DEFAULT_SIZE_PX), None)?;
+        let [width, height] = hmd.eye_size_px.map(u64::from);
+        Ok(2 * width * height * u64::from(self.spp))
+    }
+}
+
 /// Runs `tracegen rays`.
 ///
 /// # Errors

@@ -318,8 +318,14 @@ pub fn traffic(entries: &[Entry]) -> Table {
 
 /// A row for the rule and one for plain reuse, per trace.
 #[must_use]
+pub fn rows(entries: &[Entry]) -> Table {
+    Table::new(&RuleRow::columns(), &rule_rows(entries))
+}
+
+/// The same as CSV.
+#[must_use]
 pub fn csv(entries: &[Entry]) -> String {
-    Table::new(&RuleRow::columns(), &rule_rows(entries)).csv()
+    rows(entries).csv()
 }
 
 /// Pixels of a class.

@@ -233,8 +233,14 @@ impl<'a> PaperReport<'a> {
 
     /// Every row in full precision.
     #[must_use]
+    pub fn table(&self) -> Table {
+        Table::new(&Self::figures(), &self.rows)
+    }
+
+    /// Every row as CSV.
+    #[must_use]
     pub fn csv(&self) -> String {
-        Table::new(&Self::figures(), &self.rows).csv()
+        self.table().csv()
     }
 
     /// The experiment as one JSON object.

@@ -1,0 +1,43 @@
+//! `--parquet` of every command that has its rows as CSV.
+
+use crate::files::write_atomically;
+use crate::report::parquet;
+use crate::report::table::Table;
+use anyhow::{Context, Result};
+use shell::{Output, is_stdout};
+use std::path::PathBuf;
+
+/// The flag.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct ParquetArg {
+    /// Also write the rows as Parquet: typed columns under the CSV's names
+    #[arg(long = "parquet", value_name = "FILE")]
+    pub path: Option<PathBuf>,
+}
+
+impl ParquetArg {
+    /// What will be written.
+    #[must_use]
+    pub fn output(&self) -> Option<Output> {
+        let path = self.path.as_deref()?;
+        Some(Output::binary("--parquet", path))
+    }
+
+    /// Whether it takes standard output from the command's own result.
+    #[must_use]
+    pub fn takes_stdout(&self) -> bool {
+        self.path.as_deref().is_some_and(is_stdout)
+    }
+
+    /// Writes the rows, if they are asked for.
+    ///
+    /// # Errors
+    /// A cell that its column cannot hold, a file that cannot be written.
+    pub fn write(&self, rows: impl FnOnce() -> Table) -> Result<()> {
+        let Some(path) = &self.path else {
+            return Ok(());
+        };
+        let bytes = parquet::bytes(&rows()).with_context(|| path.display().to_string())?;
+        write_atomically(path, &bytes)
+    }
+}

@@ -1,0 +1,205 @@
+//! Who replays what when a plan is split over machines.
+//!
+//! Points that share a pass stay together, and passes that share a trace's expansion stay side by
+//! side, so that few machines expand it again.
+
+use super::Plan;
+use super::runner::groups;
+use crate::config::{Mode, RunConfig};
+use crate::engine::sharing;
+use shell::{Piece, Shard, balanced};
+
+/// Estimated costs a quad record, in quarters of what expanding it to lines costs. They decide how
+/// well shards are balanced, never what comes out.
+mod cost {
+    pub const EXPANSION: u64 = 4;
+    /// Caches without latencies: the first configuration of a pass, and each that shares it.
+    pub const FUNCTIONAL: u64 = 3;
+    pub const FUNCTIONAL_PART: (u64, u64) = (1, 8);
+    pub const TIMED: u64 = 6;
+}
+
+/// Points of a trace that are replayed together.
+struct Pass {
+    subject: usize,
+    /// Indexes of [`groups`].
+    groups: Vec<usize>,
+    piece: Piece,
+    /// Its part of the expansion that it shares with others.
+    expansion: u64,
+}
+
+/// A plan's points on its traces, as they are best dealt out.
+pub struct Split {
+    passes: Vec<Pass>,
+    /// Cost of expanding a trace, by [`Piece::set`].
+    expansions: Vec<u64>,
+    subjects: usize,
+}
+
+/// A point on a trace: their indexes, and what they cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Task {
+    /// Index of the trace.
+    pub subject: usize,
+    /// Index of the first point of the plan with this configuration.
+    pub point: usize,
+    /// Number of the pass; points of one pass cost little more than one of them.
+    pub pass: usize,
+    /// Estimated share of the work, in no unit.
+    pub cost: u64,
+}
+
+impl Split {
+    /// Splits the points of a plan; `records[subject]` are the quad records of each trace.
+    #[must_use]
+    pub fn new(plan: &Plan, records: &[u64]) -> Self {
+        let distinct = groups(&plan.points);
+        let configs: Vec<RunConfig> = distinct
+            .iter()
+            .map(|group| plan.points[group[0]].config)
+            .collect();
+        let streams = sharing(&configs);
+        let mut split = Self {
+            passes: Vec::new(),
+            expansions: Vec::new(),
+            subjects: records.len(),
+        };
+        for (subject, &records) in records.iter().enumerate() {
+            let records = records.max(1);
+            for stream in &streams {
+                let set = split.expansions.len();
+                let expansion = cost::EXPANSION * records;
+                split.expansions.push(expansion);
+                for groups in stream {
+                    let piece = Piece {
+                        cost: records * pass_cost(&configs[groups[0]], groups.len() as u64),
+                        set,
+                    };
+                    split.passes.push(Pass {
+                        subject,
+                        groups: groups.clone(),
+                        piece,
+                        expansion: expansion / stream.len() as u64,
+                    });
+                }
+            }
+        }
+        split
+    }
+
+    /// Indexes of the distinct configurations that a shard replays, by trace.
+    #[must_use]
+    pub fn shard(&self, shard: Shard) -> Vec<Vec<usize>> {
+        let mut wanted = vec![Vec::new(); self.subjects];
+        for pass in &self.passes[self.passes_of(shard)] {
+            wanted[pass.subject].extend_from_slice(&pass.groups);
+        }
+        wanted
+    }
+
+    fn passes_of(&self, shard: Shard) -> std::ops::Range<usize> {
+        let pieces: Vec<Piece> = self.passes.iter().map(|pass| pass.piece).collect();
+        let shards = balanced(&pieces, &self.expansions, shard.count);
+        shards[shard.number as usize - 1].clone()
+    }
+
+    /// Every distinct point on every trace, those of one pass together; only a shard's if one is
+    /// given.
+    #[must_use]
+    pub fn tasks(&self, plan: &Plan, shard: Option<Shard>) -> Vec<Task> {
+        let distinct = groups(&plan.points);
+        let range = shard.map_or(0..self.passes.len(), |shard| self.passes_of(shard));
+        let mut tasks = Vec::new();
+        for number in range {
+            let pass = &self.passes[number];
+            let cost = (pass.piece.cost + pass.expansion) / pass.groups.len() as u64;
+            tasks.extend(pass.groups.iter().map(|&group| Task {
+                subject: pass.subject,
+                point: distinct[group][0],
+                pass: number,
+                cost,
+            }));
+        }
+        tasks
+    }
+}
+
+/// Cost a quad record of a pass over an order that answers so many configurations.
+fn pass_cost(config: &RunConfig, configs: u64) -> u64 {
+    let (part, of) = cost::FUNCTIONAL_PART;
+    match config.mode {
+        Mode::Timed => cost::TIMED,
+        Mode::Functional => cost::FUNCTIONAL + cost::FUNCTIONAL * (configs - 1) * part / of,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::ExperimentFile;
+
+    fn split(file: &str, records: &[u64]) -> (Plan, Split) {
+        let plan = ExperimentFile::parse(file).unwrap().plan().unwrap();
+        let split = Split::new(&plan, records);
+        (plan, split)
+    }
+
+    fn shards(split: &Split, count: u32) -> Vec<Vec<Vec<usize>>> {
+        (1..=count)
+            .map(|number| split.shard(Shard { number, count }))
+            .collect()
+    }
+
+    const FILE: &str = "[axes]\norder = [\"morton\", \"hilbert\", \"scanline\"]\nl1.size_bytes = [\"8KiB\", \"16KiB\", \"32KiB\"]\n\
+                        [one-at-a-time]\nmode = [\"functional\"]\ncores = [4]\nlayout.block_order = [\"morton\"]\nseed = [1]\n";
+
+    #[test]
+    fn every_point_of_every_trace_is_in_one_shard_whatever_their_number() {
+        let (plan, split) = split(FILE, &[1000, 50, 0]);
+        // Changing the seed to what it is makes no new points.
+        let distinct = plan.points.len() - 9;
+        for count in [1, 2, 3, 7, 40, 500] {
+            let mut seen = vec![vec![0; distinct]; 3];
+            for shard in shards(&split, count) {
+                for (subject, groups) in shard.iter().enumerate() {
+                    groups.iter().for_each(|&group| seen[subject][group] += 1);
+                }
+            }
+            assert!(seen.iter().flatten().all(|&times| times == 1), "{count}");
+        }
+        let all = split.tasks(&plan, None);
+        assert_eq!(all.len(), 3 * distinct);
+        let of_shards: Vec<Task> = (1..=7)
+            .flat_map(|number| split.tasks(&plan, Some(Shard { number, count: 7 })))
+            .collect();
+        assert_eq!(of_shards, all);
+    }
+
+    #[test]
+    fn points_that_share_a_pass_stay_together() {
+        let file = "[base]\nmode = \"functional\"\n[axes]\norder = [\"morton\", \"hilbert\"]\nl1.ways = [1, 2, 4, 8]\nl2.ways = [1, 2, 4, 8]\n";
+        let (plan, split) = split(file, &[1000]);
+        let sizes: Vec<usize> = shards(&split, 3)
+            .iter()
+            .map(|shard| shard[0].len())
+            .collect();
+        assert_eq!(sizes, [16, 16, 0]);
+        let tasks = split.tasks(&plan, None);
+        assert!(
+            tasks
+                .chunk_by(|a, b| a.pass == b.pass)
+                .all(|pass| pass.len() == 16)
+        );
+    }
+
+    #[test]
+    fn a_large_trace_is_given_more_machines_than_a_small_one() {
+        let (_, split) = split("[axes]\nseed = [1, 2, 3, 4, 5, 6, 7, 8]\n", &[900, 100]);
+        let small = shards(&split, 5)
+            .iter()
+            .filter(|s| !s[1].is_empty())
+            .count();
+        assert_eq!(small, 1);
+    }
+}

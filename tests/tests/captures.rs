@@ -1,0 +1,168 @@
+//! `tracegen sweep`: the captures of a manifest.
+
+use parallax_tests::{program, refuse, run_ok};
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+const MANIFEST: &str = "\
+[base]
+size = \"16x24\"
+[[captures]]
+command = \"rays\"
+scene = [\"teapot\", \"chess\"]
+hmd = [\"vive\", \"quest2\"]
+";
+
+struct Captures {
+    folder: tempfile::TempDir,
+}
+
+impl Captures {
+    fn new(manifest: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        fs::write(folder.path().join("m.toml"), manifest).expect("temporary file");
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, out: &str, flags: &[&str]) -> Command {
+        let mut command = program("tracegen");
+        command
+            .arg("sweep")
+            .arg(self.path("m.toml"))
+            .arg("-o")
+            .arg(self.path(out));
+        command.args(flags);
+        command
+    }
+
+    /// Runs and tells the closing line.
+    fn run(&self, out: &str, flags: &[&str]) -> String {
+        let output = run_ok(&mut self.command(out, flags));
+        String::from_utf8_lossy(&output.stderr).trim().to_owned()
+    }
+
+    fn names(&self, out: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.path(out)).expect("the folder");
+        let name = |e: fs::DirEntry| e.file_name().to_string_lossy().into_owned();
+        let mut names: Vec<String> = entries.flatten().map(name).collect();
+        names.sort();
+        names
+    }
+}
+
+#[test]
+fn shards_capture_what_the_command_line_does_and_only_once() {
+    let captures = Captures::new(MANIFEST);
+    let told = captures.run("out", &["--shard", "2/2"]);
+    assert!(
+        told.ends_with("2 captures: 2 made, 0 there with the same recipe"),
+        "{told}"
+    );
+    let told = captures.run("out", &[]);
+    assert!(
+        told.ends_with("4 captures: 2 made, 2 there with the same recipe"),
+        "{told}"
+    );
+    let names: Vec<String> = ["chess-quest2", "chess-vive", "teapot-quest2", "teapot-vive"]
+        .iter()
+        .flat_map(|name| ["raytrace", "recipe"].map(|kind| format!("{name}.{kind}")))
+        .collect();
+    assert_eq!(captures.names("out"), names);
+
+    // A trace is what its recipe makes by hand.
+    let recipe = fs::read_to_string(captures.path("out/chess-vive.recipe")).expect("a recipe");
+    assert_eq!(recipe, "rays chess --hmd vive --size 16x24\n");
+    let by_hand = captures.path("by-hand.raytrace");
+    run_ok(
+        program("tracegen")
+            .args(recipe.split_whitespace())
+            .arg("-o")
+            .arg(&by_hand),
+    );
+    let [a, b] =
+        [captures.path("out/chess-vive.raytrace"), by_hand].map(|p| fs::read(p).expect("a trace"));
+    assert!(a == b);
+
+    // Another recipe under the same name is captured again, and so is a trace that has none.
+    fs::write(captures.path("m.toml"), MANIFEST.replace("16x24", "24x16")).expect("temporary file");
+    assert!(captures.run("out", &[]).contains("4 made"));
+    fs::remove_file(captures.path("out/teapot-vive.recipe")).expect("removed");
+    assert!(captures.run("out", &[]).contains("1 made, 3 there"));
+}
+
+#[test]
+fn the_plan_tells_recipes_costs_and_what_is_done() {
+    let captures = Captures::new(MANIFEST);
+    let text = run_ok(&mut captures.command("out", &["--plan"])).stdout;
+    let text = String::from_utf8(text).expect("text");
+    assert_eq!(text.lines().count(), 4);
+    assert!(
+        text.starts_with("teapot-vive.raytrace: rays teapot --hmd vive --size 16x24\n"),
+        "{text}"
+    );
+    let told = captures.run("out", &["--shard", "1/4"]);
+    assert!(told.contains("1 made"), "{told}");
+    let plan = run_ok(&mut captures.command("out", &["--plan", "--json"])).stdout;
+    let plan: serde_json::Value = serde_json::from_slice(&plan).expect("JSON");
+    assert_eq!(plan["schema"], "tracegen.plan/1");
+    let done: Vec<&serde_json::Value> = plan["captures"]
+        .as_array()
+        .expect("captures")
+        .iter()
+        .map(|c| &c["done"])
+        .collect();
+    assert_eq!(done, [true, false, false, false]);
+    assert_eq!(plan["captures"][0]["cost"], 2 * 16 * 24);
+}
+
+#[test]
+fn a_slurm_script_captures_a_shard_a_task() {
+    let captures = Captures::new(MANIFEST);
+    let script = run_ok(&mut captures.command("it's out", &["--emit-slurm", "2"])).stdout;
+    fs::write(captures.path("job.sh"), script).expect("temporary file");
+    for task in ["2", "1"] {
+        run_ok(
+            Command::new("sh")
+                .arg(captures.path("job.sh"))
+                .env("SLURM_ARRAY_TASK_ID", task),
+        );
+    }
+    assert_eq!(captures.names("it's out").len(), 8);
+}
+
+#[test]
+fn bad_captures_are_refused_before_the_first_and_failures_are_named_after_the_last() {
+    for (line, expected) in [
+        ("hmd = \"rift\"", "rift"),
+        ("shadow = true", "--shadow"),
+        ("size = \"0x4\"", "0x4"),
+        ("threads = 2", "the sweep sets it itself"),
+    ] {
+        let captures = Captures::new(&format!("[[captures]]\nscene = \"teapot\"\n{line}\n"));
+        refuse(
+            &mut captures.command("out", &[]),
+            &["m.toml", "[[captures]] 1", expected],
+        );
+        assert!(!captures.path("out").exists());
+    }
+    let captures = Captures::new(
+        "[base]\nsize = \"16x16\"\ncommand = \"rays\"\n[[captures]]\nscene = [\"none.gltf\", \"teapot\"]\n",
+    );
+    refuse(
+        &mut captures.command("out", &[]),
+        &["none.gltf", "1 of 2 captures failed: none.raytrace"],
+    );
+    assert_eq!(captures.names("out"), ["teapot.raytrace", "teapot.recipe"]);
+    refuse(&mut captures.command("out", &["--json"]), &["--plan"]);
+    refuse(
+        &mut captures.command("out", &["--shard", "3/2"]),
+        &["found `3/2`"],
+    );
+    fs::write(captures.path("file"), "").expect("temporary file");
+    refuse(&mut captures.command("file", &[]), &["file"]);
+}

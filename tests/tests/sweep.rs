@@ -1,0 +1,355 @@
+//! Sweeps over many machines: shards, a merge, and what a killed worker leaves behind.
+
+use parallax_tests::{program, refuse, root, run_ok};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+const EXPERIMENT: &str = "\
+[base]
+mode = \"functional\"
+[axes]
+order = [\"morton\", \"z2-sta\"]
+l1.size_bytes = [\"4KiB\", \"8KiB\"]
+l1.ways = [2, 4]
+[one-at-a-time]
+mode = [\"timed\"]
+l2.replacement = [\"fifo\"]
+layout.block_order = [\"morton\"]
+seed = [1]
+";
+
+/// Distinct points of [`EXPERIMENT`]: a seed of 1 is no change.
+const POINTS: usize = 32;
+
+const RESULTS: [&str; 4] = ["results.json", "results.csv", "report.html", "rows.parquet"];
+
+/// An experiment with its folders.
+struct Sweep {
+    folder: tempfile::TempDir,
+}
+
+impl Sweep {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        fs::write(folder.path().join("a.toml"), EXPERIMENT).expect("temporary file");
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// `replay sweep` of an experiment into a folder.
+    fn command_of(&self, experiment: &str, out: &str, flags: &[&str]) -> Command {
+        let mut command = program("replay");
+        command.arg("sweep").arg(self.path(experiment));
+        command.arg(root().join("traces/atrium-shadows.textrace"));
+        command.arg("--out").arg(self.path(out)).args(flags);
+        for variable in ["ID", "COUNT", "MIN", "MAX", "STEP"] {
+            command.env_remove(format!("SLURM_ARRAY_TASK_{variable}"));
+        }
+        command
+    }
+
+    fn command(&self, out: &str, flags: &[&str]) -> Command {
+        self.command_of("a.toml", out, flags)
+    }
+
+    /// Runs to the end; returns what is printed.
+    fn results(&self, out: &str, flags: &[&str]) -> Vec<u8> {
+        let mut command = self.command(out, flags);
+        let rows = self.path(out).join("rows.parquet");
+        run_ok(command.arg("--parquet").arg(rows)).stdout
+    }
+
+    fn points(&self, out: &str) -> Vec<PathBuf> {
+        let folder = fs::read_dir(self.path(out).join("points"));
+        folder
+            .map(|entries| entries.flatten().map(|e| e.path()).collect())
+            .unwrap_or_default()
+    }
+}
+
+fn assert_same_results(a: &Path, b: &Path) {
+    for name in RESULTS {
+        let [a, b] = [a, b].map(|folder| fs::read(folder.join(name)).expect("a result"));
+        assert!(a == b, "{name} differs");
+    }
+}
+
+#[test]
+fn shards_in_any_order_merge_to_one_machines_bytes() {
+    let sweep = Sweep::new();
+    let printed = sweep.results("whole", &[]);
+    for (out, count, order) in [("two", 2, vec![2, 1]), ("five", 5, vec![3, 5, 1, 2, 4])] {
+        for number in order {
+            let shard = format!("{number}/{count}");
+            let output = run_ok(&mut sweep.command(out, &["--shard", &shard]));
+            assert!(output.stdout.is_empty(), "a shard prints no result");
+            let entries = fs::read_dir(sweep.path(out)).expect("the folder").count();
+            assert_eq!(entries, 1, "a shard writes points alone");
+        }
+        assert_eq!(sweep.points(out).len(), POINTS);
+        assert_eq!(sweep.results(out, &["--merge-only"]), printed);
+        assert_same_results(&sweep.path("whole"), &sweep.path(out));
+    }
+}
+
+#[test]
+fn a_slurm_task_does_its_shard() {
+    let sweep = Sweep::new();
+    for task in ["4", "8"] {
+        let mut command = sweep.command("out", &["--shard"]);
+        command.env("SLURM_ARRAY_TASK_ID", task);
+        command.env("SLURM_ARRAY_TASK_MIN", "4");
+        command.env("SLURM_ARRAY_TASK_MAX", "8");
+        command.env("SLURM_ARRAY_TASK_STEP", "4");
+        run_ok(command.env("SLURM_ARRAY_TASK_COUNT", "2"));
+    }
+    assert_eq!(sweep.points("out").len(), POINTS);
+    for (id, expected) in [
+        ("one", "SLURM_ARRAY_TASK_ID: expected a number, found `one`"),
+        ("3", "K/N"),
+    ] {
+        let mut command = sweep.command("out", &["--shard"]);
+        command.env("SLURM_ARRAY_TASK_COUNT", "2");
+        refuse(command.env("SLURM_ARRAY_TASK_ID", id), &[expected]);
+    }
+    refuse(
+        &mut sweep.command("out", &["--shard"]),
+        &["SLURM_ARRAY_TASK_ID is not set"],
+    );
+}
+
+#[test]
+fn after_a_killed_worker_the_results_are_the_same() {
+    let sweep = Sweep::new();
+    let printed = sweep.results("whole", &[]);
+    // One thread, so that the first points are kept long before the last.
+    let mut worker = sweep.command("out", &["--shard", "1/2", "--threads", "1"]);
+    let mut worker = worker.stderr(Stdio::null()).spawn().expect("replay starts");
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while sweep.points("out").is_empty() && Instant::now() < deadline {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    worker.kill().expect("SIGKILL");
+    worker.wait().expect("an end");
+    let [old, new] = [".old.part", ".new.part"].map(|name| sweep.path("out/points").join(name));
+    for path in [&old, &new] {
+        let file = File::create(path).expect("a stray file");
+        let written = file.metadata().and_then(|m| m.modified()).expect("a time");
+        if path == &old {
+            file.set_modified(written - Duration::from_secs(7200))
+                .expect("a time");
+        }
+    }
+    run_ok(&mut sweep.command("out", &["--shard", "2/2"]));
+    run_ok(&mut sweep.command("out", &["--shard", "1/2"]));
+    assert_eq!(sweep.results("out", &["--merge-only"]), printed);
+    assert_same_results(&sweep.path("whole"), &sweep.path("out"));
+    assert!(
+        !old.exists() && new.exists(),
+        "what may have a writer stays"
+    );
+}
+
+#[test]
+fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
+    let sweep = Sweep::new();
+    refuse(
+        &mut sweep.command("out", &["--merge-only"]),
+        &[
+            &format!("{POINTS} of {POINTS} points are not there"),
+            "order=morton",
+            ": missing",
+        ],
+    );
+    assert!(!sweep.path("out/results.json").exists());
+    sweep.results("out", &[]);
+    let whole = fs::read(sweep.path("out/results.json")).expect("results");
+    let mut points = sweep.points("out");
+    points.sort();
+    let name = |path: &Path| {
+        path.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let text = fs::read_to_string(&points[1]).expect("a point");
+    fs::remove_file(&points[0]).expect("removed");
+    fs::write(&points[1], &text[..text.len() / 2]).expect("cut");
+    fs::write(&points[2], text.replacen("\"replay 0", "\"replay 9", 1)).expect("another version");
+    refuse(
+        &mut sweep.command("out", &["--merge-only"]),
+        &[
+            &format!("3 of {POINTS} points are not there"),
+            &format!("{}: missing", name(&points[0])),
+            &format!("{}: damaged: EOF", name(&points[1])),
+            &format!("{}: expected replay.point/1 of replay 0", name(&points[2])),
+        ],
+    );
+    // The same shards mend it.
+    for shard in ["1/3", "2/3", "3/3"] {
+        run_ok(&mut sweep.command("out", &["--shard", shard]));
+    }
+    sweep.results("out", &["--merge-only"]);
+    assert_eq!(
+        fs::read(sweep.path("out/results.json")).expect("results"),
+        whole
+    );
+}
+
+#[test]
+fn two_experiments_in_one_folder_do_not_mix() {
+    let sweep = Sweep::new();
+    sweep.results("alone", &[]);
+    let other = EXPERIMENT.replace("l1.ways = [2, 4]", "l1.ways = [4, 8]");
+    fs::write(sweep.path("b.toml"), other).expect("temporary file");
+    for (experiment, shard) in [
+        ("b.toml", "1/2"),
+        ("a.toml", "2/2"),
+        ("b.toml", "2/2"),
+        ("a.toml", "1/2"),
+    ] {
+        run_ok(&mut sweep.command_of(experiment, "out", &["--shard", shard]));
+    }
+    sweep.results("out", &["--merge-only"]);
+    assert_same_results(&sweep.path("alone"), &sweep.path("out"));
+}
+
+#[test]
+fn the_plan_tells_keys_costs_and_what_is_done() {
+    let sweep = Sweep::new();
+    run_ok(&mut sweep.command("out", &["--shard", "2/3"]));
+    let plan = |flags: &[&str]| -> Vec<serde_json::Value> {
+        let output = run_ok(&mut sweep.command("out", &[&["--plan", "--json"], flags].concat()));
+        let plan: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(plan["schema"], "replay.plan/1");
+        plan["points"].as_array().expect("points").clone()
+    };
+    let all = plan(&[]);
+    assert_eq!(all.len(), POINTS);
+    let of_shards: Vec<_> = ["1/3", "2/3", "3/3"]
+        .iter()
+        .flat_map(|k| plan(&["--shard", k]))
+        .collect();
+    assert_eq!(of_shards, all);
+    for point in &all {
+        let key = point["key"].as_str().expect("a key");
+        let file = sweep.path("out/points").join(format!("{key}.json"));
+        assert_eq!(point["done"], file.exists(), "{point}");
+        assert!(point["cost"].as_u64() > Some(0), "{point}");
+    }
+    assert!(
+        plan(&["--shard", "2/3"])
+            .iter()
+            .all(|point| point["done"] == true)
+    );
+}
+
+#[test]
+fn contradicting_flags_and_impossible_shards_are_refused() {
+    let sweep = Sweep::new();
+    for (flags, expected) in [
+        (&["--shard", "0/4"][..], "found `0/4`"),
+        (&["--shard", "5/4"], "found `5/4`"),
+        (&["--shard", "1/0"], "found `1/0`"),
+        (&["--shard", "a.textrace"], "expected K/N"),
+        (&["--emit-slurm", "0"], "0 is not in"),
+        (&["--shard", "1/2", "--merge-only"], "cannot be used with"),
+        (
+            &["--shard", "1/2", "--emit-slurm", "2"],
+            "cannot be used with",
+        ),
+        (
+            &["--merge-only", "--emit-slurm", "2"],
+            "cannot be used with",
+        ),
+        (&["--merge-only", "--plan"], "cannot be used with"),
+        (&["--emit-slurm", "2", "--json"], "cannot be used with"),
+        (
+            &["--shard", "1/2", "--json"],
+            "--merge-only prints the results",
+        ),
+        (&["--shard", "1/2", "--parquet", "a"], "writes points alone"),
+        (&["--plan"], "--plan --out"),
+    ] {
+        refuse(&mut sweep.command("out", flags), &[expected]);
+    }
+    assert!(
+        !sweep.path("out").exists(),
+        "refused before anything is written"
+    );
+}
+
+#[test]
+fn bad_plans_and_outputs_are_refused_before_the_work() {
+    let sweep = Sweep::new();
+    fs::write(
+        sweep.path("bad.toml"),
+        "[axes]\nl1.size_bytes = [\"6KiB\"]\n",
+    )
+    .expect("temporary file");
+    for flags in [
+        &["--shard", "1/2"][..],
+        &["--merge-only"],
+        &["--emit-slurm", "2"],
+        &["--plan"],
+    ] {
+        refuse(
+            &mut sweep.command_of("bad.toml", "out", flags),
+            &["bad.toml", "L1 cache of 6 KiB"],
+        );
+    }
+    // A folder that cannot be made.
+    fs::write(sweep.path("file"), "").expect("temporary file");
+    for flags in [
+        &["--shard", "1/2"][..],
+        &["--merge-only"],
+        &["--emit-slurm", "2"],
+        &[],
+    ] {
+        refuse(
+            &mut sweep.command("file", flags),
+            &["file/", "cannot write"],
+        );
+    }
+    let experiment = sweep.path("a.toml").display().to_string();
+    for (path, expected) in [
+        ("/dev/null", "found a device"),
+        (experiment.as_str(), "would replace the input"),
+        (
+            &sweep.path("out/results.csv").display().to_string(),
+            "the same output twice",
+        ),
+    ] {
+        refuse(
+            &mut sweep.command("out", &["--parquet", path]),
+            &["--parquet", expected][1..],
+        );
+    }
+    assert!(sweep.points("out").is_empty());
+}
+
+#[test]
+fn a_slurm_script_does_the_work_whatever_its_paths_hold() {
+    let sweep = Sweep::new();
+    let out = "it's a \"folder\" $(true) `x`\\";
+    let rows = sweep.path(out).join("rows.parquet");
+    let mut command = sweep.command(out, &["--emit-slurm", "3", "--threads", "1", "--parquet"]);
+    let script = run_ok(command.arg(&rows)).stdout;
+    let path = sweep.path("sweep.sh");
+    fs::write(&path, script).expect("temporary file");
+    // Slurm's part, played by hand: the tasks in any order, then task 0.
+    for task in ["2", "3", "1", "0"] {
+        run_ok(
+            Command::new("sh")
+                .arg(&path)
+                .env("SLURM_ARRAY_TASK_ID", task),
+        );
+    }
+    sweep.results("whole", &[]);
+    assert_same_results(&sweep.path("whole"), &sweep.path(out));
+}

@@ -1,0 +1,282 @@
+//! A manifest of captures: scenes, cameras and displays, crossed.
+//!
+//! ```toml
+//! [base]                          # options of every capture, by their long names
+//! size = "1024x1024"
+//! [[captures]]                    # lists are crossed
+//! scene = ["atrium", "sponza.gltf"]
+//! hmd = ["vive", "quest2"]
+//! [[captures]]
+//! command = "rays"                # `raster` where it is left out
+//! scene = "chess"
+//! ```
+
+use anyhow::{Context, bail, ensure};
+use std::path::Path;
+use toml::{Table, Value};
+
+/// More captures than this are taken for a mistake.
+const MOST_CAPTURES: usize = 10_000;
+
+/// Options that a manifest does not set: the sweep does.
+const OWN_OPTIONS: [&str; 5] = ["output", "image", "threads", "quiet", "help"];
+
+/// A capture to make.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Capture {
+    /// Name of the trace's file.
+    pub file: String,
+    /// Arguments of `tracegen` but for the output.
+    pub arguments: Vec<String>,
+    /// Which `[[captures]]` it is of, from 1.
+    pub table: usize,
+}
+
+impl Capture {
+    /// The arguments in a line, as golden traces have them.
+    #[must_use]
+    pub fn recipe(&self) -> String {
+        let words: Vec<_> = self.arguments.iter().map(|a| shell::quoted(a)).collect();
+        words.join(" ")
+    }
+
+    /// Name of the recipe's file.
+    #[must_use]
+    pub fn recipe_file(&self) -> String {
+        let file = Path::new(&self.file).with_extension("recipe");
+        file.to_string_lossy().into_owned()
+    }
+}
+
+/// Reads a manifest.
+///
+/// # Errors
+/// Syntax, an unknown table, a value that is no option's, two captures of one name.
+pub fn parse(text: &str) -> anyhow::Result<Vec<Capture>> {
+    let manifest: Table =
+        toml::from_str(text).map_err(|e| anyhow::anyhow!("{}", e.to_string().trim()))?;
+    let mut base = Table::new();
+    let mut tables = Vec::new();
+    for (key, value) in manifest {
+        match (key.as_str(), value) {
+            ("base", Value::Table(table)) => base = table,
+            ("captures", Value::Array(list)) => tables = list,
+            (key, value) => bail!(
+                "`{key}`: expected [base] or [[captures]], found {}",
+                value.type_str()
+            ),
+        }
+    }
+    ensure!(!tables.is_empty(), "expected [[captures]], found none");
+    let mut captures: Vec<Capture> = Vec::new();
+    for (index, own) in tables.into_iter().enumerate() {
+        let place = || format!("[[captures]] {}", index + 1);
+        let Value::Table(own) = own else {
+            bail!("{}: expected a table", place());
+        };
+        let mut options = base.clone();
+        options.extend(own);
+        for capture in crossed(options, index + 1).with_context(place)? {
+            if let Some(other) = captures.iter().find(|c| c.file == capture.file) {
+                bail!(
+                    "{}: `{}` and `{}` would both be {}; give one table a `name`",
+                    place(),
+                    other.recipe(),
+                    capture.recipe(),
+                    capture.file
+                );
+            }
+            captures.push(capture);
+            ensure!(
+                captures.len() <= MOST_CAPTURES,
+                "expected at most {MOST_CAPTURES} captures, found more"
+            );
+        }
+    }
+    Ok(captures)
+}
+
+/// The captures of a table: every combination of its lists' values.
+fn crossed(mut options: Table, table: usize) -> anyhow::Result<Vec<Capture>> {
+    let mut word = |key: &str| match options.remove(key) {
+        None => Ok(None),
+        Some(Value::String(text)) => Ok(Some(text)),
+        Some(other) => bail!("`{key}`: expected text, found {other}"),
+    };
+    let command = word("command")?.unwrap_or_else(|| "raster".to_owned());
+    let name = word("name")?;
+    let extension = match command.as_str() {
+        "raster" => "textrace",
+        "rays" => "raytrace",
+        other => bail!("`command`: expected raster or rays, found `{other}`"),
+    };
+    let scenes = options
+        .remove("scene")
+        .context("`scene`: expected one or a list, found none")?;
+    let mut axes = vec![("scene".to_owned(), values("scene", scenes)?)];
+    for (key, value) in options {
+        ensure!(
+            !OWN_OPTIONS.contains(&key.as_str()),
+            "`{key}`: the sweep sets it itself"
+        );
+        let values = values(&key, value)?;
+        axes.push((key, values));
+    }
+    let product = axes.iter().map(|(_, values)| values.len());
+    let count = product.fold(1usize, usize::saturating_mul);
+    ensure!(
+        count <= MOST_CAPTURES,
+        "expected at most {MOST_CAPTURES} captures, found {count}"
+    );
+    let capture = |mut number: usize| {
+        let mut arguments = vec![command.clone()];
+        let mut parts: Vec<String> = name.iter().cloned().collect();
+        let mut chosen = Vec::new();
+        // The last axis runs fastest.
+        for (key, values) in axes.iter().rev() {
+            chosen.push((key, &values[number % values.len()], values.len() > 1));
+            number /= values.len();
+        }
+        for (key, value, varies) in chosen.into_iter().rev() {
+            let is_scene = key == "scene";
+            if varies || is_scene && name.is_none() {
+                parts.push(short(value.as_deref().unwrap_or(key), is_scene));
+            }
+            match value {
+                Some(value) if is_scene => arguments.push(value.clone()),
+                Some(value) if value.is_empty() => arguments.push(format!("--{key}")),
+                Some(value) if value.starts_with('-') => arguments.push(format!("--{key}={value}")),
+                Some(value) => arguments.extend([format!("--{key}"), value.clone()]),
+                None => {}
+            }
+        }
+        Capture {
+            file: format!("{}.{extension}", parts.join("-")),
+            arguments,
+            table,
+        }
+    };
+    Ok((0..count).map(capture).collect())
+}
+
+/// The values of an option: text, empty for a switch that is set, none for one that is not.
+fn values(key: &str, value: Value) -> anyhow::Result<Vec<Option<String>>> {
+    let values = match value {
+        Value::Array(values) if values.is_empty() => bail!("`{key}`: expected values, found none"),
+        Value::Array(values) => values,
+        value => vec![value],
+    };
+    let text = |value: Value| match value {
+        Value::String(text) if text.is_empty() => bail!("`{key}`: expected text, found none"),
+        Value::String(text) => Ok(Some(text)),
+        Value::Integer(_) | Value::Float(_) => Ok(Some(value.to_string())),
+        Value::Boolean(set) if key != "scene" => Ok(set.then(String::new)),
+        other => bail!("`{key}`: expected text, a number or true, found {other}"),
+    };
+    values.into_iter().map(text).collect()
+}
+
+/// A value as part of a file's name; a scene goes by its file's without extension.
+fn short(value: &str, is_scene: bool) -> String {
+    let stem = Path::new(value).file_stem().filter(|_| is_scene);
+    let text = stem.map_or(value.into(), |stem| stem.to_string_lossy());
+    let kept = |c: char| {
+        if c.is_alphanumeric() || "._+".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    };
+    text.chars().map(kept).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recipes(text: &str) -> Vec<(String, String)> {
+        let captures = parse(text).unwrap();
+        captures
+            .into_iter()
+            .map(|c| (c.file.clone(), c.recipe()))
+            .collect()
+    }
+
+    #[test]
+    fn lists_are_crossed_and_name_the_files() {
+        let text = "[base]\nsize = \"64x48\"\nno-plain = true\n[[captures]]\nscene = [\"atrium\", \"models/my scene.gltf\"]\nhmd = [\"vive\", \"quest2\"]\n\
+                    [[captures]]\ncommand = \"rays\"\nscene = \"chess\"\nno-plain = false\nspp = 2\ncant = -5\n[[captures]]\nname = \"dark\"\nscene = \"atrium\"\nshadows = true\n";
+        let expected = [
+            (
+                "atrium-vive.textrace",
+                "raster atrium --hmd vive --no-plain --size 64x48",
+            ),
+            (
+                "atrium-quest2.textrace",
+                "raster atrium --hmd quest2 --no-plain --size 64x48",
+            ),
+            (
+                "my_scene-vive.textrace",
+                "raster 'models/my scene.gltf' --hmd vive --no-plain --size 64x48",
+            ),
+            (
+                "my_scene-quest2.textrace",
+                "raster 'models/my scene.gltf' --hmd quest2 --no-plain --size 64x48",
+            ),
+            (
+                "chess.raytrace",
+                "rays chess --cant=-5 --size 64x48 --spp 2",
+            ),
+            (
+                "dark.textrace",
+                "raster atrium --no-plain --shadows --size 64x48",
+            ),
+        ];
+        let expected: Vec<_> = expected.map(|(a, b)| (a.to_owned(), b.to_owned())).into();
+        assert_eq!(recipes(text), expected);
+    }
+
+    #[test]
+    fn what_is_no_manifest_is_refused() {
+        let many = |n: usize| (0..n).map(|i| i.to_string()).collect::<Vec<_>>().join(",");
+        let crossed = format!(
+            "[[captures]]\nscene = \"a\"\na = [{0}]\nb = [{0}]\n",
+            many(101)
+        );
+        for (text, expected) in [
+            ("", "expected [[captures]], found none"),
+            ("[capture]\n", "`capture`: expected [base] or [[captures]]"),
+            ("captures = [1]\n", "[[captures]] 1: expected a table"),
+            (
+                "[[captures]]\n",
+                "`scene`: expected one or a list, found none",
+            ),
+            (
+                "[[captures]]\nscene = []\n",
+                "`scene`: expected values, found none",
+            ),
+            ("[[captures]]\nscene = true\n", "`scene`: expected text"),
+            (
+                "[[captures]]\nscene = \"a\"\ncommand = \"rm\"\n",
+                "raster or rays, found `rm`",
+            ),
+            (
+                "[[captures]]\nscene = \"a\"\noutput = \"b\"\n",
+                "`output`: the sweep sets it itself",
+            ),
+            (
+                "[[captures]]\nscene = \"a\"\nx = { y = 1 }\n",
+                "`x`: expected text, a number or true",
+            ),
+            (
+                "[[captures]]\nscene = [\"a/s.obj\", \"b/s.obj\"]\n",
+                "would both be s.textrace",
+            ),
+            ("[[captures]]\nscene = \n", "line 2"),
+            (&crossed, "at most 10000 captures, found 10201"),
+        ] {
+            let error = format!("{:#}", parse(text).unwrap_err());
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
+}

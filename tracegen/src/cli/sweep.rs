@@ -1,0 +1,242 @@
+//! `tracegen sweep`: the captures of a manifest, here or on many machines.
+
+use super::{Cli, Command};
+use crate::captures::{self, Capture};
+use anyhow::{Context, bail, ensure};
+use clap::{Args, Parser};
+use formats::container::{AtomicFile, remove_abandoned};
+use serde::Serialize;
+use shell::{Output, Piece, Progress, Shard, ShardArgs, SlurmArray, Threads, balanced};
+use std::path::{Path, PathBuf};
+use std::process::{Command as Process, Stdio};
+use std::time::Duration;
+
+/// Schema of `--plan --json`.
+const PLAN_SCHEMA: &str = "tracegen.plan/1";
+
+/// An unfinished trace that nobody has written to for so long has no writer.
+const ABANDONED_AFTER: Duration = Duration::from_secs(24 * 3600);
+
+/// A manifest is a page of settings.
+const LONGEST_MANIFEST_BYTES: u64 = 4 << 20;
+
+/// Arguments of `tracegen sweep`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  tracegen sweep captures.toml -o traces
+  tracegen sweep captures.toml -o traces --shard 3/8
+  tracegen sweep captures.toml -o traces --emit-slurm 8 > captures.sh && sh captures.sh
+  replay sweep caches.toml traces/*.textrace
+
+Each capture is a trace and its recipe, a line of arguments. What stands there with the same recipe is
+not captured again. Paths in the manifest are relative to it.")]
+pub struct SweepArgs {
+    /// Manifest: [base] and [[captures]] with options of `raster` and `rays`
+    manifest: PathBuf,
+    /// Folder for the traces and their recipes
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Print the captures and stop
+    #[arg(long, conflicts_with = "emit_slurm")]
+    plan: bool,
+    /// Print the plan as one JSON object (schema tracegen.plan/1)
+    #[arg(long, requires = "plan")]
+    json: bool,
+    #[command(flatten)]
+    shards: ShardArgs,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// A capture, and whether it is there.
+struct Planned {
+    capture: Capture,
+    trace: PathBuf,
+    /// Estimated, in pixels.
+    cost: u64,
+    done: bool,
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'a str,
+    tool: String,
+    captures: Vec<PlannedCapture<'a>>,
+}
+
+#[derive(Serialize)]
+struct PlannedCapture<'a> {
+    file: &'a str,
+    recipe: String,
+    cost: u64,
+    done: bool,
+}
+
+/// Runs `tracegen sweep`.
+///
+/// # Errors
+/// A bad manifest, a folder that cannot be written, captures that failed.
+pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
+    let name = || args.manifest.display().to_string();
+    let captures = captures::parse(&read(&args.manifest)?).with_context(name)?;
+    let planned = captures
+        .into_iter()
+        .map(|capture| plan(capture, &args.output));
+    let planned: Vec<Planned> = planned.collect::<Result<_, _>>().with_context(name)?;
+    if let Some(shards) = args.shards.emit_slurm {
+        return shell::print(&slurm_script(args, shards)?);
+    }
+    let mine = match args.shards.shard {
+        None => &planned[..],
+        Some(shard) => &planned[of_shard(&planned, shard)],
+    };
+    if args.plan {
+        return shell::print(&plan_text(mine, args.json)?);
+    }
+    capture_all(args, mine)
+}
+
+fn read(path: &Path) -> anyhow::Result<String> {
+    let place = || path.display().to_string();
+    let length = std::fs::metadata(path).with_context(place)?.len();
+    ensure!(
+        length <= LONGEST_MANIFEST_BYTES,
+        "{}: expected at most {LONGEST_MANIFEST_BYTES} bytes, found {length}",
+        path.display()
+    );
+    std::fs::read_to_string(path).with_context(place)
+}
+
+/// Checks a capture's arguments, and looks whether it is there.
+fn plan(capture: Capture, folder: &Path) -> anyhow::Result<Planned> {
+    let trace = folder.join(&capture.file);
+    let place = || format!("[[captures]] {}: {}", capture.table, capture.recipe());
+    let words = ["tracegen"]
+        .into_iter()
+        .chain(capture.arguments.iter().map(String::as_str));
+    let parsed = Cli::try_parse_from(words.chain(["-o", "trace"])).map_err(|error| {
+        let text = error.to_string();
+        let first = text.lines().next().unwrap_or_default();
+        anyhow::anyhow!("{}", first.trim_start_matches("error: "))
+    });
+    let cost = match parsed.with_context(place)?.command {
+        Command::Raster(args) => args.pixels(),
+        Command::Rays(args) => args.samples(),
+        _ => bail!("{}: expected a capture", place()),
+    };
+    let recipe = std::fs::read_to_string(folder.join(capture.recipe_file()));
+    Ok(Planned {
+        done: trace.is_file() && recipe.is_ok_and(|found| found.trim_end() == capture.recipe()),
+        cost: cost.with_context(place)?,
+        trace,
+        capture,
+    })
+}
+
+fn of_shard(planned: &[Planned], shard: Shard) -> std::ops::Range<usize> {
+    let pieces: Vec<Piece> = planned
+        .iter()
+        .map(|p| Piece {
+            cost: p.cost,
+            set: 0,
+        })
+        .collect();
+    balanced(&pieces, &[0], shard.count)[shard.number as usize - 1].clone()
+}
+
+fn plan_text(planned: &[Planned], json: bool) -> anyhow::Result<String> {
+    if !json {
+        let line = |p: &Planned| format!("{}: {}", p.capture.file, p.capture.recipe());
+        return Ok(planned.iter().map(line).collect::<Vec<_>>().join("\n"));
+    }
+    let captures = planned.iter().map(|p| PlannedCapture {
+        file: &p.capture.file,
+        recipe: p.capture.recipe(),
+        cost: p.cost,
+        done: p.done,
+    });
+    Ok(serde_json::to_string(&Document {
+        schema: PLAN_SCHEMA,
+        tool: super::tool(),
+        captures: captures.collect(),
+    })?)
+}
+
+/// Makes what is not there, each capture in a process of its own: it has the driver to itself, and
+/// its trace is that of the same command line by hand.
+fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
+    let place = || args.output.display().to_string();
+    std::fs::create_dir_all(&args.output).with_context(place)?;
+    let outputs: Vec<Output> = planned
+        .iter()
+        .flat_map(|p| [p.trace.clone(), args.output.join(p.capture.recipe_file())])
+        .map(|path| Output::binary("--output", &path))
+        .collect();
+    shell::check_outputs(&outputs, [args.manifest.as_path()])?;
+    let program = std::env::current_exe().context("the program's own path")?;
+    let folder = match args.manifest.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let open: Vec<&Planned> = planned.iter().filter(|p| !p.done).collect();
+    let progress = Progress::new("capturing", open.len() as u64, "traces");
+    let mut failed = Vec::new();
+    for p in &open {
+        let recipe = args.output.join(p.capture.recipe_file());
+        // A recipe stands only beside the trace that it made.
+        if recipe.exists() {
+            std::fs::remove_file(&recipe).with_context(|| recipe.display().to_string())?;
+        }
+        let mut process = Process::new(&program);
+        process.args(&p.capture.arguments).arg("--quiet");
+        process.arg("-o").arg(std::path::absolute(&p.trace)?);
+        if let Some(threads) = args.threads.count {
+            process.args(["--threads", &threads.to_string()]);
+        }
+        let status = process.current_dir(folder).stdin(Stdio::null()).status();
+        if status.context("the program itself")?.success() {
+            let line = p.capture.recipe() + "\n";
+            AtomicFile::write_whole(&recipe, line.as_bytes())
+                .with_context(|| format!("cannot write {}", recipe.display()))?;
+        } else {
+            failed.push(p.capture.file.as_str());
+        }
+        progress.advance(1);
+    }
+    drop(progress);
+    // What cannot be removed does no harm: nobody reads unfinished files.
+    let _left = remove_abandoned(&args.output, ABANDONED_AFTER);
+    ensure!(
+        failed.is_empty(),
+        "{} of {} captures failed: {}",
+        failed.len(),
+        planned.len(),
+        failed.join(", ")
+    );
+    shell::note(&format!(
+        "{} captures: {} made, {} there with the same recipe",
+        planned.len(),
+        open.len(),
+        planned.len() - open.len()
+    ));
+    Ok(())
+}
+
+fn slurm_script(args: &SweepArgs, shards: u32) -> anyhow::Result<String> {
+    let program = std::env::current_exe().context("the program's own path")?;
+    let name = args.manifest.file_stem().unwrap_or_default();
+    let array = SlurmArray {
+        name: &name.to_string_lossy(),
+        shards,
+        cpus: args.threads.count,
+        command: vec![
+            shell::absolute(&program)?,
+            "sweep".to_owned(),
+            shell::absolute(&args.manifest)?,
+            "--output".to_owned(),
+            shell::absolute(&args.output)?,
+        ],
+        then: Vec::new(),
+    };
+    Ok(array.script())
+}
