@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques test lint build deps golden clean
+.PHONY: demo techniques test bench lint build deps golden clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -18,6 +18,10 @@ techniques: deps build
 test:
 	@scripts/install-deps.sh test
 	@CARGO="$(CARGO)" scripts/test.sh
+
+# What each stage of a replay costs, beside this machine's bandwidth (TEXTRACE=file for another trace).
+bench:
+	@$(CARGO) bench --locked -p replay --bench engine
 
 lint:
 	$(CARGO) fmt --all --check

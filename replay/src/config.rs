@@ -60,6 +60,25 @@ impl Hsr {
     }
 }
 
+/// What becomes of the caches between the frames of a trace.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum BetweenFrames {
+    /// They keep their lines, so that a frame finds what the one before has left.
+    #[default]
+    Keep,
+    /// They are emptied, as where other work runs between two frames.
+    Flush,
+}
+
+impl BetweenFrames {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// Geometry of one cache level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -185,6 +204,9 @@ pub struct RunConfig {
     /// Hidden-surface removal; results name it where it is not the default.
     #[serde(skip_serializing_if = "Hsr::is_default")]
     pub hsr: Hsr,
+    /// The caches between frames; results name it where it is not the default.
+    #[serde(skip_serializing_if = "BetweenFrames::is_default")]
+    pub between_frames: BetweenFrames,
 }
 
 impl Default for RunConfig {
@@ -203,6 +225,7 @@ impl Default for RunConfig {
             tmu: TmuConfig::default(),
             tile_maps: false,
             hsr: Hsr::EarlyZ,
+            between_frames: BetweenFrames::Keep,
         }
     }
 }

@@ -2,7 +2,7 @@
 //! and ray traces through a model of a mobile ray-tracing GPU.
 
 pub mod addresses;
-mod cache;
+pub mod cache;
 pub mod cli;
 pub mod config;
 pub mod engine;

@@ -2,7 +2,7 @@
 //! from the types themselves. `UPDATE_DOCS=1` rewrites the page; review the diff.
 
 use clap::ValueEnum;
-use replay::config::{Assign, Hsr, Mode, Order, Replacement, RunConfig};
+use replay::config::{Assign, BetweenFrames, Hsr, Mode, Order, Replacement, RunConfig};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -104,6 +104,7 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
         "Mode" => of::<Mode>(),
         "Assign" => of::<Assign>(),
         "Hsr" => of::<Hsr>(),
+        "BetweenFrames" => of::<BetweenFrames>(),
         "FilterOverride" | "LodFormula" | "BlockOrder" | "TextureOrder" | "TexelFormat" => {
             let name = |item: &Item| {
                 let variant = item.line.split([' ', ',']).next().unwrap();
@@ -165,9 +166,13 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             describe(sources, kind, &format!("{key}."), inner, page);
             continue;
         }
-        // The one key that the written default leaves out.
-        let hsr = (key == "hsr").then(|| Value::try_from(Hsr::default()).unwrap());
-        let default = default.or(hsr.as_ref());
+        // Keys that the written default leaves out.
+        let left_out = match &*key {
+            "hsr" => Value::try_from(Hsr::default()).ok(),
+            "between_frames" => Value::try_from(BetweenFrames::default()).ok(),
+            _ => None,
+        };
+        let default = default.or(left_out.as_ref());
         let default = default.map_or_else(|| "none".to_owned(), |v| format!("`{v}`"));
         let values = values(sources, kind);
         for (value, _) in &values {

@@ -40,4 +40,9 @@ impl Cache for Fifo {
             *oldest + 1
         };
     }
+
+    fn clear(&mut self) {
+        self.tags.fill(EMPTY);
+        self.oldest.fill(0);
+    }
 }

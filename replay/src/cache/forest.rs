@@ -51,6 +51,13 @@ impl Forest {
         }
     }
 
+    /// Empties all caches.
+    pub fn clear(&mut self) {
+        self.trees
+            .iter_mut()
+            .for_each(|tree| tree.lines.fill(EMPTY));
+    }
+
     /// Accesses lines from the first on until one lies `ways` deep or deeper for any number of sets:
     /// its index and, in `depths`, what [`Self::access`] says of it; their number if there is none.
     #[inline(always)]

@@ -73,6 +73,11 @@ impl InFlight {
         }
     }
 
+    /// Forgets all that is on its way.
+    pub fn clear(&mut self) {
+        *self = Self::new(self.days.len() as u64 - 1);
+    }
+
     /// When the line arrives, if it is on its way.
     #[inline(always)]
     #[must_use]
@@ -269,6 +274,10 @@ mod tests {
 
         fn fill(&mut self, line: u32) {
             self.0.push(line);
+        }
+
+        fn clear(&mut self) {
+            self.0.clear();
         }
     }
 

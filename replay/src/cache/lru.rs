@@ -3,7 +3,7 @@
 //! Moving a hit to the front of four packed tags beat time stamps by four times and SIMD compares
 //! by two; the repeats that dominate texture traffic end at the first compare.
 
-use super::{AnyCache, Cache, boxed};
+use super::{AnyCache, Cache, EMPTY, boxed};
 
 /// Associativity, fixed at compile time where speed matters.
 pub trait Ways: Copy + Send {
@@ -170,17 +170,14 @@ impl<W: Ways> Cache for Lru<W> {
     }
 
     #[inline(always)]
-    fn lookup_all(&mut self, lines: &[u32]) -> usize {
+    fn lookup_all(&mut self, lines: &[u32]) -> Option<usize> {
         // Nothing of the loop's own but the tags is in memory.
         let (ways, mask) = (self.ways.ways(), self.set_mask);
         let tags = self.tags.as_mut_slice();
-        for (index, &line) in lines.iter().enumerate() {
+        lines.iter().position(|&line| {
             let first = line.set(mask) * ways;
-            if !look_up(&mut tags[first..first + ways], line) {
-                return index;
-            }
-        }
-        lines.len()
+            !look_up(&mut tags[first..first + ways], line)
+        })
     }
 
     #[inline(always)]
@@ -190,6 +187,10 @@ impl<W: Ways> Cache for Lru<W> {
             set[way] = set[way - 1];
         }
         set[0] = line;
+    }
+
+    fn clear(&mut self) {
+        self.tags.fill(EMPTY);
     }
 
     #[inline(always)]

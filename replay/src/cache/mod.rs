@@ -90,20 +90,22 @@ struct Geometry {
 /// Tag of a way that holds nothing; no line has this number.
 const EMPTY: u32 = u32::MAX;
 
-/// A cache that holds whole lines. Looking up once more, in the same order, lines that have just all
-/// been found changes nothing: such repeats need no simulation.
+/// A cache that holds whole lines. What look-ups leave behind depends only on the order of the last
+/// one of each line that is there: earlier ones need no simulation.
 pub trait Cache: Send {
     /// True if the line is there; marks it used.
     fn lookup(&mut self, line: u32) -> bool;
 
-    /// Looks up lines from the first on until one is not there: its index, or their number.
-    fn lookup_all(&mut self, lines: &[u32]) -> usize {
-        let missing = lines.iter().position(|&line| !self.lookup(line));
-        missing.unwrap_or(lines.len())
+    /// Looks up lines one after another until one is not there: its index.
+    fn lookup_all(&mut self, lines: &[u32]) -> Option<usize> {
+        lines.iter().position(|&line| !self.lookup(line))
     }
 
     /// Puts in a line that is not there, in place of the set's victim.
     fn fill(&mut self, line: u32);
+
+    /// Takes all lines out.
+    fn clear(&mut self);
 
     /// Looks up, and on a miss fills at once. True for a hit.
     fn access(&mut self, line: u32) -> bool {
@@ -126,12 +128,16 @@ impl Cache for Box<dyn Cache> {
         (**self).lookup(line)
     }
 
-    fn lookup_all(&mut self, lines: &[u32]) -> usize {
+    fn lookup_all(&mut self, lines: &[u32]) -> Option<usize> {
         (**self).lookup_all(lines)
     }
 
     fn fill(&mut self, line: u32) {
         (**self).fill(line);
+    }
+
+    fn clear(&mut self) {
+        (**self).clear();
     }
 
     fn access(&mut self, line: u32) -> bool {

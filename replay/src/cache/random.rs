@@ -42,4 +42,8 @@ impl Cache for RandomReplacement {
         });
         set[way] = line;
     }
+
+    fn clear(&mut self) {
+        self.tags.fill(EMPTY);
+    }
 }

@@ -74,4 +74,9 @@ impl Cache for TreePlru {
         self.tags[first + way] = line;
         self.touch(set, way);
     }
+
+    fn clear(&mut self) {
+        self.tags.fill(EMPTY);
+        self.trees.fill(0);
+    }
 }

@@ -1,8 +1,8 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
 use crate::config::{
-    AnisotropyModel, Assign, BlockOrder, FilterOverride, Hsr, LodFormula, Mode, Order, Replacement,
-    RunConfig, TextureOrder,
+    AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr, LodFormula, Mode, Order,
+    Replacement, RunConfig, TextureOrder,
 };
 use crate::size::{format_bytes, parse_bytes};
 use anyhow::{Context, Result, anyhow, ensure};
@@ -88,6 +88,9 @@ pub struct ConfigArgs {
     /// Hidden-surface removal
     #[arg(long)]
     hsr: Option<Hsr>,
+    /// The caches between the frames of a trace
+    #[arg(long)]
+    between_frames: Option<BetweenFrames>,
 
     /// Filter in place of the recorded one: trilinear, bilinear, nearest
     #[arg(long, value_parser = named::<FilterOverride>, help_heading = "Sampling")]
@@ -207,6 +210,7 @@ impl ConfigArgs {
         set(&mut config.assign, self.assign);
         set(&mut config.seed, self.seed);
         set(&mut config.hsr, self.hsr);
+        set(&mut config.between_frames, self.between_frames);
         set(&mut config.sampling.filter, self.filter);
         set(&mut config.sampling.lod, self.lod);
         set(&mut config.sampling.lod_bias, self.lod_bias);

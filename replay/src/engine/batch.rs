@@ -11,7 +11,7 @@ use super::summary::summary;
 use super::timed::Timed;
 use super::{Machine, ReplayError};
 use crate::cache::Levels;
-use crate::config::{CacheConfig, Mode, Order, RunConfig, TmuConfig};
+use crate::config::{BetweenFrames, CacheConfig, Mode, Order, RunConfig, TmuConfig};
 use crate::order::{self, Phase};
 use crate::result::{RunResult, TmuResult};
 use crate::stream::{Cores, Expander, LineMemory, TileSource, TraceCounts, shaded};
@@ -167,6 +167,7 @@ fn stream_key(config: &RunConfig) -> RunConfig {
         cores: usual.cores,
         assign: usual.assign,
         mode: usual.mode,
+        between_frames: usual.between_frames,
         ..pass_key(config)
     }
 }
@@ -263,7 +264,9 @@ impl Wave<'_> {
     fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
         let trace_passes = &self.trace.tables().passes;
         let shaded = shaded(self.trace, passes[0].config().hsr)?;
-        let expander = Expander::new(&shaded, passes[0].config())?;
+        // Only the timed machine asks for them.
+        let distinct = passes.iter().any(|pass| pass.config().mode == Mode::Timed);
+        let expander = Expander::new(&shaded, passes[0].config())?.with_distinct_lines(distinct);
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
         frames.sort_unstable();
@@ -287,7 +290,12 @@ impl Wave<'_> {
                 let order = (config.order, config.seed);
                 let phases = orders.iter().position(|o| *o == order).map(|i| &plans[i]);
                 let mut machine = match pass.machine.take() {
-                    Some(machine) => machine,
+                    Some(mut machine) => {
+                        if config.between_frames == BetweenFrames::Flush {
+                            machine.flush();
+                        }
+                        machine
+                    }
                     None => pass.build(&expander)?,
                 };
                 let mut cores = Cores::new(&frame, config.cores as usize);

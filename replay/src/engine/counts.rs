@@ -64,6 +64,12 @@ impl CacheCounts {
         }
     }
 
+    /// Counts lines of footprints that were on their way into the L1.
+    #[inline]
+    pub fn secondary(&mut self, cell: usize, lines: u32) {
+        self.cells[cell].l1.secondary += u64::from(lines);
+    }
+
     /// Counts a footprint that did not find all its lines.
     #[inline]
     pub fn footprint(&mut self, cell: usize, tile: usize, misses: &FootprintMisses) {

@@ -73,6 +73,11 @@ impl<C: Cache> Machine for Functional<C> {
         interleave(cores, phases, assign, self)
     }
 
+    fn flush(&mut self) {
+        self.levels.l1.iter_mut().for_each(Cache::clear);
+        self.levels.l2.clear();
+    }
+
     fn outcome(&self, _config: &RunConfig) -> Outcome {
         self.counts.clone().into()
     }

@@ -56,6 +56,9 @@ trait Machine: Send {
         assign: Assign,
     ) -> Result<(), StreamError>;
 
+    /// Empties the caches, between frames.
+    fn flush(&mut self);
+
     /// What was counted for one of its configurations.
     fn outcome(&self, config: &RunConfig) -> batch::Outcome;
 }

@@ -316,6 +316,11 @@ impl Machine for OnePass {
         interleave(cores, phases, assign, self)
     }
 
+    fn flush(&mut self) {
+        self.forests.iter_mut().for_each(Forest::clear);
+        self.under.iter_mut().for_each(|under| under.forest.clear());
+    }
+
     fn outcome(&self, config: &RunConfig) -> Outcome {
         // Only configurations with a geometry are put into a pass.
         let counts = geometry(config).map(|geometry| self.counts(geometry));

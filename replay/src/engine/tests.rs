@@ -3,7 +3,7 @@ use super::functional::Functional;
 use super::summary::summary;
 use super::*;
 use crate::cache::{AnyCache, Levels};
-use crate::config::{CacheConfig, Mode, Order};
+use crate::config::{BetweenFrames, CacheConfig, Mode, Order};
 use crate::order::{self, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
@@ -360,10 +360,9 @@ fn all(trace: &MemoryTrace, configs: &[RunConfig], bytes: u64) -> Vec<RunResult>
 
 /// One configuration on a machine of its own.
 fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> RunResult {
-    let (expander, memory) = (
-        Expander::new(trace, config).unwrap(),
-        LineMemory::new(1 << 30),
-    );
+    let expander = Expander::new(trace, config).unwrap();
+    let expander = expander.with_distinct_lines(config.mode == Mode::Timed);
+    let memory = LineMemory::new(1 << 30);
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
     let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
@@ -533,3 +532,52 @@ fn caches_take_lines_that_no_trace_sent() {
 
 mod one_pass;
 mod plain_timed;
+
+/// The same frame several times over.
+fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
+    let mut long = trace.clone();
+    for frame in 1..frames {
+        long.tiles.extend_from_slice(&trace.tiles);
+        let passes = trace.tables.passes.iter().cloned();
+        let passes = passes.map(|pass| formats::textrace::Pass { frame, ..pass });
+        long.tables.passes.extend(passes);
+    }
+    long
+}
+
+#[test]
+fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
+    let (one, three) = (small(), repeated(&small(), 3));
+    for policy in crate::config::Replacement::all() {
+        for mode in [Mode::Functional, Mode::Timed] {
+            let mut config = RunConfig {
+                mode,
+                ..functional(Order::Z2_STA)
+            };
+            // A slot that is not full is carried over, a full one is not.
+            config.tmu.retry_footprints = 1;
+            (config.l1.replacement, config.l2.replacement) = (policy, policy);
+            let flush = RunConfig {
+                between_frames: BetweenFrames::Flush,
+                ..config
+            };
+            let single = replay(&one, &config).unwrap();
+            let [kept, flushed] = [config, flush].map(|c| replay(&three, &c).unwrap());
+            assert_eq!(flushed.footprints, 3 * single.footprints);
+            assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
+            if policy != crate::config::Replacement::RANDOM {
+                assert_eq!(
+                    flushed.l1.misses,
+                    3 * single.l1.misses,
+                    "{policy:?} {mode:?}"
+                );
+                assert_eq!(
+                    flushed.l2.misses,
+                    3 * single.l2.misses,
+                    "{policy:?} {mode:?}"
+                );
+                assert_eq!(flushed.cycles, single.cycles.map(|cycles| 3 * cycles));
+            }
+        }
+    }
+}

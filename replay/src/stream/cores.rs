@@ -89,6 +89,15 @@ impl<'f> Cores<'f> {
         Ok(())
     }
 
+    /// The quad that [`Self::next_quad`] gave last; none after [`Self::load`].
+    #[inline]
+    #[must_use]
+    pub fn quad(&self, core: usize) -> Option<QuadLines<'_>> {
+        let core = &self.cores[core];
+        let quad = core.quads.start.checked_sub(1)?;
+        core.tiles[core.slot].lines().map(|tile| tile.quad(quad))
+    }
+
     /// The core's next quad, until the item is done.
     #[inline(always)]
     pub fn next_quad(&mut self, core: usize) -> Option<QuadLines<'_>> {
@@ -107,6 +116,9 @@ impl<'f> Cores<'f> {
 
 fn fill<'f>(slot: &mut Slot<'f>, frame: &'f Frame<'f>, at: TileRef) -> Result<(), StreamError> {
     if let Some(kept) = frame.kept(at) {
+        if !kept.distinct.is_empty() {
+            kept.touch();
+        }
         *slot = Slot::Kept(kept);
         return Ok(());
     }

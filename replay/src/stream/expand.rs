@@ -5,6 +5,7 @@
 //! frames. Tiles for which the [`LineMemory`] has no room are counted and expanded again whenever
 //! a core comes to them.
 
+use super::distinct::Distinct;
 use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
 use super::lines::{QuadEnd, QuadRun, Tag, TileLines};
 use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, feed};
@@ -49,6 +50,7 @@ pub struct Expander<'a> {
     footprints: Footprints,
     bins: Bins,
     touched: LineSet,
+    distinct: bool,
 }
 
 /// Memory for the expansion of a tile, kept from tile to tile, and what was counted.
@@ -57,6 +59,7 @@ pub(super) struct Work {
     tile: Tile,
     scratch: Scratch,
     counts: TraceCounts,
+    distinct: Option<Distinct>,
     /// The last tile's lines.
     pub(super) lines: TileLines,
 }
@@ -74,7 +77,14 @@ impl<'a> Expander<'a> {
             footprints,
             bins: Bins::new(tables)?,
             source,
+            distinct: false,
         })
+    }
+
+    /// Lists each quad's distinct lines, too.
+    #[must_use]
+    pub fn with_distinct_lines(self, distinct: bool) -> Self {
+        Self { distinct, ..self }
     }
 
     /// Where accesses count.
@@ -138,6 +148,7 @@ impl<'a> Expander<'a> {
             tile: Tile::default(),
             scratch: self.footprints.scratch(),
             counts: TraceCounts::without_tiles(&self.bins),
+            distinct: self.distinct.then(Distinct::default),
             lines: TileLines::default(),
         }
     }
@@ -149,6 +160,7 @@ impl<'a> Expander<'a> {
             tile,
             scratch,
             counts,
+            distinct,
             lines,
         } = work;
         lines.begin(self.bins.place(at));
@@ -174,8 +186,14 @@ impl<'a> Expander<'a> {
                         footprints += u32::from(bundle.count);
                     });
                 accesses.footprints = accesses.footprints.wrapping_add(footprints);
+                if let Some(distinct) = distinct {
+                    let start = lines.quads.last().map_or(0, |quad| quad.end as usize);
+                    let (lines_of, tags) = (&lines.lines[start..], &lines.tags[start..]);
+                    distinct.list(lines_of, tags, &mut lines.distinct, &mut lines.uses);
+                }
                 lines.quads.push(QuadEnd {
                     end: lines.lines.len() as u32,
+                    distinct_end: lines.distinct.len() as u32,
                     footprints,
                 });
             }

@@ -1,6 +1,7 @@
 //! A tile's quads as lines: what every order, cache and clock reads in place of the trace.
 
 use super::counts::Place;
+use super::distinct::Use;
 use crate::order::Interleave;
 
 /// What a line belongs to: its footprint's cell within the view and, on a footprint's first line,
@@ -40,7 +41,7 @@ impl Tag {
     }
 
     #[inline(always)]
-    fn cell(self) -> u32 {
+    pub(super) fn cell(self) -> u32 {
         self.0 & (Self::CELLS as u32 - 1)
     }
 }
@@ -56,6 +57,8 @@ pub(super) struct QuadRun {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct QuadEnd {
     pub(super) end: u32,
+    /// Its distinct lines likewise.
+    pub(super) distinct_end: u32,
     /// With repeats.
     pub(super) footprints: u32,
 }
@@ -69,6 +72,9 @@ pub struct TileLines {
     pub(super) quads: Vec<QuadEnd>,
     pub(super) lines: Vec<u32>,
     pub(super) tags: Vec<Tag>,
+    /// Empty where nobody asked for them, like their uses.
+    pub(super) distinct: Vec<u32>,
+    pub(super) uses: Vec<Use>,
 }
 
 impl TileLines {
@@ -79,13 +85,34 @@ impl TileLines {
         self.quads.clear();
         self.lines.clear();
         self.tags.clear();
+        self.distinct.clear();
+        self.uses.clear();
     }
 
     /// Memory that the lists take.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let lists = size_of_val(&*self.runs) + size_of_val(&*self.quads);
-        (lists + size_of_val(&*self.lines) + size_of_val(&*self.tags) + size_of::<Self>()) as u64
+        let quads = size_of_val(&*self.runs) + size_of_val(&*self.quads);
+        let lines = size_of_val(&*self.lines) + size_of_val(&*self.tags);
+        let distinct = size_of_val(&*self.distinct) + size_of_val(&*self.uses);
+        (quads + lines + distinct + size_of::<Self>()) as u64
+    }
+
+    /// Brings what the timed machine reads into the processor's caches: many cache lines at once,
+    /// where coming to them one by one would wait for each.
+    pub(super) fn touch(&self) {
+        /// Words of a cache line.
+        const STEP: usize = 16;
+        let distinct = self.distinct.iter().step_by(STEP);
+        let uses = self.uses.iter().step_by(STEP);
+        let tags = self.tags.iter().step_by(STEP);
+        let quads = self.quads.iter().step_by(STEP / 3);
+        std::hint::black_box((
+            distinct.fold(0, |sum, line| sum ^ line),
+            uses.fold(0, |sum, of| sum ^ of.footprints()),
+            tags.fold(0, |sum, tag| sum ^ tag.0),
+            quads.fold(0, |sum, quad| sum ^ quad.end),
+        ));
     }
 
     /// Number of quads.
@@ -105,16 +132,22 @@ impl TileLines {
     #[inline(always)]
     #[must_use]
     pub fn quad(&self, index: usize) -> QuadLines<'_> {
-        let start = match index {
-            0 => 0,
-            _ => self.quads[index - 1].end as usize,
+        let (start, distinct_start) = match index.checked_sub(1) {
+            None => (0, 0),
+            Some(before) => {
+                let before = self.quads[before];
+                (before.end as usize, before.distinct_end as usize)
+            }
         };
         let quad = self.quads[index];
+        let distinct = distinct_start..quad.distinct_end as usize;
         QuadLines {
             place: self.place,
             footprints: quad.footprints,
             lines: &self.lines[start..quad.end as usize],
             tags: &self.tags[start..quad.end as usize],
+            distinct: &self.distinct[distinct.clone()],
+            uses: &self.uses[distinct],
         }
     }
 }
@@ -165,6 +198,10 @@ pub struct QuadLines<'a> {
     pub lines: &'a [u32],
     /// A tag for each line.
     pub tags: &'a [Tag],
+    /// Segment by segment each line once, in the order of last use. Empty where nobody asked for it.
+    pub distinct: &'a [u32],
+    /// Who uses each of these.
+    pub uses: &'a [Use],
 }
 
 impl<'a> QuadLines<'a> {

@@ -8,6 +8,7 @@
 
 mod cores;
 mod counts;
+mod distinct;
 mod error;
 mod expand;
 mod feed;
@@ -23,6 +24,7 @@ pub mod testing;
 
 pub use cores::Cores;
 pub use counts::{Bins, Cell, CellAccesses, TileAccesses, TraceCounts};
+pub use distinct::{Segment, Use};
 pub use error::StreamError;
 pub use expand::{Expander, Frame, LineMemory};
 pub use feed::{Quad, for_quads};

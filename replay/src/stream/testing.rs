@@ -124,6 +124,7 @@ pub fn tile_lines(quads: &[&[&[u32]]]) -> TileLines {
         }
         tile.quads.push(QuadEnd {
             end: tile.lines.len() as u32,
+            distinct_end: 0,
             footprints: footprints.len() as u32,
         });
     }

@@ -56,7 +56,7 @@ impl PipelineStats {
 struct Looping {
     /// When it is there.
     back: u64,
-    /// When the first of the footprints that it waits for is ready.
+    /// When the first of the footprints that it waits for is ready: the last of its list.
     earliest: u64,
     /// Footprints that it waits for.
     waiting: u32,
@@ -86,7 +86,7 @@ pub struct Pipeline {
     clock: u64,
     /// In order of return, since every loop is equally long.
     looping: VecDeque<Looping>,
-    /// What they wait for.
+    /// What they wait for, the latest first.
     pending: Vec<Vec<Pending>>,
     /// Lists that no thread has.
     spare: Vec<u32>,
@@ -156,7 +156,7 @@ impl Pipeline {
     }
 
     fn retry(&mut self) {
-        let Some(thread) = self.looping.pop_front() else {
+        let Some(mut thread) = self.looping.pop_front() else {
             return;
         };
         self.stats.loops += 1;
@@ -164,17 +164,20 @@ impl Pipeline {
             self.trip(0, thread);
             return;
         }
-        let clock = self.clock;
         let list = &mut self.pending[thread.list as usize];
-        list.retain(|pending| pending.ready > clock);
-        let left = Looping::new(thread.list, list);
-        self.trip((thread.waiting - left.waiting).into(), left);
-        if left.waiting == 0 {
+        let waited = thread.waiting;
+        while thread.earliest <= self.clock {
+            thread.waiting -= list.pop().map_or(0, |ready| ready.footprints);
+            thread.earliest = list.last().map_or(u64::MAX, |next| next.ready);
+        }
+        if thread.waiting == 0 {
             self.spare.push(thread.list);
         }
+        self.trip((waited - thread.waiting).into(), thread);
     }
 
-    /// A new thread enters now. `pending` are those of its `footprints` that miss.
+    /// A new thread enters now. `pending` are those of its `footprints` that miss, the latest
+    /// first.
     #[inline(always)]
     pub fn start(&mut self, footprints: u32, pending: &[Pending]) {
         self.stats.threads += 1;
@@ -194,7 +197,12 @@ impl Pipeline {
         let own = &mut self.pending[list as usize];
         own.clear();
         own.extend_from_slice(pending);
-        let thread = Looping::new(list, own);
+        let thread = Looping {
+            back: 0,
+            earliest: pending.last().map_or(u64::MAX, |first| first.ready),
+            waiting: pending.iter().map(|p| p.footprints).sum(),
+            list,
+        };
         self.trip((footprints - thread.waiting).into(), thread);
     }
 
@@ -216,19 +224,6 @@ impl Pipeline {
             back: entered + u64::from(self.config.loop_cycles),
             ..thread
         });
-    }
-}
-
-impl Looping {
-    /// A thread that waits for what is in a list.
-    #[inline(always)]
-    fn new(list: u32, pending: &[Pending]) -> Self {
-        Self {
-            back: 0,
-            earliest: pending.iter().map(|p| p.ready).min().unwrap_or(u64::MAX),
-            waiting: pending.iter().map(|p| p.footprints).sum(),
-            list,
-        }
     }
 }
 
@@ -260,7 +255,8 @@ mod tests {
                             ready: now + l,
                             footprints: 1,
                         });
-                        let pending: Vec<Pending> = pending.collect();
+                        let mut pending: Vec<Pending> = pending.collect();
+                        pending.sort_by_key(|p| std::cmp::Reverse(p.ready));
                         pipeline.start(hits + pending.len() as u32, &pending);
                     }
                     None => pipeline.drain(),

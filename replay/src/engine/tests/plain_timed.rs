@@ -256,6 +256,13 @@ impl Machine for PlainTimed {
         Ok(())
     }
 
+    fn flush(&mut self) {
+        for level in self.l1.iter_mut().chain([&mut self.l2]) {
+            level.cache.clear();
+            level.in_flight = PlainInFlight::default();
+        }
+    }
+
     fn outcome(&self, _config: &RunConfig) -> batch::Outcome {
         let sum = |of: fn(&PlainUnit) -> u64| self.units.iter().map(of).sum::<u64>();
         let (useful, wasted) = (sum(|unit| unit.useful), sum(|unit| unit.wasted));

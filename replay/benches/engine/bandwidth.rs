@@ -1,0 +1,23 @@
+//! How fast this machine reads memory that no cache holds.
+
+use crate::stages::seconds;
+use std::hint::black_box;
+
+/// Larger than the processor's own caches.
+const BYTES: usize = 256 << 20;
+
+/// Bytes that one core reads in a second, one after another.
+pub fn bytes_per_second() -> f64 {
+    let words = vec![1_u64; BYTES / 8];
+    let sum = || {
+        // Independent sums, so that adding does not wait.
+        let mut sums = [0_u64; 16];
+        for chunk in words.chunks_exact(16) {
+            for (sum, word) in sums.iter_mut().zip(chunk) {
+                *sum = sum.wrapping_add(*word);
+            }
+        }
+        black_box(sums);
+    };
+    BYTES as f64 / seconds(sum)
+}

@@ -1,0 +1,54 @@
+//! The rows side by side.
+
+/// A stage.
+pub struct Row {
+    /// What it does, and what it counts if not lines.
+    pub name: &'static str,
+    /// What it went through.
+    pub items: u64,
+    /// What it read of it, or wrote.
+    pub bytes: u64,
+    /// The shortest run.
+    pub seconds: f64,
+    /// True for the plain LRU.
+    pub yardstick: bool,
+}
+
+impl Row {
+    /// A row that is not the yardstick.
+    pub fn new(name: &'static str, items: u64, bytes: u64, seconds: f64) -> Self {
+        Self {
+            name,
+            items,
+            bytes,
+            seconds,
+            yardstick: false,
+        }
+    }
+
+    fn items_per_second(&self) -> f64 {
+        self.items as f64 / self.seconds
+    }
+}
+
+/// Prints the rows; `bandwidth` is in bytes per second.
+pub fn print(bandwidth: f64, rows: &[Row]) {
+    println!("memory is read at {:.1} GB/s\n", bandwidth / 1e9);
+    println!("| stage | items, M | ms | M items/s | GB/s | of the bandwidth | plain LRU = 1 |");
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    let plain = rows.iter().find(|row| row.yardstick);
+    let plain = plain.map_or(f64::NAN, Row::items_per_second);
+    for row in rows {
+        let rate = row.bytes as f64 / row.seconds;
+        println!(
+            "| {} | {:.2} | {:.1} | {:.0} | {:.2} | {:.0} % | {:.2} |",
+            row.name,
+            row.items as f64 / 1e6,
+            row.seconds * 1e3,
+            row.items_per_second() / 1e6,
+            rate / 1e9,
+            100.0 * rate / bandwidth,
+            row.items_per_second() / plain,
+        );
+    }
+}

@@ -1,0 +1,163 @@
+//! Timed replay: each core's texture unit runs on its own cycle clock, and the clocks decide in
+//! which order the cores' misses reach the shared L2.
+
+mod memory;
+
+use super::Machine;
+use super::batch::Outcome;
+use super::counts::CacheCounts;
+use crate::cache::{Cache, Levels};
+use crate::config::{Assign, RunConfig, TmuConfig};
+use crate::order::{Phase, WorkItem};
+use crate::result::TmuResult;
+use crate::stream::{Cores, StreamError, furthest_behind};
+use crate::tmu::{Pipeline, PipelineStats, Turn};
+use memory::{Found, Memory};
+
+/// Texture units, and the caches that they share.
+pub struct Timed<C> {
+    memory: Memory<C>,
+    units: Vec<Pipeline>,
+    /// Cycles until the last core was done.
+    cycles: u64,
+}
+
+impl<C: Cache> Timed<C> {
+    /// Empty caches, a texture unit for each L1.
+    pub fn new(levels: Levels<C>, tmu: TmuConfig, counts: CacheCounts) -> Self {
+        let cores = levels.l1.len();
+        Self {
+            memory: Memory::new(levels, tmu, counts),
+            units: vec![Pipeline::new(tmu); cores],
+            cycles: 0,
+        }
+    }
+
+    /// What the cores share, the L2 and the list of items, sees them in the order of time: it is
+    /// the turn of the core whose clock is furthest behind. All else a core does on its own, so it
+    /// runs on until it wants something shared and another core is behind.
+    fn run_phase(
+        &mut self,
+        work: &mut Cores<'_>,
+        phase: &[WorkItem],
+        assign: Assign,
+    ) -> Result<(), StreamError> {
+        let mut items = Items::new(phase, assign, self.units.len());
+        // A core that is done is at the end of time.
+        let mut clocks: Vec<u64> = self.units.iter().map(Pipeline::clock).collect();
+        // Cores whose thread has been looked up and is to ask the L2.
+        let mut asking = vec![false; self.units.len()];
+        while let Some((core, until)) = furthest_behind(&clocks) {
+            let unit = &mut self.units[core];
+            if std::mem::take(&mut asking[core])
+                && let Some(quad) = work.quad(core)
+            {
+                let pending = self.memory.ask(core, unit.clock(), &quad);
+                unit.start(quad.footprints, pending);
+            }
+            clocks[core] = loop {
+                match unit.turn() {
+                    Turn::Looped => {}
+                    Turn::Done => break u64::MAX,
+                    Turn::Free => {
+                        let now = unit.clock();
+                        if let Some(quad) = work.next_quad(core) {
+                            if quad.footprints == 0 {
+                                continue;
+                            }
+                            match self.memory.look_up(core, now, &quad) {
+                                Found::All => unit.start(quad.footprints, &[]),
+                                Found::NotAll if now > until => {
+                                    asking[core] = true;
+                                    break now;
+                                }
+                                Found::NotAll | Found::OnTheirWay => {
+                                    let pending = self.memory.ask(core, now, &quad);
+                                    unit.start(quad.footprints, pending);
+                                }
+                            }
+                        } else if now > until {
+                            break now;
+                        } else if let Some(item) = items.next(core) {
+                            work.load(core, item)?;
+                        } else {
+                            unit.drain();
+                        }
+                    }
+                }
+            };
+        }
+        Ok(())
+    }
+}
+
+/// The items of a phase by assignment.
+struct Items<'a> {
+    items: &'a [WorkItem],
+    assign: Assign,
+    /// First idle: the next item of all. Static: the next item by core.
+    next: Vec<usize>,
+    cores: usize,
+}
+
+impl<'a> Items<'a> {
+    fn new(items: &'a [WorkItem], assign: Assign, cores: usize) -> Self {
+        let next = match assign {
+            Assign::FirstIdle => vec![0],
+            Assign::Static => (0..cores).collect(),
+        };
+        Self {
+            items,
+            assign,
+            next,
+            cores,
+        }
+    }
+
+    fn next(&mut self, core: usize) -> Option<&'a WorkItem> {
+        let (next, step) = match self.assign {
+            Assign::FirstIdle => (&mut self.next[0], 1),
+            Assign::Static => (&mut self.next[core], self.cores),
+        };
+        let item = self.items.get(*next);
+        *next += step;
+        item
+    }
+}
+
+impl<C: Cache> Machine for Timed<C> {
+    /// A phase starts when the last core is done with the one before.
+    fn run(
+        &mut self,
+        work: &mut Cores<'_>,
+        phases: &[Phase],
+        assign: Assign,
+    ) -> Result<(), StreamError> {
+        for phase in phases {
+            let cycles = self.cycles;
+            self.units.iter_mut().for_each(|unit| unit.resume(cycles));
+            self.run_phase(work, phase, assign)?;
+            self.cycles = self.units.iter().map(Pipeline::clock).max().unwrap_or(0);
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) {
+        self.memory.flush();
+    }
+
+    fn outcome(&self, _config: &RunConfig) -> Outcome {
+        let mut sum = PipelineStats::default();
+        self.units.iter().for_each(|unit| sum.add(&unit.stats()));
+        Outcome {
+            counts: self.memory.counts().clone(),
+            tmu: Some(TmuResult {
+                utilization: sum.utilization(),
+                wasted_issues: sum.wasted,
+                threads: sum.threads,
+                loops: sum.loops,
+            }),
+            cycles: Some(self.cycles),
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! A quad's distinct lines: all that a cache has to be asked where the quad's own accesses change
+//! nothing in it but the order of last use.
+//!
+//! A quad is cut into *segments* of so many footprints that a word has a bit for each. In a segment,
+//! each line of each cell is listed once, with the footprints that use it.
+
+use super::QuadLines;
+use super::lines::Tag;
+
+/// Footprints of a segment at most, repeats counted: four lanes of three trilinear textures.
+const FOOTPRINTS: u32 = 24;
+
+/// Buckets of the table; a power of two, far more than a segment has lines.
+const BUCKETS: usize = 512;
+
+/// Who uses a distinct line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Use(u32);
+
+impl Use {
+    const LAST: u32 = 1 << 31;
+
+    fn new(footprints: u32, first_line: usize) -> Self {
+        Self(footprints | (first_line as u32) << FOOTPRINTS)
+    }
+
+    /// A bit for each footprint of the segment, repeats counted.
+    #[inline(always)]
+    #[must_use]
+    pub fn footprints(self) -> u32 {
+        self.0 & ((1 << FOOTPRINTS) - 1)
+    }
+
+    /// Where it stands first among the segment's lines.
+    #[inline(always)]
+    #[must_use]
+    pub fn first_line(self) -> usize {
+        ((self.0 & !Self::LAST) >> FOOTPRINTS) as usize
+    }
+
+    /// True for the last distinct line of a segment.
+    #[inline(always)]
+    fn ends_segment(self) -> bool {
+        self.0 & Self::LAST != 0
+    }
+}
+
+/// A part of a quad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// Its first line.
+    pub first_line: usize,
+    /// The end of its distinct lines, which follow those of the segment before.
+    pub distinct_end: usize,
+}
+
+impl<'a> QuadLines<'a> {
+    /// The segments of the distinct lines.
+    #[inline(always)]
+    pub fn segments(self) -> impl Iterator<Item = Segment> + use<'a> {
+        let mut next = Segment {
+            first_line: 0,
+            distinct_end: 0,
+        };
+        std::iter::from_fn(move || {
+            let start = next.distinct_end;
+            let uses = &self.uses[start..];
+            let end = start + 1 + uses.iter().position(|of| of.ends_segment())?;
+            let segment = Segment {
+                distinct_end: end,
+                ..next
+            };
+            next = segment;
+            if end < self.uses.len() {
+                let all = |all, of: &Use| all | of.footprints();
+                let footprints = self.uses[start..end].iter().fold(0, all).count_ones();
+                next.first_line = self.skip(segment.first_line, footprints);
+            }
+            Some(segment)
+        })
+    }
+
+    /// The line after so many footprints, repeats counted, from the one at `line` on.
+    fn skip(&self, mut line: usize, mut footprints: u32) -> usize {
+        while footprints > 0 {
+            footprints = footprints.saturating_sub(1 + self.tags[line].repeats());
+            line = self.end_of_footprint(line);
+        }
+        line
+    }
+}
+
+/// A distinct line of the segment at hand.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    line: u32,
+    footprints: u32,
+    first_line: usize,
+}
+
+/// Finds the distinct lines of one quad after another.
+#[derive(Debug)]
+pub(super) struct Distinct {
+    /// Open addressing: the segment that wrote it, and the index in `seen`. What other segments
+    /// wrote is empty.
+    buckets: Vec<(u32, u32)>,
+    segment: u32,
+    seen: Vec<Seen>,
+    /// Cell of each.
+    cells: Vec<u32>,
+    /// Index in `seen` of each line.
+    indexes: Vec<u8>,
+}
+
+impl Default for Distinct {
+    fn default() -> Self {
+        Self {
+            buckets: vec![(0, 0); BUCKETS],
+            segment: 0,
+            seen: Vec::new(),
+            cells: Vec::new(),
+            indexes: Vec::new(),
+        }
+    }
+}
+
+impl Distinct {
+    /// Appends a quad's distinct lines and their uses.
+    pub(super) fn list(
+        &mut self,
+        lines: &[u32],
+        tags: &[Tag],
+        distinct: &mut Vec<u32>,
+        uses: &mut Vec<Use>,
+    ) {
+        let mut line = 0;
+        while line < lines.len() {
+            self.begin();
+            let start = line;
+            let mut footprints = 0;
+            while line < lines.len() {
+                let times = 1 + tags[line].repeats();
+                if footprints + times > FOOTPRINTS {
+                    break;
+                }
+                let bits = ((1 << times) - 1) << footprints;
+                loop {
+                    self.add(lines[line], tags[line].cell(), bits, line - start);
+                    line += 1;
+                    if line == lines.len() || tags[line].is_first() {
+                        break;
+                    }
+                }
+                footprints += times;
+            }
+            self.finish(distinct, uses);
+        }
+    }
+
+    fn begin(&mut self) {
+        self.segment = self.segment.wrapping_add(1);
+        if self.segment == 0 {
+            // Numbers start again: what was written with them is forgotten.
+            self.buckets.fill((0, 0));
+            self.segment = 1;
+        }
+        self.seen.clear();
+        self.cells.clear();
+        self.indexes.clear();
+    }
+
+    /// Adds a line of some footprints.
+    #[inline(always)]
+    fn add(&mut self, line: u32, cell: u32, footprints: u32, at: usize) {
+        let mut bucket = line.wrapping_mul(0x9e37_79b1) as usize >> (32 - BUCKETS.ilog2());
+        let index = loop {
+            let (segment, index) = self.buckets[bucket];
+            if segment != self.segment {
+                let index = self.seen.len() as u32;
+                self.buckets[bucket] = (self.segment, index);
+                self.cells.push(cell);
+                self.seen.push(Seen {
+                    line,
+                    footprints: 0,
+                    first_line: at,
+                });
+                break index;
+            }
+            if self.seen[index as usize].line == line && self.cells[index as usize] == cell {
+                break index;
+            }
+            bucket = (bucket + 1) % BUCKETS;
+        };
+        self.seen[index as usize].footprints |= footprints;
+        self.indexes.push(index as u8);
+    }
+
+    /// Appends what was added, in the order of last use.
+    fn finish(&mut self, distinct: &mut Vec<u32>, uses: &mut Vec<Use>) {
+        let first = distinct.len();
+        let mut slot = first + self.seen.len();
+        distinct.resize(slot, 0);
+        uses.resize(slot, Use(0));
+        let mut last = Use::LAST;
+        for &index in self.indexes.iter().rev() {
+            let seen = &mut self.seen[usize::from(index)];
+            let footprints = std::mem::take(&mut seen.footprints);
+            if footprints != 0 {
+                slot -= 1;
+                distinct[slot] = seen.line;
+                uses[slot] = Use(Use::new(footprints, seen.first_line).0 | last);
+                last = 0;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::lines::{QuadEnd, TileLines};
+    use proptest::prelude::*;
+    use std::collections::HashMap;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(256))]
+
+        /// Footprints of up to four lines of a cell, with repeats; lines shared by cells.
+        #[test]
+        fn segments_say_of_each_line_who_uses_it_and_in_which_order(
+            quads in prop::collection::vec(prop::collection::vec(
+                (0_u32..3, 0_u32..4, prop::collection::vec(0_u32..30, 1..5)), 0..40,
+            ), 1..4),
+        ) {
+            // Segments' numbers start again.
+            let mut distinct = Distinct { segment: u32::MAX - 1, ..Distinct::default() };
+            let mut tile = TileLines::default();
+            for footprints in &quads {
+                let start = tile.lines.len();
+                for (cell, repeats, lines) in footprints {
+                    let [first, other] = Tag::of_footprint(*cell, *repeats);
+                    for (index, line) in lines.iter().enumerate() {
+                        tile.lines.push(*line);
+                        tile.tags.push(if index == 0 { first } else { other });
+                    }
+                }
+                let (lines, tags) = (&tile.lines[start..], &tile.tags[start..]);
+                distinct.list(lines, tags, &mut tile.distinct, &mut tile.uses);
+                tile.quads.push(QuadEnd {
+                    end: tile.lines.len() as u32,
+                    distinct_end: tile.distinct.len() as u32,
+                    footprints: 0,
+                });
+            }
+            for index in 0..quads.len() {
+                let quad = tile.quad(index);
+                let mut begin = 0;
+                let ends: Vec<usize> = quad.segments().skip(1).map(|s| s.first_line).collect();
+                for (segment, end) in quad.segments().zip(ends.into_iter().chain([quad.lines.len()])) {
+                    // Footprints and last position by line and cell.
+                    let mut plain: HashMap<(u32, u32), (u32, usize, usize)> = HashMap::new();
+                    let (mut bit, mut bits) = (0, 0);
+                    for at in segment.first_line..end {
+                        if quad.tags[at].is_first() {
+                            let times = 1 + quad.tags[at].repeats();
+                            bits = ((1 << times) - 1) << bit;
+                            bit += times;
+                        }
+                        let key = (quad.lines[at], quad.tags[at].cell());
+                        let first = at - segment.first_line;
+                        let entry = plain.entry(key).or_insert((0, first, 0));
+                        *entry = (entry.0 | bits, entry.1, at);
+                    }
+                    prop_assert!(bit <= FOOTPRINTS);
+                    let listed = begin..segment.distinct_end;
+                    begin = segment.distinct_end;
+                    prop_assert_eq!(listed.len(), plain.len());
+                    let mut before = 0;
+                    for (line, of) in quad.distinct[listed.clone()].iter().zip(&quad.uses[listed]) {
+                        let cell = quad.tags[segment.first_line + of.first_line()].cell();
+                        let (footprints, first, last) = plain[&(*line, cell)];
+                        prop_assert_eq!((of.footprints(), of.first_line()), (footprints, first));
+                        prop_assert!(before <= last);
+                        before = last;
+                    }
+                }
+                prop_assert_eq!(begin, quad.distinct.len());
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Memory and time of long traces: `cargo test --release -p replay --test many_frames -- --ignored
+//! --nocapture`; `FRAMES` and `TEXTRACE` choose how many frames and the trace whose first is repeated.
+
+use formats::textrace::{Pass, Tables, Textrace, TextraceWriter, Tile};
+use replay::config::{CacheConfig, Mode, Order, RunConfig};
+use replay::engine::replay_all;
+use replay::stream::synthetic::Synthetic;
+use replay::stream::{LineMemory, TileSource};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Writes the first frame of a trace so many times; the frames' views repeat with it.
+fn write(source: &dyn TileSource, frames: u32, path: &Path) {
+    let old = source.tables();
+    let first = old.passes.iter().map(|pass| pass.frame).min().unwrap();
+    let of_frame = (0..)
+        .zip(&old.passes)
+        .filter(|(_, pass)| pass.frame == first);
+    let of_frame: Vec<(u32, &Pass)> = of_frame.collect();
+    let mut tables = Tables {
+        passes: Vec::new(),
+        ..old.clone()
+    };
+    let views = old.meta.frames[first as usize].clone();
+    tables.meta.frames = vec![views; frames as usize];
+    for frame in 0..frames {
+        let again = of_frame.iter().map(|(_, pass)| Pass {
+            frame,
+            ..(*pass).clone()
+        });
+        tables.passes.extend(again);
+    }
+    let mut writer = TextraceWriter::create(path, &tables).unwrap();
+    let mut tile = Tile::default();
+    for frame in 0..frames as usize {
+        for (number, (pass, info)) in of_frame.iter().enumerate() {
+            for index in 0..info.tile_count() {
+                source.read_tile(*pass, index, &mut tile).unwrap();
+                let to = frame * of_frame.len() + number;
+                writer.write_tile(to, index as usize, &tile).unwrap();
+            }
+        }
+    }
+    writer.finish().unwrap();
+}
+
+/// This process's memory that is not a mapped file, in bytes; none where the system does not say.
+fn own_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("RssAnon:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib << 10)
+}
+
+/// Seconds that `work` takes, and the most memory meanwhile.
+fn watched(work: impl FnOnce()) -> (f64, u64) {
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let watch = scope.spawn(|| {
+            let mut most = 0;
+            while !done.load(Ordering::Relaxed) {
+                most = most.max(own_bytes().unwrap_or(0));
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            most
+        });
+        let start = Instant::now();
+        work();
+        let seconds = start.elapsed().as_secs_f64();
+        done.store(true, Ordering::Relaxed);
+        (seconds, watch.join().unwrap())
+    })
+}
+
+#[test]
+#[ignore = "minutes"]
+fn neither_memory_nor_the_time_of_a_frame_grows_with_the_number_of_frames() {
+    let frames: u32 = std::env::var("FRAMES").map_or(300, |frames| frames.parse().unwrap());
+    let given = std::env::var_os("TEXTRACE").map(|path| Textrace::open(Path::new(&path)).unwrap());
+    let generated = Synthetic {
+        size_px: [480, 540],
+        ..Synthetic::default()
+    };
+    let source: Box<dyn TileSource> = match given {
+        Some(trace) => Box::new(trace),
+        None => Box::new(generated.generate()),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let [short, long] = [frames / 10, frames].map(|frames| {
+        let path = folder.path().join(format!("{frames}.textrace"));
+        write(&*source, frames, &path);
+        (frames, Textrace::open(&path).unwrap())
+    });
+    drop(source);
+    let config = |mode, l1_kib: u64| RunConfig {
+        mode,
+        order: Order::Z2_STA,
+        l1: CacheConfig::lru(l1_kib << 10),
+        ..RunConfig::default()
+    };
+    let batches: [(&str, Vec<RunConfig>); 4] = [
+        ("functional", vec![config(Mode::Functional, 8)]),
+        ("timed", vec![config(Mode::Timed, 8)]),
+        ("both, three caches each", {
+            let modes = [Mode::Functional, Mode::Timed];
+            let all = modes
+                .into_iter()
+                .flat_map(|m| [8, 16, 32].map(|kib| config(m, kib)));
+            all.collect()
+        }),
+        ("functional, two line sizes", {
+            let lines = [16, 64].map(|line_bytes| RunConfig {
+                line_bytes,
+                ..config(Mode::Functional, 8)
+            });
+            lines.to_vec()
+        }),
+    ];
+    for (name, configs) in batches {
+        let run = |(frames, trace): &(u32, Textrace)| {
+            let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+            let (seconds, bytes) = watched(|| {
+                replay_all(trace, &configs, &memory, &|_, _| {}).unwrap();
+            });
+            (1e3 * seconds / f64::from(*frames), bytes)
+        };
+        let ((short_ms, short_bytes), (long_ms, long_bytes)) = (run(&short), run(&long));
+        println!(
+            "{name}: {} frames {short_ms:.1} ms each, {} MB; {} frames {long_ms:.1} ms each, {} MB",
+            short.0,
+            short_bytes / 1_000_000,
+            long.0,
+            long_bytes / 1_000_000
+        );
+        assert!(long_bytes < 512_000_000, "{long_bytes} bytes");
+        // Other programs run on the machine, too.
+        assert!(long_ms < 2.0 * short_ms, "{short_ms} ms, then {long_ms} ms");
+    }
+}
