@@ -4,17 +4,17 @@
 pub const PADDING_BYTES: usize = 8;
 
 /// Most bits that [`BitReader::peek`] is sure to hold.
-pub(super) const PEEK_BITS: u32 = 57;
+pub(in crate::textrace) const PEEK_BITS: u32 = 57;
 
 /// Appends bits to bytes.
-pub(super) struct BitWriter {
+pub(in crate::textrace) struct BitWriter {
     bytes: Vec<u8>,
     pending: u64,
     count: u32,
 }
 
 impl BitWriter {
-    pub(super) fn new(bytes: Vec<u8>) -> Self {
+    pub(in crate::textrace) fn new(bytes: Vec<u8>) -> Self {
         Self {
             bytes,
             pending: 0,
@@ -23,7 +23,7 @@ impl BitWriter {
     }
 
     /// Appends the lowest `count` bits of `value`, at most 32.
-    pub(super) fn put(&mut self, value: u32, count: u32) {
+    pub(in crate::textrace) fn put(&mut self, value: u32, count: u32) {
         debug_assert!(count == 32 || u64::from(value) < 1 << count);
         self.pending |= u64::from(value) << self.count;
         self.count += count;
@@ -34,7 +34,7 @@ impl BitWriter {
         }
     }
 
-    pub(super) fn finish(mut self) -> Vec<u8> {
+    pub(in crate::textrace) fn finish(mut self) -> Vec<u8> {
         if self.count > 0 {
             self.bytes.push(self.pending.to_le_bytes()[0]);
         }
@@ -44,30 +44,30 @@ impl BitWriter {
 }
 
 /// Reads bits from bytes that end with padding.
-pub(super) struct BitReader<'a> {
+pub(in crate::textrace) struct BitReader<'a> {
     bytes: &'a [u8],
     bit: usize,
 }
 
 impl<'a> BitReader<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
+    pub(in crate::textrace) fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, bit: 0 }
     }
 
     /// The next bits, at least [`PEEK_BITS`] of them; `None` at the end.
     #[inline(always)]
-    pub(super) fn peek(&self) -> Option<u64> {
+    pub(in crate::textrace) fn peek(&self) -> Option<u64> {
         let word = self.bytes.get(self.bit >> 3..)?.first_chunk::<8>()?;
         Some(u64::from_le_bytes(*word) >> (self.bit & 7))
     }
 
     #[inline(always)]
-    pub(super) fn skip(&mut self, count: u32) {
+    pub(in crate::textrace) fn skip(&mut self, count: u32) {
         self.bit += count as usize;
     }
 
     /// The bits between the last one read and the end of its byte.
-    pub(super) fn left_in_byte(&self) -> u8 {
+    pub(in crate::textrace) fn left_in_byte(&self) -> u8 {
         let byte = self.bytes.get(self.bit >> 3).copied().unwrap_or_default();
         if self.bit & 7 == 0 {
             0
@@ -77,7 +77,7 @@ impl<'a> BitReader<'a> {
     }
 
     /// The bytes that no read bit lies in.
-    pub(super) fn rest(&self) -> &'a [u8] {
+    pub(in crate::textrace) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.bit.div_ceil(8)..).unwrap_or_default()
     }
 }

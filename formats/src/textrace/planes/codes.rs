@@ -1,0 +1,118 @@
+//! Prefix codes: canonical, from the lengths in [`super::lengths`].
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+use super::lengths::LENGTHS;
+use std::array::from_fn;
+use std::sync::LazyLock;
+
+/// Longest code.
+pub(super) const MOST_BITS: u32 = 12;
+const ENTRIES: usize = 1 << MOST_BITS;
+
+/// A prefix code, for both directions.
+pub(super) struct Code {
+    /// Its place in [`LENGTHS`].
+    pub number: usize,
+    /// By the next [`MOST_BITS`] bits: symbol * 16 + length.
+    by_bits: Box<[u16; ENTRIES]>,
+    /// By symbol: bits as they are written, lowest first, and their number (0: not in the code).
+    by_symbol: Vec<(u32, u32)>,
+}
+
+impl Code {
+    /// From the length of each symbol's code, a hexadecimal digit each, 0 for none.
+    pub fn new(number: usize, lengths: &str) -> Self {
+        let lengths: Vec<u32> = lengths.chars().filter_map(|c| c.to_digit(16)).collect();
+        let mut by_bits = Box::new([0; ENTRIES]);
+        let mut by_symbol = vec![(0, 0); lengths.len()];
+        let mut next = 0u32;
+        for length in 1u16.. {
+            let bits = u32::from(length);
+            if bits > MOST_BITS {
+                break;
+            }
+            next <<= 1;
+            let symbols = lengths.iter().zip(&mut by_symbol).zip(0u16..);
+            for ((_, entry), symbol) in symbols.filter(|((l, _), _)| **l == bits) {
+                let code = next.reverse_bits() >> (32 - bits);
+                *entry = (code, bits);
+                let places = by_bits.iter_mut().skip(code as usize);
+                places
+                    .step_by(1 << bits)
+                    .for_each(|place| *place = symbol << 4 | length);
+                next += 1;
+            }
+        }
+        Self {
+            number,
+            by_bits,
+            by_symbol,
+        }
+    }
+
+    /// Symbol and length of the code that the bits start with.
+    #[inline(always)]
+    pub fn decode(&self, bits: u64) -> (u32, u32) {
+        let low = bits & (ENTRIES as u64 - 1);
+        #[allow(clippy::cast_possible_truncation, reason = "less than ENTRIES")]
+        let entry = self.by_bits.get(low as usize).copied();
+        let entry = u32::from(entry.unwrap_or_default());
+        (entry >> 4, entry & 15)
+    }
+
+    /// Bits and their number; `None` for a symbol that is not in the code.
+    #[inline]
+    pub fn encode(&self, symbol: u32) -> Option<(u32, u32)> {
+        let found = self.by_symbol.get(symbol as usize).copied();
+        found.filter(|(_, length)| *length > 0)
+    }
+
+    /// Bits that a symbol takes, `otherwise` if it is not in the code.
+    #[inline]
+    pub fn length(&self, symbol: u32, otherwise: u32) -> u32 {
+        self.encode(symbol).map_or(otherwise, |(_, length)| length)
+    }
+}
+
+/// All codes.
+pub(super) struct Codes {
+    /// Step and mask, by [`super::state::State::place_context`].
+    pub place: [Code; 5],
+    /// Classes of a quad's residuals, by those of the group's last quad.
+    pub sizes: [Code; 4],
+    /// Widths of a first quad's dx, dy, cross and uv.
+    pub first: [Code; 4],
+    /// Widths of what no class holds.
+    pub later: Code,
+    /// Widths of a correction's start, slopes to the right, slopes down, and tilt.
+    pub correction: [Code; 4],
+    /// Level of the correction, by the records of the run.
+    pub level: [Code; 4],
+}
+
+/// Number of codes.
+pub(super) const CODES: usize = 5 + 4 + 4 + 1 + 4 + 4;
+
+static ALL: LazyLock<Codes> = LazyLock::new(|| Codes::new(&LENGTHS));
+
+impl Codes {
+    pub fn get() -> &'static Self {
+        &ALL
+    }
+
+    pub fn new<S: AsRef<str>>(lengths: &[S; CODES]) -> Self {
+        let mut left = (0..).zip(lengths);
+        let mut next = || {
+            let (number, lengths) = left.next().expect("a code for each of CODES");
+            Code::new(number, lengths.as_ref())
+        };
+        Self {
+            place: from_fn(|_| next()),
+            sizes: from_fn(|_| next()),
+            first: from_fn(|_| next()),
+            later: next(),
+            correction: from_fn(|_| next()),
+            level: from_fn(|_| next()),
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Residuals: pairs of small numbers in classes, larger ones by their width.
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+use super::plane::Quad;
+use crate::varint::{low_u32, unzigzag, zigzag};
+
+/// A pair (u, v).
+pub(super) type Pair = [i32; 2];
+
+/// Bits of a pair in each class: both 0; within 1; within 2; anything else tells its width.
+pub(super) const CLASS_BITS: [u32; 4] = [0, 3, 4, 0];
+/// The class that tells its width.
+pub(super) const WIDE: u32 = 3;
+
+/// The pairs of the classes 0 to 2: 1, 8 and 16, each class row by row.
+const SMALL: [[i8; 2]; 25] = {
+    let mut pairs = [[0; 2]; 25];
+    let mut at = 0;
+    let mut class = 0;
+    while class <= 2 {
+        let mut u = -class;
+        while u <= class {
+            let mut v = -class;
+            while v <= class {
+                let most = if abs(u) > abs(v) { abs(u) } else { abs(v) };
+                if most == class {
+                    #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+                    {
+                        pairs[at] = [u, v];
+                    }
+                    at += 1;
+                }
+                v += 1;
+            }
+            u += 1;
+        }
+        class += 1;
+    }
+    pairs
+};
+
+/// First pair of each class.
+const STARTS: [u32; 4] = [0, 1, 9, 0];
+
+const fn abs(value: i8) -> i8 {
+    if value < 0 { -value } else { value }
+}
+
+/// The pair of a class that some bits name.
+#[inline(always)]
+pub(super) fn small(class: u32, bits: u64) -> Pair {
+    let of = |table: [u32; 4]| table.get(class as usize & 3).copied().unwrap_or_default();
+    let index = of(STARTS) + (low_u32(bits) & ((1 << of(CLASS_BITS)) - 1));
+    let pair = SMALL.get(index as usize).copied().unwrap_or_default();
+    pair.map(i32::from)
+}
+
+/// Bits of a class.
+#[inline(always)]
+pub(super) fn class_bits(class: u32) -> u32 {
+    let found = CLASS_BITS.get(class as usize & 3).copied();
+    found.unwrap_or_default()
+}
+
+/// Class of a pair and, unless it is wide, the bits that name it.
+pub(super) fn classify([u, v]: Pair) -> (u32, u32) {
+    let class = u.unsigned_abs().max(v.unsigned_abs()).min(WIDE);
+    if class == WIDE {
+        return (WIDE, 0);
+    }
+    let is = |pair: &[i8; 2]| pair.map(i32::from) == [u, v];
+    let index = (0..).zip(&SMALL).find(|(_, pair)| is(pair));
+    let index = index.map_or(0, |(index, _)| index);
+    let start = STARTS.get(class as usize).copied().unwrap_or_default();
+    (class, index - start)
+}
+
+/// Bits that the larger of a pair needs.
+pub(super) fn width(pair: Pair) -> u32 {
+    let [u, v] = pair.map(fold);
+    32 - (u | v).leading_zeros()
+}
+
+/// A number as it is stored: 0, -1, 1, -2, ...
+pub(super) fn fold(number: i32) -> u32 {
+    low_u32(zigzag(number.into()))
+}
+
+#[inline(always)]
+pub(super) fn unfold(bits: u64) -> i32 {
+    low_u32(unzigzag(u64::from(low_u32(bits))).cast_unsigned()).cast_signed()
+}
+
+/// Which code tells of a group's next residuals, from the classes of the last ones.
+#[inline(always)]
+pub(super) fn noise(classes: u32) -> usize {
+    let sum = (classes & 3) + (classes >> 2 & 3) + (classes >> 4 & 3) + (classes >> 6 & 3);
+    match sum {
+        0 => 0,
+        1..=3 => 1,
+        4..=7 => 2,
+        _ => 3,
+    }
+}
+
+/// `quad - expected`, wrapping.
+pub(super) fn difference(quad: &Quad, expected: &Quad) -> Quad {
+    let mut left = *quad;
+    for (pair, of) in left.iter_mut().zip(expected) {
+        for (number, of) in pair.iter_mut().zip(of) {
+            *number = number.wrapping_sub(*of);
+        }
+    }
+    left
+}
+
+#[inline(always)]
+pub(super) fn sum([a, b]: Pair, [c, d]: Pair) -> Pair {
+    [a.wrapping_add(c), b.wrapping_add(d)]
+}
