@@ -34,11 +34,17 @@ impl BitWriter {
         }
     }
 
-    pub(in crate::textrace) fn finish(mut self) -> Vec<u8> {
+    /// The bytes, with padding.
+    pub(in crate::textrace) fn finish(self) -> Vec<u8> {
+        let mut bytes = self.finish_unpadded();
+        bytes.extend([0; PADDING_BYTES]);
+        bytes
+    }
+
+    pub(in crate::textrace) fn finish_unpadded(mut self) -> Vec<u8> {
         if self.count > 0 {
             self.bytes.push(self.pending.to_le_bytes()[0]);
         }
-        self.bytes.extend([0; PADDING_BYTES]);
         self.bytes
     }
 }
@@ -61,6 +67,22 @@ impl<'a> BitReader<'a> {
         Some(u64::from_le_bytes(*word) >> (self.bit & 7))
     }
 
+    /// The next bits, zeros after the last one, for bytes without padding; `None` where bits were
+    /// read that are not there.
+    #[inline(always)]
+    pub(in crate::textrace) fn peek_unpadded(&self) -> Option<u64> {
+        self.peek().or_else(|| self.peek_tail())
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn peek_tail(&self) -> Option<u64> {
+        let mut word = [0; 8];
+        let left = self.bytes.get(self.bit >> 3..)?;
+        word.iter_mut().zip(left).for_each(|(to, from)| *to = *from);
+        (self.bit <= self.bytes.len() * 8).then(|| u64::from_le_bytes(word) >> (self.bit & 7))
+    }
+
     #[inline(always)]
     pub(in crate::textrace) fn skip(&mut self, count: u32) {
         self.bit += count as usize;
@@ -74,6 +96,11 @@ impl<'a> BitReader<'a> {
         } else {
             byte >> (self.bit & 7)
         }
+    }
+
+    /// Bits were read that are not there.
+    pub(in crate::textrace) fn overrun(&self) -> bool {
+        self.bit > self.bytes.len() * 8
     }
 
     /// The bytes that no read bit lies in.

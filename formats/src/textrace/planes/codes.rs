@@ -88,10 +88,18 @@ pub(super) struct Codes {
     pub correction: [Code; 4],
     /// Level of the correction, by the records of the run.
     pub level: [Code; 4],
+    /// Highest bit of the step to a run's primitive; and whether the draw is another.
+    pub header: Code,
+    /// Highest bit of a run's records.
+    pub count: Code,
+    /// Highest bit of how far back a first quad's parent is.
+    pub parent: Code,
+    /// Where a run starts, against where the last one did.
+    pub start: Code,
 }
 
 /// Number of codes.
-pub(super) const CODES: usize = 5 + 4 + 4 + 1 + 4 + 4;
+pub(super) const CODES: usize = 5 + 4 + 4 + 1 + 4 + 4 + 4;
 
 static ALL: LazyLock<Codes> = LazyLock::new(|| Codes::new(&LENGTHS));
 
@@ -113,6 +121,10 @@ impl Codes {
             later: next(),
             correction: from_fn(|_| next()),
             level: from_fn(|_| next()),
+            header: next(),
+            count: next(),
+            parent: next(),
+            start: next(),
         }
     }
 }

@@ -2,13 +2,14 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::codes::{Code, Codes};
+use super::mode::{Departure, Mode};
 use super::plane::{Plane, Quad};
-use super::residual::{Pair, WIDE, class_bits, noise, small, sum, unfold};
+use super::residual::{Pair, WIDE, add, class_bits, noise, small, sum, unfold};
 use super::state::State;
-use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS};
+use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS, STEPS};
 use crate::textrace::bits::BitReader;
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile};
-use crate::varint::low_u32;
+use crate::varint::{low_u32, unzigzag};
 
 /// What was expected where the bits went wrong.
 pub(super) type Outcome<T> = Result<T, &'static str>;
@@ -41,12 +42,13 @@ impl<'a> Decoder<'a> {
         let mut draw = 0;
         let mut first = 0u32;
         for _ in 0..runs {
-            let primitive = next_primitive + self.gamma()? - 1;
+            let (step, draw_changed) = self.header()?;
+            let primitive = next_primitive + step - 1;
             let primitive = u32::try_from(primitive).map_err(|_| "a primitive below 2^32")?;
-            if self.take(1)? == 1 {
+            if draw_changed {
                 draw = u32::try_from(self.gamma()? - 1).map_err(|_| "a draw below 2^32")?;
             }
-            let count = u32::try_from(self.gamma()?).unwrap_or(u32::MAX);
+            let count = u32::try_from(self.number(&self.codes.count)?).unwrap_or(u32::MAX);
             if count > records - first {
                 return Err("a run of no more records than the index tells");
             }
@@ -67,12 +69,15 @@ impl<'a> Decoder<'a> {
         if first != records {
             return Err("runs of as many records as the index tells");
         }
+        if self.bits.overrun() {
+            return Err(SHORT);
+        }
         Ok(())
     }
 
     #[inline(always)]
     fn peek(&self) -> Outcome<u64> {
-        self.bits.peek().ok_or(SHORT)
+        self.bits.peek_unpadded().ok_or(SHORT)
     }
 
     /// A number of at most 32 bits.
@@ -81,6 +86,23 @@ impl<'a> Decoder<'a> {
         let bits = self.peek()?;
         self.bits.skip(count);
         Ok(bits & ((1 << count) - 1))
+    }
+
+    /// A number from 1 to 2^33 - 1: a code tells its highest bit.
+    #[inline]
+    fn number(&mut self, code: &Code) -> Outcome<u64> {
+        let (power, length) = code.decode(self.peek()?);
+        self.bits.skip(length);
+        Ok(1 << power | self.take(power)?)
+    }
+
+    /// The step to a run's primitive, and whether its draw is another.
+    #[inline]
+    fn header(&mut self) -> Outcome<(u64, bool)> {
+        let (symbol, length) = self.codes.header.decode(self.peek()?);
+        self.bits.skip(length);
+        let power = symbol >> 1;
+        Ok((1 << power | self.take(power)?, symbol & 1 == 1))
     }
 
     /// A number from 1 to 2^33 - 1 in Elias's gamma code.
@@ -99,7 +121,9 @@ impl<'a> Decoder<'a> {
         let (x, y) = position(morton)?;
         let quad = if self.state.has_seen(group) {
             let expected = self.state.group_mut(group).plane.predict(x, y);
-            self.residuals(group, &expected)?
+            let residual = self.residual(group)?;
+            let departure = &mut self.state.group_mut(group).departure;
+            add(&expected, &departure.read(x, y, &residual))
         } else {
             self.first(group, x, y, count)?
         };
@@ -122,12 +146,13 @@ impl<'a> Decoder<'a> {
     fn place(&mut self) -> Outcome<(u32, u8, u8)> {
         let state = &self.state;
         let follow = state.follow();
-        let mut bits = self.bits.peek().ok_or(SHORT)?;
+        let mut bits = self.bits.peek_unpadded().ok_or(SHORT)?;
         let mut used = 0;
         let mut before = state.morton;
         if state.first_of_run {
-            before = low_u32(bits & 63).wrapping_sub(1);
-            used = 6;
+            let (apart, length) = self.codes.start.decode(bits);
+            before = (state.morton_of_start ^ apart).wrapping_sub(1);
+            used = length;
         } else if follow.same_quad {
             used = 1;
             if bits & 1 == 1 {
@@ -147,16 +172,21 @@ impl<'a> Decoder<'a> {
             let morton = before.wrapping_add(low_u32(bits & 63));
             return Ok((morton, mask.to_le_bytes()[0], group.to_le_bytes()[0]));
         }
+        let mut step = 1 + symbol / MASKS;
+        if step == STEPS {
+            step = low_u32(bits >> length & 63);
+            used += 6;
+        }
         self.bits.skip(used);
-        let morton = before.wrapping_add(1 + symbol / MASKS);
+        let morton = before.wrapping_add(step);
         let mask = (1 + symbol % MASKS).to_le_bytes()[0];
         Ok((morton, state.swap_mask(morton, mask), follow.group))
     }
 
-    /// What a plane leaves over, added to what it says.
+    /// What a plane leaves over.
     #[inline(always)]
-    fn residuals(&mut self, group: u8, expected: &Quad) -> Outcome<Quad> {
-        let mut bits = self.bits.peek().ok_or(SHORT)?;
+    fn residual(&mut self, group: u8) -> Outcome<Quad> {
+        let mut bits = self.bits.peek_unpadded().ok_or(SHORT)?;
         let known = self.state.group_mut(group);
         let code = self.codes.sizes.get(known.noise).ok_or(SHORT)?;
         let (mut classes, mut used) = code.decode(bits);
@@ -167,11 +197,10 @@ impl<'a> Decoder<'a> {
             used += 8;
         }
         known.noise = noise(classes);
-        let [uv, dx, dy, cross] = *expected;
         // A class of 3 is two set bits side by side.
         if classes & classes >> 1 & 0x55 != 0 {
             self.bits.skip(used);
-            return self.wide(classes, expected);
+            return self.wide(classes);
         }
         let mut next = |class: u32| {
             let pair = small(class & 3, bits);
@@ -180,34 +209,28 @@ impl<'a> Decoder<'a> {
             used += width;
             pair
         };
-        let quad = [
-            sum(dx, next(classes)),
-            sum(dy, next(classes >> 2)),
-            sum(cross, next(classes >> 4)),
-            sum(uv, next(classes >> 6)),
-        ];
+        let dx = next(classes);
+        let dy = next(classes >> 2);
+        let cross = next(classes >> 4);
+        let uv = next(classes >> 6);
         self.bits.skip(used);
-        let [dx, dy, cross, uv] = quad;
         Ok([uv, dx, dy, cross])
     }
 
     /// Residuals one of which is wide at least.
-    fn wide(&mut self, classes: u32, expected: &Quad) -> Outcome<Quad> {
-        let [uv, dx, dy, cross] = *expected;
-        let mut next = |class: u32, expected: Pair| -> Outcome<Pair> {
+    fn wide(&mut self, classes: u32) -> Outcome<Quad> {
+        let mut next = |class: u32| -> Outcome<Pair> {
             let class = class & 3;
-            let pair = if class == WIDE {
-                self.pair(&self.codes.later)?
-            } else {
-                let bits = self.take(class_bits(class))?;
-                small(class, bits)
-            };
-            Ok(sum(expected, pair))
+            if class == WIDE {
+                return self.pair(&self.codes.later);
+            }
+            let bits = self.take(class_bits(class))?;
+            Ok(small(class, bits))
         };
-        let dx = next(classes, dx)?;
-        let dy = next(classes >> 2, dy)?;
-        let cross = next(classes >> 4, cross)?;
-        Ok([next(classes >> 6, uv)?, dx, dy, cross])
+        let dx = next(classes)?;
+        let dy = next(classes >> 2)?;
+        let cross = next(classes >> 4)?;
+        Ok([next(classes >> 6)?, dx, dy, cross])
     }
 
     /// A pair whose width a code tells.
@@ -219,22 +242,40 @@ impl<'a> Decoder<'a> {
         Ok([unfold(self.take(width)?), unfold(self.take(width)?)])
     }
 
+    /// A pair whose width a code tells as the difference from another, zigzag; and its width.
+    #[inline]
+    fn pair_after(&mut self, code: &Code, before: u32) -> Outcome<(u32, Pair)> {
+        let bits = self.peek()?;
+        let (symbol, length) = code.decode(bits);
+        let width = i64::from(before) + unzigzag(symbol.into());
+        let width = u32::try_from(width).ok().filter(|width| *width <= 32);
+        let width = width.ok_or("a width of at most 32 bits")?;
+        self.bits.skip(length);
+        let pair = [unfold(self.take(width)?), unfold(self.take(width)?)];
+        Ok((width, pair))
+    }
+
     /// The first quad of a run in a group, and its plane.
     #[inline(never)]
     fn first(&mut self, group: u8, x: u8, y: u8, count: u32) -> Outcome<Quad> {
-        let back = usize::try_from(self.gamma()? - 1).unwrap_or(usize::MAX);
+        let back = self.number(&self.codes.parent)? - 1;
+        let back = usize::try_from(back).unwrap_or(usize::MAX);
         let parent = self.state.parent(group, back);
         let parent = parent.ok_or("an earlier run of the group")?;
         let expected = self.state.expect(&parent, x, y);
         let [dx_code, dy_code, cross_code, uv_code] = &self.codes.first;
         let [dx, dy] = expected.slopes();
-        let dx = sum(dx, self.pair(dx_code)?);
-        let dy = sum(dy, self.pair(dy_code)?);
-        let cross = sum(expected.cross(dx, dy), self.pair(cross_code)?);
-        let uv = sum(expected.uv(), self.pair(uv_code)?);
+        let (width, left) = self.pair_after(dx_code, 0)?;
+        let dx = sum(dx, left);
+        let (width, left) = self.pair_after(dy_code, width)?;
+        let dy = sum(dy, left);
+        let (width, left) = self.pair_after(cross_code, width)?;
+        let cross = sum(expected.cross(dx, dy), left);
+        let (_, left) = self.pair_after(uv_code, width)?;
+        let uv = sum(expected.uv(), left);
         let quad = [uv, dx, dy, cross];
         let tilt = self.state.tilt(x, y, &quad, &expected);
-        let level = self.level(count)?;
+        let (mode, level) = self.level(count)?;
         let plane = if level == 0 {
             Plane::through(x, y, &quad, tilt)
         } else {
@@ -244,20 +285,23 @@ impl<'a> Decoder<'a> {
             }
             Plane::corrected(x, y, &quad, tilt, level, &by)
         };
+        let departure = Departure::start(mode, x, y);
         self.state
-            .start_plane(group, plane, super::first_noise(level));
+            .start_plane(group, plane, super::first_noise(level), departure);
         Ok(quad)
     }
 
-    /// How fine the correction of a plane is; a lone record has none.
-    fn level(&mut self, count: u32) -> Outcome<u32> {
+    /// How residuals are told, and how fine the correction of the plane is; a lone record has
+    /// neither.
+    fn level(&mut self, count: u32) -> Outcome<(Mode, u32)> {
         let Some(context) = super::level_context(count) else {
-            return Ok(0);
+            return Ok((Mode::Plain, 0));
         };
         let code = self.codes.level.get(context).ok_or(SHORT)?;
-        let (level, length) = code.decode(self.peek()?);
+        let (symbol, length) = code.decode(self.peek()?);
         self.bits.skip(length);
-        Ok(level)
+        let mode = Mode::of(symbol >> 3).ok_or("one of three modes")?;
+        Ok((mode, symbol & 7))
     }
 }
 

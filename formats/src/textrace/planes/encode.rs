@@ -2,11 +2,13 @@
 
 use super::codes::{Code, Codes};
 use super::fit::fit;
+use super::mode::{Departure, Mode};
 use super::plane::{Plane, Quad, Units, quad_of};
 use super::residual::{WIDE, class_bits, classify, difference, fold, noise, width};
 use super::state::{Expected, State};
 use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS, STEPS, first_noise, level_context};
 use crate::textrace::bits::BitWriter;
+use crate::varint::{low_u32, zigzag};
 use crate::textrace::{QuadRecord, Tile, quad_morton};
 
 /// Most earlier runs that a first quad is compared with. More would be smaller by little and
@@ -47,13 +49,16 @@ pub(super) fn tile(tile: &Tile, codes: &Codes, sink: &mut impl Sink) {
     let mut draw = 0;
     let mut records = tile.records.as_slice();
     for run in &tile.runs {
-        encoder.gamma(u64::from(run.primitive) + 1 - next_primitive);
-        encoder.sink.bits(u32::from(run.draw != draw), 1);
+        let step = u64::from(run.primitive) + 1 - next_primitive;
+        let changed = u32::from(run.draw != draw);
+        let header = step.ilog2() << 1 | changed;
+        encoder.sink.symbol(&codes.header, header, 0);
+        encoder.below_power(step);
         if run.draw != draw {
             encoder.gamma(u64::from(run.draw) + 1);
             draw = run.draw;
         }
-        encoder.gamma(run.count.into());
+        encoder.number(&codes.count, run.count.into());
         encoder.state.start_run(run);
         let (of_run, rest) = records.split_at(run.count as usize);
         for at in 0..of_run.len() {
@@ -73,10 +78,21 @@ struct Encoder<'a, S> {
 impl<S: Sink> Encoder<'_, S> {
     /// A number from 1 on in Elias's gamma code.
     fn gamma(&mut self, number: u64) {
-        let zeros = number.ilog2();
-        self.sink.bits(0, zeros);
+        self.sink.bits(0, number.ilog2());
         self.sink.bits(1, 1);
-        self.sink.bits((number - (1 << zeros)) as u32, zeros);
+        self.below_power(number);
+    }
+
+    /// A number from 1 on: a code tells its highest bit.
+    fn number(&mut self, code: &Code, number: u64) {
+        self.sink.symbol(code, number.ilog2(), 0);
+        self.below_power(number);
+    }
+
+    /// The bits of a number below its highest one.
+    fn below_power(&mut self, number: u64) {
+        let power = number.ilog2();
+        self.sink.bits((number - (1 << power)) as u32, power);
     }
 
     /// The first of some records of a run of `count`.
@@ -87,7 +103,10 @@ impl<S: Sink> Encoder<'_, S> {
         if self.state.has_seen(record.group) {
             let expected = self.state.group_mut(record.group).plane;
             let expected = expected.predict(record.x, record.y);
-            self.residuals(record.group, &difference(&quad_of(record), &expected));
+            let left = difference(&quad_of(record), &expected);
+            let departure = &mut self.state.group_mut(record.group).departure;
+            let residual = departure.write(record.x, record.y, &left);
+            self.residuals(record.group, &residual);
         } else {
             self.first(left, count);
         }
@@ -99,7 +118,8 @@ impl<S: Sink> Encoder<'_, S> {
         let follow = state.follow();
         let mut step = morton.wrapping_sub(state.morton);
         if state.first_of_run {
-            self.sink.bits(morton, 6);
+            let apart = morton ^ state.morton_of_start;
+            self.sink.symbol(&self.codes.start, apart, 0);
             step = 1;
         } else if follow.same_quad {
             let same =
@@ -111,14 +131,17 @@ impl<S: Sink> Encoder<'_, S> {
         }
         let code = &self.codes.place[state.place_context()];
         let swapped = state.swap_mask(morton, record.mask);
-        let listed = record.group == follow.group && (1..=STEPS).contains(&step);
+        let listed = record.group == follow.group && step > 0;
         let symbol = if listed {
-            (step - 1) * MASKS + u32::from(swapped) - 1
+            (step.min(STEPS) - 1) * MASKS + u32::from(swapped) - 1
         } else {
             ESCAPE_PLACE
         };
-        if !self.sink.symbol(code, symbol, ESCAPE_PLACE) || symbol == ESCAPE_PLACE {
+        let known = self.sink.symbol(code, symbol, ESCAPE_PLACE) && symbol != ESCAPE_PLACE;
+        if !known || step >= STEPS {
             self.sink.bits(step, 6);
+        }
+        if !known {
             self.sink.bits(record.mask.into(), 4);
             self.sink.bits(record.group.into(), 4);
         }
@@ -144,6 +167,10 @@ impl<S: Sink> Encoder<'_, S> {
     fn pair(&mut self, code: &Code, pair: [i32; 2]) {
         let width = width(pair);
         self.sink.symbol(code, width, 0);
+        self.numbers(pair, width);
+    }
+
+    fn numbers(&mut self, pair: [i32; 2], width: u32) {
         for number in pair {
             self.sink.bits(fold(number), width);
         }
@@ -158,14 +185,19 @@ impl<S: Sink> Encoder<'_, S> {
         let parents = candidates.filter_map(|back| {
             let expected = self.state.expect(&self.state.parent(group, back)?, x, y);
             let pairs = first_pairs(&quad, &expected);
-            let bits = gamma_bits(back as u64 + 1) + self.pairs_bits(&self.codes.first, &pairs);
+            let power = (back as u64 + 1).ilog2();
+            let bits = self.codes.parent.length(power, 0) + power + self.first_bits(&pairs);
             Some((bits, back, expected, pairs))
         });
         let best = parents.min_by_key(|(bits, ..)| *bits);
         let (_, back, expected, pairs) = best.expect("there is always the plane of zeros");
-        self.gamma(back as u64 + 1);
+        self.number(&self.codes.parent, back as u64 + 1);
+        let mut before = 0;
         for (code, pair) in self.codes.first.iter().zip(pairs) {
-            self.pair(code, pair);
+            let width = width(pair);
+            self.sink.symbol(code, width_symbol(before, width), 0);
+            self.numbers(pair, width);
+            before = width;
         }
         let tilt = self.state.tilt(x, y, &quad, &expected);
         let plain = Plane::through(x, y, &quad, tilt);
@@ -176,16 +208,19 @@ impl<S: Sink> Encoder<'_, S> {
             .copied()
             .collect();
         let Some(context) = level_context(count) else {
-            return self.state.start_plane(group, plain, first_noise(0));
+            let departure = Departure::start(Mode::Plain, x, y);
+            return self.state.start_plane(group, plain, first_noise(0), departure);
         };
-        let (level, by, plane) = self.best_plane(&quad, &plain, &left[0], &others, context);
-        self.sink.symbol(&self.codes.level[context], level, 0);
+        let told = self.best_plane(&quad, &plain, &left[0], &others, context);
+        let (mode, level, by, plane) = told;
+        self.sink.symbol(&self.codes.level[context], (mode as u32) << 3 | level, 0);
         if level > 0 {
             for (code, pair) in self.codes.correction.iter().zip(by) {
                 self.pair(code, pair);
             }
         }
-        self.state.start_plane(group, plane, first_noise(level));
+        let departure = Departure::start(mode, x, y);
+        self.state.start_plane(group, plane, first_noise(level), departure);
     }
 
     /// Level, correction and plane with which a run's other records of a group take fewest bits.
@@ -196,12 +231,25 @@ impl<S: Sink> Encoder<'_, S> {
         first: &QuadRecord,
         others: &[QuadRecord],
         context: usize,
-    ) -> (u32, Quad, Plane) {
+    ) -> (Mode, u32, Quad, Plane) {
         let code = &self.codes.level[context];
-        let mut best = (0, Quad::default(), *plain);
-        let mut least = code.length(0, 0) + self.run_bits(plain, others, first_noise(0));
+        let mut best = (Mode::Plain, 0, Quad::default(), *plain);
+        let mut least = u32::MAX;
+        let mut try_plane = |level: u32, by: Quad, plane: Plane| {
+            for mode in Mode::ALL {
+                let mut bits = code.length((mode as u32) << 3 | level, 0);
+                if level > 0 {
+                    bits += self.pairs_bits(&self.codes.correction, &by);
+                }
+                bits += self.run_bits(&plane, Departure::start(mode, first.x, first.y), others, first_noise(level));
+                if bits < least {
+                    (least, best) = (bits, (mode, level, by, plane));
+                }
+            }
+            least
+        };
         // A correction takes some 20 bits.
-        if least < 24 {
+        if try_plane(0, Quad::default(), *plain) < 24 {
             return best;
         }
         let Some(fitted) = fit(plain, quad, others) else {
@@ -213,21 +261,17 @@ impl<S: Sink> Encoder<'_, S> {
         for level in likely.saturating_sub(1).max(1)..=(likely + 2).min(7) {
             let by = correction(quad, plain, &fitted, level);
             let plane = Plane::corrected(first.x, first.y, quad, plain.tilt, level, &by);
-            let bits = code.length(level, 0)
-                + self.pairs_bits(&self.codes.correction, &by)
-                + self.run_bits(&plane, others, first_noise(level));
-            if bits < least {
-                (least, best) = (bits, (level, by, plane));
-            }
+            try_plane(level, by, plane);
         }
         best
     }
 
     /// Bits of some records' residuals.
-    fn run_bits(&self, plane: &Plane, records: &[QuadRecord], mut at: usize) -> u32 {
+    fn run_bits(&self, plane: &Plane, mut departure: Departure, records: &[QuadRecord], mut at: usize) -> u32 {
         let mut bits = 0;
         for record in records {
             let left = difference(&quad_of(record), &plane.predict(record.x, record.y));
+            let left = departure.write(record.x, record.y, &left);
             let (classes, pairs) = classes(&left);
             let code = &self.codes.sizes[at];
             bits += code.length(classes, code.length(ESCAPE_SIZES, 0) + 8);
@@ -244,6 +288,17 @@ impl<S: Sink> Encoder<'_, S> {
         bits
     }
 
+    fn first_bits(&self, pairs: &[[i32; 2]; 4]) -> u32 {
+        let mut before = 0;
+        let of = |(code, pair): (&Code, &[i32; 2])| {
+            let width = width(*pair);
+            let symbol = width_symbol(before, width);
+            before = width;
+            code.length(symbol, 0) + 2 * width
+        };
+        self.codes.first.iter().zip(pairs).map(of).sum()
+    }
+
     fn pairs_bits(&self, codes: &[Code; 4], pairs: &[[i32; 2]; 4]) -> u32 {
         let of = |(code, pair): (&Code, &[i32; 2])| {
             let width = width(*pair);
@@ -253,8 +308,9 @@ impl<S: Sink> Encoder<'_, S> {
     }
 }
 
-fn gamma_bits(number: u64) -> u32 {
-    2 * number.ilog2() + 1
+/// The symbol of a width after another.
+fn width_symbol(before: u32, width: u32) -> u32 {
+    low_u32(zigzag(i64::from(width) - i64::from(before)))
 }
 
 /// What is told of a first quad: dx, dy, cross and uv less what is expected.

@@ -13,12 +13,13 @@ mod decode;
 mod encode;
 mod fit;
 mod lengths;
+mod mode;
 mod plane;
 mod residual;
 mod state;
 
 use super::Tile;
-use super::bits::{BitWriter, PADDING_BYTES};
+use super::bits::BitWriter;
 use crate::parse::{Fault, Parsed, ensure};
 use codes::Codes;
 use decode::Decoder;
@@ -28,8 +29,9 @@ pub(super) const MIN_RECORD_BITS: u32 = 2;
 
 /// Masks of a quad.
 const MASKS: u32 = 15;
-/// Steps along the curve that have symbols, 1 to this.
-const STEPS: u32 = 6;
+/// Steps along the curve that have symbols, 1 to this; the last symbol stands for all from here on,
+/// and the step follows.
+const STEPS: u32 = 7;
 /// The symbol after which step, mask and group follow as numbers.
 const ESCAPE_PLACE: u32 = STEPS * MASKS;
 /// The symbol after which the classes follow as a number.
@@ -55,7 +57,7 @@ pub(super) fn encode(tile: &Tile) -> Vec<u8> {
     let bytes = Vec::with_capacity(tile.records.len() * 4 + tile.runs.len() * 16 + 16);
     let mut bits = BitWriter::new(bytes);
     encode::tile(tile, Codes::get(), &mut bits);
-    bits.finish()
+    bits.finish_unpadded()
 }
 
 pub(super) fn decode<'a>(
@@ -80,9 +82,9 @@ pub(super) fn decode<'a>(
     )?;
     ensure(
         rest,
-        rest.len() == PADDING_BYTES && rest.iter().all(|byte| *byte == 0),
-        || format!("{PADDING_BYTES} zero bytes after the last record"),
-        format_args!("{} bytes", rest.len()),
+        rest.is_empty(),
+        || "no bytes after the last record".to_owned(),
+        format_args!("{}", rest.len()),
     )?;
     Ok((&[], ()))
 }

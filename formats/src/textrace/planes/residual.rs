@@ -114,6 +114,13 @@ pub(super) fn difference(quad: &Quad, expected: &Quad) -> Quad {
     left
 }
 
+/// `quad + by`, wrapping.
+#[inline(always)]
+pub(super) fn add(quad: &Quad, by: &Quad) -> Quad {
+    let ([a, b, c, d], [e, f, g, h]) = (*quad, *by);
+    [sum(a, e), sum(b, f), sum(c, g), sum(d, h)]
+}
+
 #[inline(always)]
 pub(super) fn sum([a, b]: Pair, [c, d]: Pair) -> Pair {
     [a.wrapping_add(c), b.wrapping_add(d)]

@@ -1,6 +1,7 @@
 //! What is remembered from record to record of a tile, in both directions alike.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
+use super::mode::Departure;
 use super::plane::{Plane, Quad, cross, tilt_of};
 use crate::textrace::PrimitiveRun;
 
@@ -24,6 +25,8 @@ pub(super) struct Group {
     pub plane: Plane,
     /// How large the last residuals were: which code tells of the next.
     pub noise: usize,
+    /// How far the run's last quad departed from the plane.
+    pub departure: Departure,
 }
 
 /// What is remembered.
@@ -37,6 +40,8 @@ pub(super) struct State {
     /// The run's last record: place on the Morton curve and mask; before the first one 0 and 0.
     pub morton: u32,
     pub mask: u8,
+    /// Place of the first record of the run, or of the last one's before its first record.
+    pub morton_of_start: u32,
     /// The last record came right after the one before it on the curve.
     stepped_one: bool,
     pub first_of_run: bool,
@@ -56,6 +61,7 @@ impl State {
             group: 0,
             morton: 0,
             mask: 0,
+            morton_of_start: 0,
             stepped_one: false,
             first_of_run: true,
             seen: 0,
@@ -133,6 +139,9 @@ impl State {
         if !same_quad {
             self.stepped_one = morton == self.morton + 1;
         }
+        if self.first_of_run {
+            self.morton_of_start = morton;
+        }
         self.morton = morton;
         self.mask = mask;
         self.group = group;
@@ -180,13 +189,14 @@ impl State {
     }
 
     /// Takes in the plane of a group's first quad of the run.
-    pub fn start_plane(&mut self, group: u8, plane: Plane, noise: usize) {
+    pub fn start_plane(&mut self, group: u8, plane: Plane, noise: usize, departure: Departure) {
         self.run_plane = Some(plane);
         self.seen |= 1 << (group & 15);
         let group = self.group_mut(group);
         group.planes.push(plane);
         group.plane = plane;
         group.noise = noise;
+        group.departure = departure;
     }
 }
 

@@ -72,13 +72,13 @@ fn lengths(counts: &[u64]) -> Vec<u32> {
 #[ignore = "a tool: needs traces"]
 fn train() {
     let paths = std::env::var("TEXTRACES").expect("TEXTRACES names traces");
-    let every: usize = std::env::var("EVERY").map_or(5, |every| every.parse().unwrap());
+    let every: usize = std::env::var("EVERY").map_or(7, |every| every.parse().unwrap());
     let traces: Vec<Textrace> = paths
         .split(':')
         .map(|path| Textrace::open(Path::new(path)).unwrap())
         .collect();
     let mut texts: Vec<String> = LENGTHS.iter().map(|l| (*l).to_owned()).collect();
-    for round in 0..4 {
+    for _ in 0..3 {
         let codes = Codes::new(texts.as_slice().try_into().unwrap());
         let mut sums = vec![];
         for trace in &traces {
@@ -90,7 +90,7 @@ fn train() {
             let mut tile = Tile::default();
             let mut records = 0;
             for (pass, info) in trace.tables().passes.iter().enumerate() {
-                for index in (round..info.tile_count() as usize).step_by(every) {
+                for index in (0..info.tile_count() as usize).step_by(every) {
                     trace.decode_tile(pass, index, &mut tile).unwrap();
                     records += tile.records.len();
                     counts.last = CODES - 1;
@@ -104,7 +104,7 @@ fn train() {
                 .collect();
             let bits: u64 = counts.bits.as_flattened().iter().sum();
             println!(
-                "round {round}: {records} records, {:.3} bytes each; {}",
+                "{records} records, {:.3} bytes each; {}",
                 bits as f64 / 8.0 / records as f64,
                 by_code.join(" ")
             );
