@@ -13,10 +13,8 @@ mod records;
 mod runs;
 
 use super::Tile;
+use super::bits::{BitReader, BitWriter, PADDING_BYTES};
 use crate::parse::{Fault, Parsed, ensure};
-use super::bits::{BitReader, BitWriter};
-
-pub use super::bits::PADDING_BYTES;
 
 /// Fewest bits that a record takes, which bounds the records that a tile's bytes can hold.
 pub const MIN_RECORD_BITS: u32 = records::CONTROL_BITS;

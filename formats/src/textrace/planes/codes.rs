@@ -6,7 +6,7 @@ use std::array::from_fn;
 use std::sync::LazyLock;
 
 /// Longest code.
-pub(super) const MOST_BITS: u32 = 12;
+pub(super) const MOST_BITS: u32 = 11;
 const ENTRIES: usize = 1 << MOST_BITS;
 
 /// A prefix code, for both directions.
@@ -77,9 +77,9 @@ impl Code {
 /// All codes.
 pub(super) struct Codes {
     /// Step and mask, by [`super::state::State::place_context`].
-    pub place: [Code; 5],
+    pub place: [Code; 17],
     /// Classes of a quad's residuals, by those of the group's last quad.
-    pub sizes: [Code; 4],
+    pub sizes: [Code; 6],
     /// Widths of a first quad's dx, dy, cross and uv.
     pub first: [Code; 4],
     /// Widths of what no class holds.
@@ -99,7 +99,7 @@ pub(super) struct Codes {
 }
 
 /// Number of codes.
-pub(super) const CODES: usize = 5 + 4 + 4 + 1 + 4 + 4 + 4;
+pub(super) const CODES: usize = 17 + 6 + 4 + 1 + 4 + 4 + 4;
 
 static ALL: LazyLock<Codes> = LazyLock::new(|| Codes::new(&LENGTHS));
 

@@ -7,7 +7,7 @@ use super::plane::{Plane, Quad};
 use super::residual::{Pair, WIDE, add, class_bits, noise, small, sum, unfold};
 use super::state::State;
 use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS, STEPS};
-use crate::textrace::bits::BitReader;
+use crate::textrace::bits::{BitReader, PEEK_BITS};
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile};
 use crate::varint::{low_u32, unzigzag};
 
@@ -238,7 +238,19 @@ impl<'a> Decoder<'a> {
     fn pair(&mut self, code: &Code) -> Outcome<Pair> {
         let bits = self.peek()?;
         let (width, length) = code.decode(bits);
-        self.bits.skip(length);
+        self.numbers(bits, length, width)
+    }
+
+    /// Two numbers of a width, after `used` of the next bits.
+    #[inline(always)]
+    fn numbers(&mut self, bits: u64, used: u32, width: u32) -> Outcome<Pair> {
+        let all = used + 2 * width;
+        if all <= PEEK_BITS {
+            self.bits.skip(all);
+            let (bits, low) = (bits >> used, (1 << width) - 1);
+            return Ok([unfold(bits & low), unfold(bits >> width & low)]);
+        }
+        self.bits.skip(used);
         Ok([unfold(self.take(width)?), unfold(self.take(width)?)])
     }
 
@@ -250,9 +262,7 @@ impl<'a> Decoder<'a> {
         let width = i64::from(before) + unzigzag(symbol.into());
         let width = u32::try_from(width).ok().filter(|width| *width <= 32);
         let width = width.ok_or("a width of at most 32 bits")?;
-        self.bits.skip(length);
-        let pair = [unfold(self.take(width)?), unfold(self.take(width)?)];
-        Ok((width, pair))
+        Ok((width, self.numbers(bits, length, width)?))
     }
 
     /// The first quad of a run in a group, and its plane.

@@ -8,8 +8,8 @@ use super::residual::{WIDE, class_bits, classify, difference, fold, noise, width
 use super::state::{Expected, State};
 use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS, STEPS, first_noise, level_context};
 use crate::textrace::bits::BitWriter;
-use crate::varint::{low_u32, zigzag};
 use crate::textrace::{QuadRecord, Tile, quad_morton};
+use crate::varint::{low_u32, zigzag};
 
 /// Most earlier runs that a first quad is compared with. More would be smaller by little and
 /// take longer.
@@ -209,18 +209,22 @@ impl<S: Sink> Encoder<'_, S> {
             .collect();
         let Some(context) = level_context(count) else {
             let departure = Departure::start(Mode::Plain, x, y);
-            return self.state.start_plane(group, plain, first_noise(0), departure);
+            return self
+                .state
+                .start_plane(group, plain, first_noise(0), departure);
         };
         let told = self.best_plane(&quad, &plain, &left[0], &others, context);
         let (mode, level, by, plane) = told;
-        self.sink.symbol(&self.codes.level[context], (mode as u32) << 3 | level, 0);
+        self.sink
+            .symbol(&self.codes.level[context], (mode as u32) << 3 | level, 0);
         if level > 0 {
             for (code, pair) in self.codes.correction.iter().zip(by) {
                 self.pair(code, pair);
             }
         }
         let departure = Departure::start(mode, x, y);
-        self.state.start_plane(group, plane, first_noise(level), departure);
+        self.state
+            .start_plane(group, plane, first_noise(level), departure);
     }
 
     /// Level, correction and plane with which a run's other records of a group take fewest bits.
@@ -241,7 +245,12 @@ impl<S: Sink> Encoder<'_, S> {
                 if level > 0 {
                     bits += self.pairs_bits(&self.codes.correction, &by);
                 }
-                bits += self.run_bits(&plane, Departure::start(mode, first.x, first.y), others, first_noise(level));
+                bits += self.run_bits(
+                    &plane,
+                    Departure::start(mode, first.x, first.y),
+                    others,
+                    first_noise(level),
+                );
                 if bits < least {
                     (least, best) = (bits, (mode, level, by, plane));
                 }
@@ -267,7 +276,13 @@ impl<S: Sink> Encoder<'_, S> {
     }
 
     /// Bits of some records' residuals.
-    fn run_bits(&self, plane: &Plane, mut departure: Departure, records: &[QuadRecord], mut at: usize) -> u32 {
+    fn run_bits(
+        &self,
+        plane: &Plane,
+        mut departure: Departure,
+        records: &[QuadRecord],
+        mut at: usize,
+    ) -> u32 {
         let mut bits = 0;
         for record in records {
             let left = difference(&quad_of(record), &plane.predict(record.x, record.y));

@@ -89,7 +89,11 @@ impl Equations {
         let slopes = plane.slopes.as_flattened();
         let steepest = slopes.iter().fold(1.0f64, |most, s| most.max(s.abs()));
         for at in 0..UNKNOWNS {
-            self.0[at][at] += if at < 6 { 1e-6 } else { 1e-8 * steepest * steepest };
+            self.0[at][at] += if at < 6 {
+                1e-6
+            } else {
+                1e-8 * steepest * steepest
+            };
         }
         for at in 0..UNKNOWNS {
             let pivot = (at..UNKNOWNS).max_by(|a, b| {
@@ -104,11 +108,15 @@ impl Equations {
             for (number, other) in self.0.iter_mut().enumerate() {
                 let factor = other[at] / row[at];
                 if number != at {
-                    other.iter_mut().zip(row).for_each(|(to, by)| *to -= factor * by);
+                    other
+                        .iter_mut()
+                        .zip(row)
+                        .for_each(|(to, by)| *to -= factor * by);
                 }
             }
         }
-        let solution: [f64; UNKNOWNS] = std::array::from_fn(|at| self.0[at][UNKNOWNS] / self.0[at][at]);
+        let solution: [f64; UNKNOWNS] =
+            std::array::from_fn(|at| self.0[at][UNKNOWNS] / self.0[at][at]);
         solution.iter().all(|v| v.is_finite()).then_some(solution)
     }
 }

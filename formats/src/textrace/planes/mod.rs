@@ -50,7 +50,7 @@ fn level_context(records: u32) -> Option<usize> {
 
 /// Which code tells the sizes of a run's second quad: the third where the plane is uncorrected.
 fn first_noise(level: u32) -> usize {
-    if level == 0 { 2 } else { 1 }
+    if level == 0 { 3 } else { 2 }
 }
 
 pub(super) fn encode(tile: &Tile) -> Vec<u8> {
@@ -89,5 +89,7 @@ pub(super) fn decode<'a>(
     Ok((&[], ()))
 }
 
+#[cfg(test)]
+mod tests;
 #[cfg(test)]
 mod train;

@@ -95,7 +95,10 @@ impl Departure {
         let right = i32::from(x) - self.x;
         let down = i32::from(y) - self.y;
         let times = |n: i32, pair: Pair| pair.map(|d| d.wrapping_mul(n));
-        sum(times(right, sum(last_dx, dx)), times(down, sum(last_dy, dy)))
+        sum(
+            times(right, sum(last_dx, dx)),
+            times(down, sum(last_dy, dy)),
+        )
     }
 
     #[inline(always)]

@@ -18,8 +18,8 @@ pub(super) fn quad_of(record: &QuadRecord) -> Quad {
 /// w is taken as at least this, so that nothing becomes infinite.
 const LEAST_W: f64 = 1.0 / 1024.0;
 /// Weight of the expected slope of w against what a quad's cross tells: the square of about half a
-/// fixed-point step in units of the slope's usual error, 2^-11 a pixel.
-const PRIOR: f64 = (1u64 << 20) as f64;
+/// fixed-point step in units of the slope's usual error, 2^-9 a pixel.
+const PRIOR: f64 = 65536.0;
 
 /// A plane in perspective around the top-left lane of a quad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,49 +42,27 @@ impl Plane {
         [f64::from(2 * x) - left, f64::from(2 * y) - top]
     }
 
-    #[inline(always)]
-    fn w(&self, right: f64, down: f64) -> f64 {
-        let [p, q] = self.tilt;
-        // Not `f64::max`, whose branches on NaN cost time; nothing here can be NaN.
-        let w = 1.0 + p * right + q * down;
-        if w > LEAST_W { w } else { LEAST_W }
-    }
-
     /// What the plane says of a quad.
     #[inline(always)]
     pub fn predict(&self, x: u8, y: u8) -> Quad {
         let [right, down] = self.offset(x, y);
-        let places = [
-            [right, down],
-            [right + 1.0, down],
-            [right, down + 1.0],
-            [right + 1.0, down + 1.0],
-        ];
-        let scale = places.map(|[right, down]| 1.0 / self.w(right, down));
-        let [[ru, rv], [du, dv]] = self.slopes;
-        let axis = |start: f64, r: f64, d: f64| -> [i32; 4] {
-            let [[r0, d0], [r1, d1], [r2, d2], [r3, d3]] = places;
-            let [s0, s1, s2, s3] = scale;
-            let top_left = start + (r * r0 + d * d0) * s0;
-            let top_right = start + (r * r1 + d * d1) * s1;
-            let bottom_left = start + (r * r2 + d * d2) * s2;
-            let bottom_right = start + (r * r3 + d * d3) * s3;
-            let dx = top_right - top_left;
-            [
-                round(top_left),
-                round(dx),
-                round(bottom_left - top_left),
-                round((bottom_right - bottom_left) - dx),
-            ]
-        };
-        let [u0, v0] = self.start;
-        let ([uv_u, dx_u, dy_u, cross_u], [uv_v, dx_v, dy_v, cross_v]) =
-            (axis(u0, ru, du), axis(v0, rv, dv));
+        let [p, q] = self.tilt;
+        let w = 1.0 + p * right + q * down;
+        let (w_right, w_down) = (w + p, w + q);
+        let [scale, scale_right] = inverse([w, w_right]);
+        let [scale_down, scale_both] = inverse([w_down, w_right + q]);
+        let [to_right, to_down] = self.slopes;
+        let bend = plus(times(to_right, right), times(to_down, down));
+        let bend_right = plus(bend, to_right);
+        let top_left = times(bend, scale);
+        let bottom_left = times(plus(bend, to_down), scale_down);
+        let bottom_right = times(plus(bend_right, to_down), scale_both);
+        let dx = less(times(bend_right, scale_right), top_left);
         [
-            [uv_u, uv_v],
-            [dx_u, dx_v],
-            [dy_u, dy_v],
-            [cross_u, cross_v],
+            round(plus(self.start, top_left)),
+            round(dx),
+            round(less(bottom_left, top_left)),
+            round(less(less(bottom_right, bottom_left), dx)),
         ]
     }
 
@@ -92,8 +70,9 @@ impl Plane {
     #[inline]
     pub fn tilt_at(&self, x: u8, y: u8) -> [f64; 2] {
         let [right, down] = self.offset(x, y);
-        let w = self.w(right, down);
-        self.tilt.map(|slope| within_one(slope / w))
+        let [p, q] = self.tilt;
+        let w = at_least(1.0 + p * right + q * down);
+        [within_one(p / w), within_one(q / w)]
     }
 
     /// The plane through a quad's own numbers, with a slope of w.
@@ -162,11 +141,10 @@ fn power(n: u32) -> f64 {
 #[inline]
 pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f64; 2]) -> [i32; 2] {
     let [p, q] = tilt;
-    let w = 1.0 + p + q;
-    let w = if w > LEAST_W { w } else { LEAST_W };
-    let of = |dx: i32, dy: i32| round((f64::from(dx) * q + f64::from(dy) * p) / -w);
+    let w = at_least(1.0 + p + q);
+    let of = |dx: i32, dy: i32| (f64::from(dx) * q + f64::from(dy) * p) / -w;
     let ([dx_u, dx_v], [dy_u, dy_v]) = (dx, dy);
-    [of(dx_u, dy_u), of(dx_v, dy_v)]
+    round([of(dx_u, dy_u), of(dx_v, dy_v)])
 }
 
 /// The slope of w that a quad's own numbers tell, kept near an expected one: cross is
@@ -196,16 +174,43 @@ fn within_one(slope: f64) -> f64 {
     slope.clamp(-1.0, 1.0)
 }
 
-/// Nearest integer, ties to even, modulo 2^32: adding 1.5 * 2^52 leaves it in the low bits.
+/// Not `f64::max`, which minds NaN: nothing here can be NaN.
+#[inline(always)]
+fn at_least(w: f64) -> f64 {
+    if w > LEAST_W { w } else { LEAST_W }
+}
+
+#[inline(always)]
+fn inverse([a, b]: [f64; 2]) -> [f64; 2] {
+    [1.0 / at_least(a), 1.0 / at_least(b)]
+}
+
+#[inline(always)]
+fn plus([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    [a + c, b + d]
+}
+
+#[inline(always)]
+fn less([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    [a - c, b - d]
+}
+
+#[inline(always)]
+fn times([a, b]: [f64; 2], by: f64) -> [f64; 2] {
+    [a * by, b * by]
+}
+
+/// Nearest integers, ties to even, modulo 2^32: adding 1.5 * 2^52 leaves them in the low bits.
 ///
-/// Right below 2^51, where all predictions are: slopes stay below 2^33, offsets below 2^5, and
+/// Right below 2^51, where all predictions are: slopes stay below 2^34, offsets below 2^5, and
 /// w is at least 2^-10.
 #[inline(always)]
 #[allow(
     clippy::cast_possible_truncation,
     reason = "predictions wrap like the numbers that they predict"
 )]
-fn round(value: f64) -> i32 {
+fn round([u, v]: [f64; 2]) -> [i32; 2] {
     const MAGIC: f64 = 6_755_399_441_055_744.0;
-    ((value + MAGIC).to_bits() as u32).cast_signed()
+    let of = |value: f64| ((value + MAGIC).to_bits() as u32).cast_signed();
+    [of(u), of(v)]
 }

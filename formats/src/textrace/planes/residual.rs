@@ -7,14 +7,15 @@ use crate::varint::{low_u32, unzigzag, zigzag};
 /// A pair (u, v).
 pub(super) type Pair = [i32; 2];
 
-/// Bits of a pair in each class: both 0; within 1; within 2; anything else tells its width.
-pub(super) const CLASS_BITS: [u32; 4] = [0, 3, 4, 0];
+/// Bits of a pair in each class, a hexadecimal digit each from the lowest: none where both are 0;
+/// 3 within 1; 4 within 2; anything else tells its width.
+const CLASS_BITS: u32 = 0x0430;
 /// The class that tells its width.
 pub(super) const WIDE: u32 = 3;
 
 /// The pairs of the classes 0 to 2: 1, 8 and 16, each class row by row.
-const SMALL: [[i8; 2]; 25] = {
-    let mut pairs = [[0; 2]; 25];
+const SMALL: [[i8; 2]; 32] = {
+    let mut pairs = [[0; 2]; 32];
     let mut at = 0;
     let mut class = 0;
     while class <= 2 {
@@ -39,8 +40,8 @@ const SMALL: [[i8; 2]; 25] = {
     pairs
 };
 
-/// First pair of each class.
-const STARTS: [u32; 4] = [0, 1, 9, 0];
+/// First pair of each class, likewise.
+const STARTS: u32 = 0x0910;
 
 const fn abs(value: i8) -> i8 {
     if value < 0 { -value } else { value }
@@ -49,17 +50,20 @@ const fn abs(value: i8) -> i8 {
 /// The pair of a class that some bits name.
 #[inline(always)]
 pub(super) fn small(class: u32, bits: u64) -> Pair {
-    let of = |table: [u32; 4]| table.get(class as usize & 3).copied().unwrap_or_default();
-    let index = of(STARTS) + (low_u32(bits) & ((1 << of(CLASS_BITS)) - 1));
-    let pair = SMALL.get(index as usize).copied().unwrap_or_default();
-    pair.map(i32::from)
+    let index = nibble(STARTS, class) + (low_u32(bits) & ((1 << class_bits(class)) - 1));
+    let [u, v] = SMALL.get(index as usize & 31).copied().unwrap_or_default();
+    [u.into(), v.into()]
+}
+
+#[inline(always)]
+fn nibble(digits: u32, at: u32) -> u32 {
+    digits >> (4 * at) & 15
 }
 
 /// Bits of a class.
 #[inline(always)]
 pub(super) fn class_bits(class: u32) -> u32 {
-    let found = CLASS_BITS.get(class as usize & 3).copied();
-    found.unwrap_or_default()
+    nibble(CLASS_BITS, class)
 }
 
 /// Class of a pair and, unless it is wide, the bits that name it.
@@ -71,8 +75,7 @@ pub(super) fn classify([u, v]: Pair) -> (u32, u32) {
     let is = |pair: &[i8; 2]| pair.map(i32::from) == [u, v];
     let index = (0..).zip(&SMALL).find(|(_, pair)| is(pair));
     let index = index.map_or(0, |(index, _)| index);
-    let start = STARTS.get(class as usize).copied().unwrap_or_default();
-    (class, index - start)
+    (class, index - nibble(STARTS, class))
 }
 
 /// Bits that the larger of a pair needs.
@@ -97,9 +100,11 @@ pub(super) fn noise(classes: u32) -> usize {
     let sum = (classes & 3) + (classes >> 2 & 3) + (classes >> 4 & 3) + (classes >> 6 & 3);
     match sum {
         0 => 0,
-        1..=3 => 1,
-        4..=7 => 2,
-        _ => 3,
+        1 | 2 => 1,
+        3 | 4 => 2,
+        5 | 6 => 3,
+        7..=9 => 4,
+        _ => 5,
     }
 }
 

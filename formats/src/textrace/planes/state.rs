@@ -103,9 +103,10 @@ impl State {
     #[inline(always)]
     pub fn place_context(&self) -> usize {
         if self.first_of_run {
-            4
+            16
         } else {
-            usize::from(self.mask == 15) << 1 | usize::from(self.stepped_one)
+            let corner = usize::from(self.morton.to_le_bytes()[0] & 3);
+            corner << 2 | usize::from(self.mask == 15) << 1 | usize::from(self.stepped_one)
         }
     }
 
@@ -115,15 +116,9 @@ impl State {
     pub fn swap_mask(&self, morton: u32, mask: u8) -> u8 {
         let covered = self.covered.get(morton as usize & 63).copied();
         let rest = 15 & !covered.unwrap_or_default();
-        if rest == 0 {
-            mask
-        } else if mask == 15 {
-            rest
-        } else if mask == rest {
-            15
-        } else {
-            mask
-        }
+        // Without branches, which would be hard to predict.
+        let swaps = (rest != 0) & ((mask == 15) | (mask == rest));
+        mask ^ (15 ^ rest) * u8::from(swaps)
     }
 
     /// Takes in a record's place, mask and group.
@@ -137,7 +132,7 @@ impl State {
             *covered |= mask;
         }
         if !same_quad {
-            self.stepped_one = morton == self.morton + 1;
+            self.stepped_one = !self.first_of_run & (morton == self.morton + 1);
         }
         if self.first_of_run {
             self.morton_of_start = morton;
@@ -150,11 +145,7 @@ impl State {
 
     #[inline(always)]
     pub fn group_mut(&mut self, group: u8) -> &mut Group {
-        let [first, others @ ..] = &mut self.groups;
-        match usize::from(group) % GROUPS {
-            0 => first,
-            at => others.get_mut(at - 1).unwrap_or(first),
-        }
+        group_of(&mut self.groups, group)
     }
 
     /// The plane of an earlier run that a first quad continues: 0 the last one; past all, a plane
@@ -223,6 +214,16 @@ impl Expected {
         let [uv, ..] = self.quad;
         uv
     }
+}
+
+/// A group by its number, of which only the lowest four bits count.
+#[inline(always)]
+pub(super) fn group_of(groups: &mut [Group; GROUPS], group: u8) -> &mut Group {
+    #[allow(
+        clippy::indexing_slicing,
+        reason = "the index is below the array's length"
+    )]
+    &mut groups[usize::from(group) % GROUPS]
 }
 
 fn follow_themselves() -> [Follow; GROUPS] {

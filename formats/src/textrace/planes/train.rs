@@ -78,7 +78,7 @@ fn train() {
         .map(|path| Textrace::open(Path::new(path)).unwrap())
         .collect();
     let mut texts: Vec<String> = LENGTHS.iter().map(|l| (*l).to_owned()).collect();
-    for _ in 0..3 {
+    for _ in 0..4 {
         let codes = Codes::new(texts.as_slice().try_into().unwrap());
         let mut sums = vec![];
         for trace in &traces {
@@ -100,7 +100,10 @@ fn train() {
             let by_code: Vec<String> = counts
                 .bits
                 .iter()
-                .map(|b| b.map(|b| format!("{:.2}", b as f64 / records as f64)).join("+"))
+                .map(|b| {
+                    b.map(|b| format!("{:.2}", b as f64 / records as f64))
+                        .join("+")
+                })
                 .collect();
             let bits: u64 = counts.bits.as_flattened().iter().sum();
             println!(
@@ -120,8 +123,8 @@ fn train() {
                     }
                 }
                 let escape = match code {
-                    0..5 => Some(ESCAPE_PLACE as usize),
-                    5..9 => Some(ESCAPE_SIZES as usize),
+                    0..17 => Some(ESCAPE_PLACE as usize),
+                    17..23 => Some(ESCAPE_SIZES as usize),
                     _ => None,
                 };
                 let total: u64 = counts.iter().sum();
