@@ -8,6 +8,9 @@ use std::sync::LazyLock;
 /// Longest code.
 pub(super) const MOST_BITS: u32 = 11;
 const ENTRIES: usize = 1 << MOST_BITS;
+/// Codes of at most 9 bits, nearly all that occur, are looked up in tables small enough to stay in
+/// the nearest cache all together.
+const FEW_ENTRIES: usize = 1 << 9;
 
 /// A prefix code, for both directions.
 pub(super) struct Code {
@@ -15,6 +18,8 @@ pub(super) struct Code {
     pub number: usize,
     /// By the next [`MOST_BITS`] bits: symbol * 16 + length.
     by_bits: Box<[u16; ENTRIES]>,
+    /// The same by fewer bits; 0 where the code is longer.
+    by_few_bits: [u16; FEW_ENTRIES],
     /// By symbol: bits as they are written, lowest first, and their number (0: not in the code).
     by_symbol: Vec<(u32, u32)>,
 }
@@ -43,9 +48,15 @@ impl Code {
                 next += 1;
             }
         }
+        let mut by_few_bits = [0; FEW_ENTRIES];
+        for (few, of) in by_few_bits.iter_mut().zip(by_bits.iter()) {
+            // The same entry stands wherever the bits above its length differ.
+            *few = if of & 15 <= 9 { *of } else { 0 };
+        }
         Self {
             number,
             by_bits,
+            by_few_bits,
             by_symbol,
         }
     }
@@ -53,11 +64,13 @@ impl Code {
     /// Symbol and length of the code that the bits start with.
     #[inline(always)]
     pub fn decode(&self, bits: u64) -> (u32, u32) {
-        let low = bits & (ENTRIES as u64 - 1);
-        #[allow(clippy::cast_possible_truncation, reason = "less than ENTRIES")]
-        let entry = self.by_bits.get(low as usize).copied();
-        let entry = u32::from(entry.unwrap_or_default());
-        (entry >> 4, entry & 15)
+        let entry = lookup(&self.by_few_bits, bits);
+        let entry = if entry == 0 {
+            lookup(&*self.by_bits, bits)
+        } else {
+            entry
+        };
+        (u32::from(entry >> 4), u32::from(entry & 15))
     }
 
     /// Bits and their number; `None` for a symbol that is not in the code.
@@ -72,6 +85,15 @@ impl Code {
     pub fn length(&self, symbol: u32, otherwise: u32) -> u32 {
         self.encode(symbol).map_or(otherwise, |(_, length)| length)
     }
+}
+
+/// The entry of the lowest bits; `N` is a power of two.
+#[inline(always)]
+fn lookup<const N: usize>(entries: &[u16; N], bits: u64) -> u16 {
+    let low = bits & (N as u64 - 1);
+    #[allow(clippy::cast_possible_truncation, reason = "less than N")]
+    let entry = entries.get(low as usize).copied();
+    entry.unwrap_or_default()
 }
 
 /// All codes.

@@ -5,7 +5,7 @@ use super::codes::{Code, Codes};
 use super::mode::{Departure, Mode};
 use super::plane::{Plane, Quad};
 use super::residual::{Pair, WIDE, add, class_bits, noise, small, sum, unfold};
-use super::state::State;
+use super::state::{State, group_of};
 use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS, STEPS};
 use crate::textrace::bits::{BitReader, PEEK_BITS};
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile};
@@ -15,6 +15,17 @@ use crate::varint::{low_u32, unzigzag};
 pub(super) type Outcome<T> = Result<T, &'static str>;
 
 const SHORT: &str = "more bits";
+
+/// Most bits of a place after which the sizes and small residuals of a quad, 11 + 8 + 16 bits, are
+/// sure to lie in the same word.
+const MOST_PLACE_BITS: u32 = PEEK_BITS - 35;
+
+/// Where a record lies, the lanes that it covers, and its group.
+struct Place {
+    morton: u32,
+    mask: u8,
+    group: u8,
+}
 
 pub(super) struct Decoder<'a> {
     bits: BitReader<'a>,
@@ -117,14 +128,41 @@ impl<'a> Decoder<'a> {
 
     #[inline(always)]
     fn record(&mut self, count: u32) -> Outcome<QuadRecord> {
-        let (morton, mask, group) = self.place()?;
+        let start = self.peek()?;
+        let (place, used) = self.place(start)?;
+        let Place {
+            morton,
+            mask,
+            group,
+        } = place;
         let (x, y) = position(morton)?;
         let quad = if self.state.has_seen(group) {
-            let expected = self.state.group_mut(group).plane.predict(x, y);
-            let residual = self.residual(group)?;
-            let departure = &mut self.state.group_mut(group).departure;
-            add(&expected, &departure.read(x, y, &residual))
+            // Place and residuals of most records lie in one word.
+            let bits = if used <= MOST_PLACE_BITS {
+                start >> used
+            } else {
+                self.bits.skip(used);
+                self.peek()?
+            };
+            let before = if used <= MOST_PLACE_BITS { used } else { 0 };
+            let known = group_of(&mut self.state.groups, group);
+            let expected = known.plane.predict(x, y);
+            let code = self.codes.sizes.get(known.noise).ok_or(SHORT)?;
+            let (classes, length) = sizes(code, bits);
+            known.noise = noise(classes);
+            // A class of 3 is two set bits side by side.
+            let residual = if classes & classes >> 1 & 0x55 == 0 {
+                let (residual, all) = small_pairs(classes, bits >> length);
+                self.bits.skip(before + length + all);
+                residual
+            } else {
+                self.bits.skip(before + length);
+                self.wide(classes)?
+            };
+            let known = group_of(&mut self.state.groups, group);
+            add(&expected, &known.departure.read(x, y, &residual))
         } else {
+            self.bits.skip(used);
             self.first(group, x, y, count)?
         };
         self.state.note_place(morton, mask, group);
@@ -141,12 +179,11 @@ impl<'a> Decoder<'a> {
         })
     }
 
-    /// Place on the Morton curve, mask and group of the next record.
+    /// Place on the Morton curve, mask and group of the next record, and the bits that tell them.
     #[inline(always)]
-    fn place(&mut self) -> Outcome<(u32, u8, u8)> {
+    fn place(&self, mut bits: u64) -> Outcome<(Place, u32)> {
         let state = &self.state;
         let follow = state.follow();
-        let mut bits = self.bits.peek_unpadded().ok_or(SHORT)?;
         let mut used = 0;
         let mut before = state.morton;
         if state.first_of_run {
@@ -156,8 +193,12 @@ impl<'a> Decoder<'a> {
         } else if follow.same_quad {
             used = 1;
             if bits & 1 == 1 {
-                self.bits.skip(1);
-                return Ok((state.morton, state.mask, follow.group));
+                let place = Place {
+                    morton: state.morton,
+                    mask: state.mask,
+                    group: follow.group,
+                };
+                return Ok((place, used));
             }
         }
         bits >>= used;
@@ -165,56 +206,29 @@ impl<'a> Decoder<'a> {
         let code = self.codes.place.get(context).ok_or(SHORT)?;
         let (symbol, length) = code.decode(bits);
         used += length;
+        bits >>= length;
         if symbol == ESCAPE_PLACE {
-            bits >>= length;
-            self.bits.skip(used + 14);
             let [mask, group] = [low_u32(bits >> 6 & 15), low_u32(bits >> 10 & 15)];
-            let morton = before.wrapping_add(low_u32(bits & 63));
-            return Ok((morton, mask.to_le_bytes()[0], group.to_le_bytes()[0]));
+            let place = Place {
+                morton: before.wrapping_add(low_u32(bits & 63)),
+                mask: mask.to_le_bytes()[0],
+                group: group.to_le_bytes()[0],
+            };
+            return Ok((place, used + 14));
         }
         let mut step = 1 + symbol / MASKS;
         if step == STEPS {
-            step = low_u32(bits >> length & 63);
+            step = low_u32(bits & 63);
             used += 6;
         }
-        self.bits.skip(used);
         let morton = before.wrapping_add(step);
         let mask = (1 + symbol % MASKS).to_le_bytes()[0];
-        Ok((morton, state.swap_mask(morton, mask), follow.group))
-    }
-
-    /// What a plane leaves over.
-    #[inline(always)]
-    fn residual(&mut self, group: u8) -> Outcome<Quad> {
-        let mut bits = self.bits.peek_unpadded().ok_or(SHORT)?;
-        let known = self.state.group_mut(group);
-        let code = self.codes.sizes.get(known.noise).ok_or(SHORT)?;
-        let (mut classes, mut used) = code.decode(bits);
-        bits >>= used;
-        if classes == ESCAPE_SIZES {
-            classes = low_u32(bits & 255);
-            bits >>= 8;
-            used += 8;
-        }
-        known.noise = noise(classes);
-        // A class of 3 is two set bits side by side.
-        if classes & classes >> 1 & 0x55 != 0 {
-            self.bits.skip(used);
-            return self.wide(classes);
-        }
-        let mut next = |class: u32| {
-            let pair = small(class & 3, bits);
-            let width = class_bits(class & 3);
-            bits >>= width;
-            used += width;
-            pair
+        let place = Place {
+            morton,
+            mask: state.swap_mask(morton, mask),
+            group: follow.group,
         };
-        let dx = next(classes);
-        let dy = next(classes >> 2);
-        let cross = next(classes >> 4);
-        let uv = next(classes >> 6);
-        self.bits.skip(used);
-        Ok([uv, dx, dy, cross])
+        Ok((place, used))
     }
 
     /// Residuals one of which is wide at least.
@@ -313,6 +327,35 @@ impl<'a> Decoder<'a> {
         let mode = Mode::of(symbol >> 3).ok_or("one of three modes")?;
         Ok((mode, symbol & 7))
     }
+}
+
+/// The classes of a quad's residuals, and the bits that tell them.
+#[inline(always)]
+fn sizes(code: &Code, bits: u64) -> (u32, u32) {
+    let (classes, length) = code.decode(bits);
+    if classes == ESCAPE_SIZES {
+        (low_u32(bits >> length & 255), length + 8)
+    } else {
+        (classes, length)
+    }
+}
+
+/// Residuals none of which is wide, and their bits.
+#[inline(always)]
+fn small_pairs(classes: u32, mut bits: u64) -> (Quad, u32) {
+    let mut used = 0;
+    let mut next = |class: u32| {
+        let pair = small(class & 3, bits);
+        let width = class_bits(class & 3);
+        bits >>= width;
+        used += width;
+        pair
+    };
+    let dx = next(classes);
+    let dy = next(classes >> 2);
+    let cross = next(classes >> 4);
+    let uv = next(classes >> 6);
+    ([uv, dx, dy, cross], used)
 }
 
 /// Column and row of a place on the Morton curve.
