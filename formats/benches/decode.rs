@@ -186,7 +186,7 @@ fn main() {
     });
     let mut criterion = Criterion::default().sample_size(10).configure_from_args();
     let mut group = criterion.benchmark_group("decode");
-    for encoding in [Encoding::Raw, Encoding::Delta] {
+    for encoding in Encoding::ALL {
         let trace = reencoded(&source, encoding);
         let (mut records, mut runs, mut bytes) = (0u64, 0u64, 0u64);
         every_tile(&trace, |pass, index| {

@@ -53,7 +53,7 @@ fn documented_sizes_are_the_codes() {
         ("tile index entry", INDEX_ENTRY_BYTES),
         ("raw run", textrace::RAW_RUN_BYTES),
         ("raw record", textrace::RAW_RECORD_BYTES),
-        ("delta padding", textrace::DELTA_PADDING_BYTES),
+        ("padding of bits", textrace::BITS_PADDING_BYTES),
         ("ray tile index entry", RAY_INDEX_ENTRY_BYTES),
         (
             "ray triangle",

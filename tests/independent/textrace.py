@@ -9,6 +9,7 @@ import sys
 
 from container import META, Bytes, check_meta, parse_json, print_line, read, require
 from container import shaped, tile_spans, unzigzag
+from planes import decode_planes, read_codes
 
 TAGS = ["META", "TEXS", "SMPS", "DRAW", "PASS", "TILE", "TIDX"]
 FORMATS = {
@@ -273,13 +274,18 @@ def main(path):
     entries = [index.fields("QIIIIQ") for _ in places]
     index.end()
     touched = [entry for entry in entries if entry[3]]
-    require(all(not any(e[:5]) and e[5] < 2 for e in entries if not e[3]), "an untouched tile")
+    require(all(not any(e[:5]) and e[5] < 3 for e in entries if not e[3]), "an untouched tile")
     tile_spans([entry[:3] for entry in touched], chunks["TILE"])
+    codes = read_codes()
+
+    def planes(data, runs, records):
+        return decode_planes(data, runs, records, codes)
+
     for (number, tile), (offset, size, _, records, runs, encoding) in zip(places, entries):
         if not records:
             continue
-        require(runs <= records and encoding < 2, "an index entry")
-        decode = decode_delta if encoding else decode_raw
+        require(runs <= records and encoding < 3, "an index entry")
+        decode = [decode_raw, decode_delta, planes][encoding]
         heads, rows = decode(Bytes(chunks["TILE"][offset : offset + size]), runs, records)
         check_tile(heads, rows, draws)
         rows = iter(rows)

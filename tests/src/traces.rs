@@ -384,10 +384,10 @@ pub fn ray_trace(samples_per_px: u32, has_visits: bool, seed: u64) -> Vec<u8> {
     writer.into_bytes(&tables).expect("sound tables")
 }
 
-/// One of each: both kinds, both encodings, with visits and without, one sample a pixel and more.
+/// One of each: both kinds, every encoding, with visits and without, one sample a pixel and more.
 #[must_use]
 pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
-    let textures = [Encoding::Raw, Encoding::Delta].map(|encoding| {
+    let textures = Encoding::ALL.map(|encoding| {
         let name = format!("{encoding:?}").to_lowercase();
         (name, Kind::Textrace, texture_trace(encoding, 5))
     });

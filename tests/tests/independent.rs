@@ -136,13 +136,12 @@ fn python_reads_made_up_traces_as_replay_does() {
 }
 
 #[test]
-fn python_reads_a_fresh_capture_in_both_encodings_as_replay_does() {
+fn python_reads_a_fresh_capture_in_every_encoding_as_replay_does() {
     if !has_python() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let delta = folder.path().join("delta.textrace");
-    let raw = folder.path().join("raw.textrace");
     let size = ["--size", "56x40", "--frames", "2", "--no-plain", "-o"];
     run_ok(
         program("tracegen")
@@ -150,11 +149,15 @@ fn python_reads_a_fresh_capture_in_both_encodings_as_replay_does() {
             .args(size)
             .arg(&delta),
     );
-    let encode = ["convert", "--to", "textrace", "--encoding", "raw", "-o"];
-    run_ok(program("replay").args(encode).arg(&raw).arg(&delta));
     let records = check(&delta);
     assert!(records > 1000);
-    assert_eq!(check(&raw), records);
+    for encoding in ["raw", "planes"] {
+        let other = folder.path().join(encoding).with_extension("textrace");
+        let encode = ["convert", "--to", "textrace", "--encoding", encoding, "-o"];
+        run_ok(program("replay").args(encode).arg(&other).arg(&delta));
+        assert_eq!(check(&other), records);
+        run_ok(program("replay").arg("diff").args([&delta, &other]));
+    }
 }
 
 #[test]

@@ -5,15 +5,17 @@
 //! every uv group that its draw samples. Addresses are not stored: they follow from the texture
 //! table and from the layout that replay chooses.
 
+mod bits;
 mod delta;
 mod index;
 mod invariant;
+mod planes;
 mod raw;
 mod reader;
 pub mod tables;
 mod writer;
 
-pub use delta::PADDING_BYTES as DELTA_PADDING_BYTES;
+pub use bits::PADDING_BYTES as BITS_PADDING_BYTES;
 pub use index::INDEX_ENTRY_BYTES;
 pub use invariant::{TILE_QUADS, quad_morton};
 pub use raw::{RECORD_BYTES as RAW_RECORD_BYTES, RUN_BYTES as RAW_RUN_BYTES};
@@ -37,8 +39,7 @@ pub const TILE_INDEX: ChunkTag = ChunkTag(*b"TIDX");
 /// The encoded tiles, in index order.
 pub const TILES: ChunkTag = ChunkTag(*b"TILE");
 
-/// How a tile's bytes are encoded. Each tile names its own, so later encodings (a primitive's
-/// plane equations stored once, say) can be added beside these.
+/// How a tile's bytes are encoded. Each tile names its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
@@ -48,11 +49,16 @@ pub enum Encoding {
     /// Bit-packed differences from a linear prediction.
     #[default]
     Delta = 1,
+    /// A plane for each primitive, and what quads leave over.
+    Planes = 2,
 }
 
 impl Encoding {
+    /// Every encoding, by number.
+    pub const ALL: [Self; 3] = [Self::Raw, Self::Delta, Self::Planes];
+
     fn from_id(id: u64) -> Option<Self> {
-        [Self::Raw, Self::Delta]
+        Self::ALL
             .into_iter()
             .find(|encoding| *encoding as u64 == id)
     }
@@ -62,6 +68,7 @@ impl Encoding {
         match self {
             Self::Raw => u64::from(bytes) / raw::RECORD_BYTES as u64,
             Self::Delta => u64::from(bytes) * 8 / u64::from(delta::MIN_RECORD_BITS),
+            Self::Planes => u64::from(bytes) * 8 / u64::from(planes::MIN_RECORD_BITS),
         }
     }
 }

@@ -3,8 +3,8 @@
 
 use super::index::IndexEntry;
 use super::{
-    Encoding, INDEX_ENTRY_BYTES, Pass, TILE_INDEX, TILES, Tables, Tile, delta, invariant, raw,
-    tables,
+    Encoding, INDEX_ENTRY_BYTES, Pass, TILE_INDEX, TILES, Tables, Tile, delta, invariant, planes,
+    raw, tables,
 };
 use crate::container::{Container, Kind};
 use crate::error::{FormatError, Result};
@@ -155,6 +155,7 @@ impl Textrace {
         tile_chunk(&self.container).parse(&entry.span, |input| match entry.encoding {
             Encoding::Raw => raw::decode(runs, records, input, out),
             Encoding::Delta => delta::decode(runs, records, input, out),
+            Encoding::Planes => planes::decode(runs, records, input, out),
         })?;
         invariant::check(&self.tables.draws, out).map_err(|broken| {
             let expected = format!("{} of the tile: {}", broken.what, broken.expected);

@@ -192,7 +192,7 @@ fn small(encoding: Encoding) -> Vec<u8> {
 
 #[test]
 fn every_truncation_is_refused() {
-    for whole in [small(Encoding::Raw), small(Encoding::Delta)] {
+    for whole in Encoding::ALL.map(small) {
         read_everything(whole.clone()).unwrap();
         for length in 0..whole.len() {
             assert!(
@@ -205,7 +205,7 @@ fn every_truncation_is_refused() {
 
 #[test]
 fn every_flipped_bit_is_noticed() {
-    for whole in [small(Encoding::Raw), small(Encoding::Delta)] {
+    for whole in Encoding::ALL.map(small) {
         for bit in 0..whole.len() * 8 {
             let mut bytes = whole.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
@@ -218,7 +218,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn tiles_come_back_as_written(a in tile(), b in tile()) {
-        for encoding in [Encoding::Raw, Encoding::Delta] {
+        for encoding in Encoding::ALL {
             let bytes = write(encoding, &[(0, 1, a.clone()), (1, 5, b.clone())]);
             let trace = Textrace::from_bytes(bytes).unwrap();
             prop_assert_eq!(trace.tables(), &tables());

@@ -1,7 +1,7 @@
 //! Writing a `.textrace`.
 
 use super::index::IndexEntry;
-use super::{Encoding, Pass, Tables, Tile, delta, invariant, raw, tables};
+use super::{Encoding, Pass, Tables, Tile, delta, invariant, planes, raw, tables};
 use crate::container::{AtomicFile, ContainerWriter, Kind};
 use crate::error::{Broken, FormatError, Result};
 use crate::tiles::TileSpan;
@@ -52,6 +52,7 @@ pub fn encode_tile_as(encoding: Encoding, tables: &Tables, tile: &Tile) -> Resul
     let bytes = match encoding {
         Encoding::Raw => raw::encode(tile),
         Encoding::Delta => delta::encode(tile),
+        Encoding::Planes => planes::encode(tile),
     };
     let too_many = |_| FormatError::Unwritable {
         what: "tile".to_owned(),

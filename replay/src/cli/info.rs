@@ -139,7 +139,7 @@ impl Counts {
 fn totals(trace: &Textrace) -> Result<Value> {
     let passes = &trace.tables().passes;
     let mut value = Counts::of(trace, tiles(passes)).to_json();
-    for encoding in [Encoding::Raw, Encoding::Delta] {
+    for encoding in Encoding::ALL {
         let mut count = 0u64;
         for (pass, tile) in tiles(passes) {
             let used = trace.tile_stats(pass, tile).records > 0;

@@ -8,16 +8,13 @@
 //! Layout: the runs as bytes, then the records as bits, then [`PADDING_BYTES`] zero bytes.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-mod bits;
 mod predict;
 mod records;
 mod runs;
 
 use super::Tile;
+use super::bits::{BitReader, BitWriter, PADDING_BYTES};
 use crate::parse::{Fault, Parsed, ensure};
-use bits::{BitReader, BitWriter};
-
-pub use bits::PADDING_BYTES;
 
 /// Fewest bits that a record takes, which bounds the records that a tile's bytes can hold.
 pub const MIN_RECORD_BITS: u32 = records::CONTROL_BITS;

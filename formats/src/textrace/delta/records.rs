@@ -12,8 +12,8 @@
 //! Then the escapes in that order, then dx, dy, cross and uv, each u before v, in the width that
 //! the larger of the two needs.
 
-use super::bits::{BitReader, BitWriter, PEEK_BITS};
 use super::predict::{Context, Derivatives, Pair, split};
+use crate::textrace::bits::{BitReader, BitWriter, PEEK_BITS};
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile, quad_morton};
 use crate::varint::{low_u32, unzigzag, zigzag};
 use std::num::Wrapping;

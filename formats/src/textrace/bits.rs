@@ -4,17 +4,17 @@
 pub const PADDING_BYTES: usize = 8;
 
 /// Most bits that [`BitReader::peek`] is sure to hold.
-pub(super) const PEEK_BITS: u32 = 57;
+pub(in crate::textrace) const PEEK_BITS: u32 = 57;
 
 /// Appends bits to bytes.
-pub(super) struct BitWriter {
+pub(in crate::textrace) struct BitWriter {
     bytes: Vec<u8>,
     pending: u64,
     count: u32,
 }
 
 impl BitWriter {
-    pub(super) fn new(bytes: Vec<u8>) -> Self {
+    pub(in crate::textrace) fn new(bytes: Vec<u8>) -> Self {
         Self {
             bytes,
             pending: 0,
@@ -23,7 +23,7 @@ impl BitWriter {
     }
 
     /// Appends the lowest `count` bits of `value`, at most 32.
-    pub(super) fn put(&mut self, value: u32, count: u32) {
+    pub(in crate::textrace) fn put(&mut self, value: u32, count: u32) {
         debug_assert!(count == 32 || u64::from(value) < 1 << count);
         self.pending |= u64::from(value) << self.count;
         self.count += count;
@@ -34,40 +34,62 @@ impl BitWriter {
         }
     }
 
-    pub(super) fn finish(mut self) -> Vec<u8> {
+    /// The bytes, with padding.
+    pub(in crate::textrace) fn finish(self) -> Vec<u8> {
+        let mut bytes = self.finish_unpadded();
+        bytes.extend([0; PADDING_BYTES]);
+        bytes
+    }
+
+    pub(in crate::textrace) fn finish_unpadded(mut self) -> Vec<u8> {
         if self.count > 0 {
             self.bytes.push(self.pending.to_le_bytes()[0]);
         }
-        self.bytes.extend([0; PADDING_BYTES]);
         self.bytes
     }
 }
 
 /// Reads bits from bytes that end with padding.
-pub(super) struct BitReader<'a> {
+pub(in crate::textrace) struct BitReader<'a> {
     bytes: &'a [u8],
     bit: usize,
 }
 
 impl<'a> BitReader<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
+    pub(in crate::textrace) fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, bit: 0 }
     }
 
     /// The next bits, at least [`PEEK_BITS`] of them; `None` at the end.
     #[inline(always)]
-    pub(super) fn peek(&self) -> Option<u64> {
+    pub(in crate::textrace) fn peek(&self) -> Option<u64> {
         let word = self.bytes.get(self.bit >> 3..)?.first_chunk::<8>()?;
         Some(u64::from_le_bytes(*word) >> (self.bit & 7))
     }
 
+    /// The next bits, zeros after the last one, for bytes without padding; `None` where bits were
+    /// read that are not there.
     #[inline(always)]
-    pub(super) fn skip(&mut self, count: u32) {
+    pub(in crate::textrace) fn peek_unpadded(&self) -> Option<u64> {
+        self.peek().or_else(|| self.peek_tail())
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn peek_tail(&self) -> Option<u64> {
+        let mut word = [0; 8];
+        let left = self.bytes.get(self.bit >> 3..)?;
+        word.iter_mut().zip(left).for_each(|(to, from)| *to = *from);
+        (self.bit <= self.bytes.len() * 8).then(|| u64::from_le_bytes(word) >> (self.bit & 7))
+    }
+
+    #[inline(always)]
+    pub(in crate::textrace) fn skip(&mut self, count: u32) {
         self.bit += count as usize;
     }
 
     /// The bits between the last one read and the end of its byte.
-    pub(super) fn left_in_byte(&self) -> u8 {
+    pub(in crate::textrace) fn left_in_byte(&self) -> u8 {
         let byte = self.bytes.get(self.bit >> 3).copied().unwrap_or_default();
         if self.bit & 7 == 0 {
             0
@@ -76,8 +98,13 @@ impl<'a> BitReader<'a> {
         }
     }
 
+    /// Bits were read that are not there.
+    pub(in crate::textrace) fn overrun(&self) -> bool {
+        self.bit > self.bytes.len() * 8
+    }
+
     /// The bytes that no read bit lies in.
-    pub(super) fn rest(&self) -> &'a [u8] {
+    pub(in crate::textrace) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.bit.div_ceil(8)..).unwrap_or_default()
     }
 }

@@ -1,0 +1,216 @@
+//! A primitive's plane: its texture coordinates over the screen.
+//!
+//! `u * w`, `v * w` and `w` are linear in screen space. With w scaled to 1 at an origin, seven
+//! numbers besides the origin's coordinates give u and v everywhere. All of it is `f64` with
+//! additions, multiplications and divisions in a stated order, so every machine predicts the same.
+#![deny(clippy::indexing_slicing)]
+
+use crate::textrace::QuadRecord;
+
+/// uv, dx, dy and cross of a quad, each u and v.
+pub(super) type Quad = [[i32; 2]; 4];
+
+/// The numbers of a record in the order of [`Quad`].
+pub(super) fn quad_of(record: &QuadRecord) -> Quad {
+    [record.uv, record.dx, record.dy, record.cross]
+}
+
+/// w is taken as at least this, so that nothing becomes infinite.
+const LEAST_W: f64 = 1.0 / 1024.0;
+/// Weight of the expected slope of w against what a quad's cross tells: the square of about half a
+/// fixed-point step in units of the slope's usual error, 2^-9 a pixel.
+const PRIOR: f64 = 65536.0;
+
+/// A plane in perspective around the top-left lane of a quad.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Plane {
+    /// Pixel column and row of the origin in the tile.
+    pub origin: [f64; 2],
+    /// u and v at the origin.
+    pub start: [f64; 2],
+    /// Slope of u and v to the right and down, both times w.
+    pub slopes: [[f64; 2]; 2],
+    /// Change of w by pixel, to the right and down; w is 1 at the origin.
+    pub tilt: [f64; 2],
+}
+
+impl Plane {
+    /// Pixels from the origin to a quad's top-left lane.
+    #[inline(always)]
+    fn offset(&self, x: u8, y: u8) -> [f64; 2] {
+        let [left, top] = self.origin;
+        [f64::from(2 * x) - left, f64::from(2 * y) - top]
+    }
+
+    /// What the plane says of a quad.
+    #[inline(always)]
+    pub fn predict(&self, x: u8, y: u8) -> Quad {
+        let [right, down] = self.offset(x, y);
+        let [p, q] = self.tilt;
+        let w = 1.0 + p * right + q * down;
+        let (w_right, w_down) = (w + p, w + q);
+        let [scale, scale_right] = inverse([w, w_right]);
+        let [scale_down, scale_both] = inverse([w_down, w_right + q]);
+        let [to_right, to_down] = self.slopes;
+        let bend = plus(times(to_right, right), times(to_down, down));
+        let bend_right = plus(bend, to_right);
+        let top_left = times(bend, scale);
+        let bottom_left = times(plus(bend, to_down), scale_down);
+        let bottom_right = times(plus(bend_right, to_down), scale_both);
+        let dx = less(times(bend_right, scale_right), top_left);
+        [
+            round(plus(self.start, top_left)),
+            round(dx),
+            round(less(bottom_left, top_left)),
+            round(less(less(bottom_right, bottom_left), dx)),
+        ]
+    }
+
+    /// Slope of w around a quad, where w there is 1.
+    #[inline]
+    pub fn tilt_at(&self, x: u8, y: u8) -> [f64; 2] {
+        let [right, down] = self.offset(x, y);
+        let [p, q] = self.tilt;
+        let w = at_least(1.0 + p * right + q * down);
+        [within_one(p / w), within_one(q / w)]
+    }
+
+    /// The plane through a quad's own numbers, with a slope of w.
+    pub fn through(x: u8, y: u8, quad: &Quad, tilt: [f64; 2]) -> Self {
+        let [uv, dx, dy, _] = quad.map(|pair| pair.map(f64::from));
+        let [p, q] = tilt;
+        Self {
+            origin: [f64::from(2 * x), f64::from(2 * y)],
+            start: uv,
+            slopes: [dx.map(|d| d * (1.0 + p)), dy.map(|d| d * (1.0 + q))],
+            tilt,
+        }
+    }
+
+    /// The plane with slopes of w, slopes and start changed by a correction in the units of `level`.
+    pub fn corrected(x: u8, y: u8, quad: &Quad, tilt: [f64; 2], level: u32, by: &Quad) -> Self {
+        let [start, right, down, change] = by.map(|pair| pair.map(f64::from));
+        let units = Units::new(level, quad);
+        let ([p, q], [dp, dq]) = (tilt, change);
+        let tilt = [
+            within_one(p + dp * units.tilt),
+            within_one(q + dq * units.tilt),
+        ];
+        let mut plane = Self::through(x, y, quad, tilt);
+        let add = |to: &mut [f64; 2], by: [f64; 2], unit: f64| {
+            to.iter_mut().zip(by).for_each(|(to, by)| *to += by * unit);
+        };
+        let [of_right, of_down] = &mut plane.slopes;
+        add(of_right, right, units.slope);
+        add(of_down, down, units.slope);
+        add(&mut plane.start, start, units.start);
+        plane
+    }
+}
+
+/// What a correction of 1 stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Units {
+    pub start: f64,
+    pub slope: f64,
+    pub tilt: f64,
+}
+
+impl Units {
+    /// The finer, the higher the level; slopes of w the finer, too, the larger dx and dy are.
+    pub fn new(level: u32, quad: &Quad) -> Self {
+        let [_, dx, dy, _] = quad;
+        let largest = dx
+            .iter()
+            .chain(dy)
+            .fold(0, |most, d| d.unsigned_abs().max(most));
+        Self {
+            start: 0.25,
+            slope: power(level),
+            tilt: power(2 * level + (32 - largest.leading_zeros())),
+        }
+    }
+}
+
+/// 2^-n, exact.
+fn power(n: u32) -> f64 {
+    1.0 / (1u64 << n.min(63)) as f64
+}
+
+/// cross of a quad whose dx and dy are known, with a slope of w.
+#[inline]
+pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f64; 2]) -> [i32; 2] {
+    let [p, q] = tilt;
+    let w = at_least(1.0 + p + q);
+    let of = |dx: i32, dy: i32| (f64::from(dx) * q + f64::from(dy) * p) / -w;
+    let ([dx_u, dx_v], [dy_u, dy_v]) = (dx, dy);
+    round([of(dx_u, dy_u), of(dx_v, dy_v)])
+}
+
+/// The slope of w that a quad's own numbers tell, kept near an expected one: cross is
+/// `-(dx * q + dy * p) / (1 + p + q)` for u and for v, so least squares with a prior.
+#[inline]
+pub(super) fn tilt_of(quad: &Quad, expected: [f64; 2]) -> [f64; 2] {
+    let [_, dx, dy, cross] = quad.map(|pair| pair.map(f64::from));
+    let [p, q] = expected;
+    let ([dx_u, dx_v], [dy_u, dy_v], [c_u, c_v]) = (dx, dy, cross);
+    let (a_u, b_u, a_v, b_v) = (c_u + dy_u, c_u + dx_u, c_v + dy_v, c_v + dx_v);
+    let left_u = -(c_u + p * a_u + q * b_u);
+    let left_v = -(c_v + p * a_v + q * b_v);
+    let (aa, bb) = (a_u * a_u + a_v * a_v, b_u * b_u + b_v * b_v);
+    let ab = a_u * b_u + a_v * b_v;
+    let (ae, be) = (a_u * left_u + a_v * left_v, b_u * left_u + b_v * left_v);
+    let area = a_u * b_v - a_v * b_u;
+    // (aa + PRIOR) * (bb + PRIOR) - ab * ab, without a difference that could round to zero.
+    let determinant = PRIOR * (PRIOR + aa + bb) + area * area;
+    [
+        within_one(p + ((bb + PRIOR) * ae - ab * be) / determinant),
+        within_one(q + ((aa + PRIOR) * be - ab * ae) / determinant),
+    ]
+}
+
+#[inline]
+fn within_one(slope: f64) -> f64 {
+    slope.clamp(-1.0, 1.0)
+}
+
+/// Not `f64::max`, which minds NaN: nothing here can be NaN.
+#[inline(always)]
+fn at_least(w: f64) -> f64 {
+    if w > LEAST_W { w } else { LEAST_W }
+}
+
+#[inline(always)]
+fn inverse([a, b]: [f64; 2]) -> [f64; 2] {
+    [1.0 / at_least(a), 1.0 / at_least(b)]
+}
+
+#[inline(always)]
+fn plus([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    [a + c, b + d]
+}
+
+#[inline(always)]
+fn less([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    [a - c, b - d]
+}
+
+#[inline(always)]
+fn times([a, b]: [f64; 2], by: f64) -> [f64; 2] {
+    [a * by, b * by]
+}
+
+/// Nearest integers, ties to even, modulo 2^32: adding 1.5 * 2^52 leaves them in the low bits.
+///
+/// Right below 2^51, where all predictions are: slopes stay below 2^34, offsets below 2^5, and
+/// w is at least 2^-10.
+#[inline(always)]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "predictions wrap like the numbers that they predict"
+)]
+fn round([u, v]: [f64; 2]) -> [i32; 2] {
+    const MAGIC: f64 = 6_755_399_441_055_744.0;
+    let of = |value: f64| ((value + MAGIC).to_bits() as u32).cast_signed();
+    [of(u), of(v)]
+}

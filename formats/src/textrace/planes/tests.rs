@@ -1,0 +1,257 @@
+#![allow(
+    clippy::indexing_slicing,
+    clippy::cast_possible_truncation,
+    reason = "a test may panic"
+)]
+
+use super::codes::{Codes, MOST_BITS};
+use super::lengths::LENGTHS;
+use super::mode::{Departure, Mode};
+use super::plane::{Plane, Quad};
+use super::residual::{class_bits, classify, small};
+use super::*;
+use crate::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, quad_morton};
+use proptest::prelude::*;
+
+/// Coordinates in perspective in two groups, as a capture rounds them.
+fn record(x: u8, y: u8, group: u8, mask: u8, bend: f64) -> QuadRecord {
+    let at = |x: f64, y: f64| {
+        let w = 1.0 + 0.004 * x - 0.009 * y;
+        let scale = f64::from(group) * 3000.0 + 5000.0;
+        [
+            (700_000.0 + scale * x + 300.0 * y) / w + bend * x * x,
+            (-90_000.0 - 200.0 * x + 4100.0 * y) / w,
+        ]
+    };
+    let lane = |i: f64, j: f64| at(f64::from(x) * 2.0 + i, f64::from(y) * 2.0 + j);
+    let [o, r, d, c] = [lane(0., 0.), lane(1., 0.), lane(0., 1.), lane(1., 1.)];
+    let fixed = |f: &dyn Fn(usize) -> f64| [f(0).round() as i32, f(1).round() as i32];
+    QuadRecord {
+        x,
+        y,
+        mask,
+        group,
+        uv: fixed(&|a| o[a]),
+        dx: fixed(&|a| r[a] - o[a]),
+        dy: fixed(&|a| d[a] - o[a]),
+        cross: fixed(&|a| c[a] - d[a] - r[a] + o[a]),
+    }
+}
+
+/// A tile that one primitive covers, a record for each quad and group.
+fn covered(groups: u8, bend: f64) -> Tile {
+    let mut records: Vec<QuadRecord> = (0..64u8)
+        .flat_map(|at| (0..groups).map(move |group| record(at % 8, at / 8, group, 15, bend)))
+        .collect();
+    records.sort_by_key(|r| (quad_morton(r.x, r.y), r.group));
+    let run = PrimitiveRun {
+        primitive: u32::MAX - 1,
+        draw: 7,
+        first: 0,
+        count: records.len() as u32,
+    };
+    Tile {
+        runs: vec![run],
+        records,
+    }
+}
+
+fn decoded(tile: &Tile, bytes: &[u8]) -> Option<Tile> {
+    let (runs, records) = (tile.runs.len() as u32, tile.records.len() as u32);
+    let mut out = Tile::default();
+    decode(runs, records, bytes, &mut out).ok().map(|_| out)
+}
+
+fn bytes_a_record(tile: &Tile) -> f64 {
+    let bytes = encode(tile);
+    assert_eq!(decoded(tile, &bytes).as_ref(), Some(tile));
+    bytes.len() as f64 / tile.records.len() as f64
+}
+
+#[test]
+fn a_plane_in_perspective_takes_less_than_two_bytes_a_quad() {
+    let bytes = bytes_a_record(&covered(1, 0.0));
+    assert!(bytes < 1.6, "{bytes} bytes a record");
+}
+
+#[test]
+fn a_second_group_of_the_same_quads_costs_no_place() {
+    let bytes = bytes_a_record(&covered(2, 0.0));
+    assert!(bytes < 1.5, "{bytes} bytes a record");
+}
+
+#[test]
+fn a_surface_that_is_no_plane_is_followed() {
+    let bytes = bytes_a_record(&covered(1, 0.5));
+    assert!(bytes < 4.0, "{bytes} bytes a record");
+}
+
+#[test]
+fn numbers_at_the_ends_of_their_range_come_back() {
+    let extremes = [i32::MIN, i32::MAX, 0, -1];
+    let mut tile = Tile::default();
+    for (number, group) in [(0, 0), (1, NO_GROUP)] {
+        let first = tile.records.len() as u32;
+        for at in 0..64usize {
+            let pick = |salt: usize| [extremes[(at + salt) % 4], extremes[(at / 4 + salt) % 4]];
+            tile.records.push(QuadRecord {
+                x: (at % 8) as u8,
+                y: (at / 8) as u8,
+                mask: (at % 15 + 1) as u8,
+                group,
+                uv: pick(0),
+                dx: pick(1),
+                dy: pick(2),
+                cross: pick(3),
+            });
+        }
+        tile.records[first as usize..].sort_by_key(|r| quad_morton(r.x, r.y));
+        tile.runs.push(PrimitiveRun {
+            primitive: number * (u32::MAX - 1),
+            draw: number * (u32::MAX - 1),
+            first,
+            count: 64,
+        });
+    }
+    assert_eq!(decoded(&tile, &encode(&tile)), Some(tile));
+}
+
+#[test]
+fn cut_or_longer_bytes_are_refused() {
+    let tile = covered(2, 1.0);
+    let mut bytes = encode(&tile);
+    for length in 0..bytes.len() {
+        assert!(decoded(&tile, &bytes[..length]).is_none(), "{length} bytes");
+    }
+    bytes.push(0);
+    assert!(decoded(&tile, &bytes).is_none());
+}
+
+#[test]
+fn other_counts_than_the_index_tells_are_refused() {
+    let tile = covered(1, 0.0);
+    let bytes = encode(&tile);
+    for (runs, records) in [(1, 63), (1, 65), (2, 64), (0, 64), (u32::MAX, u32::MAX)] {
+        let mut out = Tile::default();
+        let refused = decode(runs, records, &bytes, &mut out).is_err();
+        assert!(refused, "{runs} runs of {records}");
+        assert!(out.records.len() <= bytes.len() * 4, "bounded by the bytes");
+    }
+}
+
+#[test]
+fn every_code_is_complete_and_has_an_escape_where_symbols_lack() {
+    for (number, lengths) in LENGTHS.iter().enumerate() {
+        let lengths: Vec<u32> = lengths.chars().map(|c| c.to_digit(16).unwrap()).collect();
+        let used = lengths.iter().filter(|length| **length > 0);
+        let sum: u32 = used.map(|length| 1 << (MOST_BITS - length)).sum();
+        assert_eq!(sum, 1 << MOST_BITS, "code {number}");
+        let escape = match lengths.len() as u32 - 1 {
+            last @ (ESCAPE_PLACE | ESCAPE_SIZES) => Some(last),
+            _ => None,
+        };
+        match escape {
+            Some(escape) => assert!(lengths[escape as usize] > 0, "code {number}"),
+            None => assert!(!lengths.contains(&0), "code {number}"),
+        }
+    }
+}
+
+#[test]
+fn the_documented_lengths_are_the_codes() {
+    let text = include_str!("../../../../FORMAT.md");
+    let (_, text) = text.split_once("### Code lengths of encoding 2\n").unwrap();
+    let block = text.split("```\n").nth(1).unwrap();
+    let documented = block.lines().map(|line| line.split_once(' ').unwrap().1);
+    assert!(documented.eq(LENGTHS));
+}
+
+#[test]
+fn symbols_come_back_from_their_bits() {
+    let codes = Codes::get();
+    for code in codes.place.iter().chain(&codes.sizes).chain(&codes.level) {
+        for symbol in 0..257 {
+            if let Some((bits, length)) = code.encode(symbol) {
+                let noise = u64::from(bits) | 0xffff << length;
+                assert_eq!(code.decode(noise), (symbol, length));
+            }
+        }
+    }
+}
+
+#[test]
+fn small_pairs_come_back_from_class_and_index() {
+    for u in -2..=2i32 {
+        for v in -2..=2i32 {
+            let (class, index) = classify([u, v]);
+            assert_eq!(class, u.unsigned_abs().max(v.unsigned_abs()));
+            assert!(index < 1 << class_bits(class));
+            assert_eq!(small(class, index.into()), [u, v]);
+        }
+    }
+    assert_eq!(classify([0, -3]).0, 3);
+    assert_eq!(classify([i32::MIN, 0]).0, 3);
+}
+
+#[test]
+fn a_plane_passes_through_the_quad_it_was_made_from() {
+    let quad = record(3, 5, 0, 15, 0.0);
+    let quad = [quad.uv, quad.dx, quad.dy, quad.cross];
+    // In the quad's own frame, by the closed form of w around it.
+    let w = 1.0 + 0.004 * 6.0 - 0.009 * 10.0;
+    let plane = Plane::through(3, 5, &quad, [0.004 / w, -0.009 / w]);
+    let found = plane.predict(3, 5);
+    assert_eq!(found[..3], quad[..3]);
+    for (found, exact) in found[3].iter().zip(quad[3]) {
+        assert!(found.abs_diff(exact) <= 1, "{found} for {exact}");
+    }
+    let far = record(7, 7, 0, 15, 0.0);
+    let found = plane.predict(7, 7);
+    // dx and dy are rounded to a half, 8 pixels away.
+    assert!(
+        found[0][0].abs_diff(far.uv[0]) < 16,
+        "{found:?} for {far:?}"
+    );
+}
+
+fn quad() -> impl Strategy<Value = Quad> {
+    let number = prop_oneof![-300..300i32, any::<i32>()];
+    prop::array::uniform4(prop::array::uniform2(number))
+}
+
+proptest! {
+    /// The checksum guards against damage; against malice only care in the decoder does.
+    #[test]
+    fn arbitrary_bytes_never_panic(
+        bytes in prop::collection::vec(any::<u8>(), 0..400), runs in 0..40u32, records in 0..2000u32,
+    ) {
+        let mut tile = Tile::default();
+        if decode(runs, records, &bytes, &mut tile).is_ok() {
+            prop_assert_eq!(tile.runs.len() as u32, runs);
+            prop_assert_eq!(tile.records.len() as u32, records);
+        }
+        prop_assert!(tile.records.len() <= bytes.len() * 4 + 1);
+    }
+
+    #[test]
+    fn changed_bytes_never_panic(at in 0..200usize, value in any::<u8>()) {
+        let tile = covered(2, 0.5);
+        let mut bytes = encode(&tile);
+        if let Some(byte) = bytes.get_mut(at) {
+            *byte = value;
+        }
+        decoded(&tile, &bytes);
+    }
+
+    #[test]
+    fn departures_come_back_in_every_mode(quads in prop::collection::vec((0..8u8, 0..8u8, quad()), 1..9)) {
+        for mode in Mode::ALL {
+            let mut written = Departure::start(mode, 2, 3);
+            let mut read = written;
+            for (x, y, quad) in &quads {
+                let residual = written.write(*x, *y, quad);
+                prop_assert_eq!(read.read(*x, *y, &residual), *quad);
+            }
+        }
+    }
+}
