@@ -130,7 +130,7 @@ fn outputs_are_the_same_whatever_the_number_of_threads() {
                 .arg(trace())
                 .args([
                     "--orders",
-                    "morton,z2-lrta,z2-sta",
+                    "morton,z2-sta",
                     "--merged",
                     "--threads",
                     threads,

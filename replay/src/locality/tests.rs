@@ -175,7 +175,7 @@ proptest! {
 #[test]
 fn misses_are_those_of_a_replay() {
     let trace = Synthetic {
-        size_px: [160, 128],
+        size_px: [96, 80],
         patch_px: 48,
         layers: 2,
         ..Synthetic::default()
