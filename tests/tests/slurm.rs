@@ -345,10 +345,9 @@ fn a_job_array_on_two_nodes_gives_one_machines_bytes_also_after_a_task_was_kille
             let Some((job, node)) = line.split_once(' ') else {
                 return false;
             };
-            let mut control = cluster.command("scontrol");
-            let listed = control
-                .args(["listpids", job])
-                .env("SLURMD_NODENAME", node.trim())
+            let listed = cluster
+                .command("scontrol")
+                .args(["listpids", job, node.trim()])
                 .output();
             let listed = listed
                 .map(|o| String::from_utf8_lossy(&o.stdout).into_owned())
