@@ -4,7 +4,7 @@ use super::experiment_args::parse_caches;
 use crate::addresses::{self, KindSet};
 use crate::config::RunConfig;
 use crate::report::addresses as report;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use formats::interop::plain::{AccessKind, AddressFile, AddressForm};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -70,35 +70,41 @@ pub struct AddressArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_TRACES)]
     addresses: Option<PathBuf>,
     /// Form of the addresses [default: by name (.u32, .u64, .din, .gem5) or content]
-    #[arg(long, value_name = "FORM", requires = "addresses")]
+    #[arg(long, value_name = "FORM")]
     address_form: Option<FormName>,
-    /// Kinds of access that the caches see
-    #[arg(
-        long,
-        value_name = "KINDS",
-        requires = "addresses",
-        value_delimiter = ',',
-        default_value = "read,write,fetch"
-    )]
-    kinds: Vec<KindName>,
+    /// Kinds of access that the caches see [default: all]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    kinds: Option<Vec<KindName>>,
     /// Several L1/L2 sizes in KiB, replayed in one pass if LRU
     #[arg(
         long,
         value_name = "L1/L2,...",
-        requires = "addresses",
         conflicts_with_all = ["l1", "l2"]
     )]
     caches: Option<String>,
     /// Print CSV, a row a configuration
-    #[arg(long, requires = "addresses", conflicts_with = "json")]
+    #[arg(long, conflicts_with = "json")]
     csv: bool,
 }
 
 impl AddressArgs {
     /// Where the addresses are, if they were asked for.
-    #[must_use]
-    pub fn path(&self) -> Option<&Path> {
-        self.addresses.as_deref()
+    ///
+    /// # Errors
+    /// A flag that means nothing without addresses. (Clap does not ask for an argument that conflicts
+    /// with the trace.)
+    pub fn path(&self) -> Result<Option<&Path>> {
+        let flags = [
+            ("--address-form", self.address_form.is_some()),
+            ("--kinds", self.kinds.is_some()),
+            ("--caches", self.caches.is_some()),
+            ("--csv", self.csv),
+        ];
+        let given = flags.into_iter().find(|(_, given)| *given);
+        match (&self.addresses, given) {
+            (None, Some((flag, _))) => bail!("{flag}: only with --addresses"),
+            (path, _) => Ok(path.as_deref()),
+        }
     }
 
     /// Replays the addresses at `path` and prints what the caches made of them.
@@ -113,12 +119,14 @@ impl AddressArgs {
             FormName::Din => AddressForm::Din,
             FormName::Gem5 => AddressForm::Gem5,
         });
-        let kinds = self.kinds.iter().map(|kind| match kind {
+        let kind = |name: &KindName| match name {
             KindName::Read => AccessKind::Read,
             KindName::Write => AccessKind::Write,
             KindName::Fetch => AccessKind::Fetch,
+        };
+        let kinds = self.kinds.as_ref().map_or(KindSet::ALL, |names| {
+            KindSet::of(&names.iter().map(kind).collect::<Vec<_>>())
         });
-        let kinds = KindSet::of(&kinds.collect::<Vec<_>>());
         let start = Instant::now();
         let file = AddressFile::open(path, form)?;
         let read_as = match file.compression() {

@@ -49,7 +49,7 @@ pub struct Args {
 /// An impossible configuration or an unreadable trace.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut config = args.machine.resolve()?;
-    if let Some(path) = args.addresses.path() {
+    if let Some(path) = args.addresses.path()? {
         args.threads.start()?;
         return args.addresses.run(path, &config, args.json);
     }

@@ -138,10 +138,10 @@ fn wrong_frame(error: FrameDecoderError) -> io::Error {
     // The end of the input lies deep inside; its cause alone says what happened.
     let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(&error);
     while let Some(inner) = cause {
-        if let Some(io) = inner.downcast_ref::<io::Error>() {
-            if io.kind() == io::ErrorKind::UnexpectedEof {
-                return io::ErrorKind::UnexpectedEof.into();
-            }
+        if let Some(io) = inner.downcast_ref::<io::Error>()
+            && io.kind() == io::ErrorKind::UnexpectedEof
+        {
+            return io::ErrorKind::UnexpectedEof.into();
         }
         cause = inner.source();
     }
