@@ -1,6 +1,6 @@
 //! `replay locality` against plain caches fed with what `replay convert` writes, and its outputs.
 
-use parallax_tests::{program, root, run_ok};
+use parallax_tests::{program, refuse, root, run_ok};
 use serde_json::Value;
 use std::collections::HashSet;
 
@@ -117,6 +117,57 @@ fn the_causes_of_misses_are_those_of_plain_caches_fed_with_din() {
         assert_eq!(row["unique_lines"], level.seen.len());
         assert!(row["opt_misses"].as_u64() < row["fully_associative_misses"].as_u64());
     }
+}
+
+#[test]
+fn addresses_that_a_trace_was_converted_to_have_its_locality() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let addresses = folder.path().join("a.u32.gz");
+    run_ok(
+        program("replay")
+            .args(["convert", "--to", "u32", "--order", "z2-sta", "-o"])
+            .args([&addresses, &trace()]),
+    );
+    let json = |input: &[&std::ffi::OsStr], machine: &[&str]| -> Value {
+        let mut command = program("replay");
+        command.arg("locality").args(input).args(machine);
+        let output = run_ok(command.arg("--json"));
+        serde_json::from_slice(&output.stdout).expect("one JSON object")
+    };
+    let of_trace = json(&[trace().as_os_str()], &MACHINE);
+    let caches = &MACHINE[4..];
+    let of_file = json(&["--addresses".as_ref(), addresses.as_os_str()], caches);
+    for (row, expected) in (of_file["rows"].as_array().expect("rows").iter())
+        .zip(of_trace["rows"].as_array().expect("rows"))
+    {
+        assert_eq!(row["order"], "as-given");
+        for key in [
+            "accesses",
+            "misses",
+            "unique_lines",
+            "compulsory",
+            "capacity",
+            "conflict",
+            "opt_misses",
+            "fully_associative_misses",
+        ] {
+            assert_eq!(row[key], expected[key], "{key} of {}", row["stream"]);
+        }
+    }
+    let refused = |arguments: &[&str], expected: &[&str]| {
+        let mut command = program("replay");
+        command.args(["locality", "--addresses"]).arg(&addresses);
+        refuse(command.args(arguments), expected);
+    };
+    refused(&["--merged"], &["--merged cannot be used with"]);
+    refused(&["--cores", "2"], &["--cores cannot be used with"]);
+    refused(&["x.textrace"], &["cannot be used with"]);
+    let mut command = program("replay");
+    command
+        .arg("locality")
+        .arg(trace())
+        .args(["--kinds", "read"]);
+    refuse(&mut command, &["--kinds: only with --addresses"]);
 }
 
 #[test]

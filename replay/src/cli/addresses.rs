@@ -1,5 +1,6 @@
 //! `replay run --addresses`: the caches alone, fed with the addresses of any program.
 
+use super::ConfigArgs;
 use super::experiment_args::parse_caches;
 use crate::addresses::{self, KindSet};
 use crate::config::RunConfig;
@@ -34,40 +35,12 @@ enum KindName {
     Fetch,
 }
 
-/// What has no meaning without tiles and a texture unit, or is not made for addresses.
-const OF_TRACES: [&str; 24] = [
-    "trace",
-    "order",
-    "mode",
-    "cores",
-    "assign",
-    "hsr",
-    "filter",
-    "lod",
-    "lod_bias",
-    "helper_lanes",
-    "texel_format",
-    "block_order",
-    "uncompressed_order",
-    "base_align",
-    "texture_order",
-    "l1_penalty",
-    "l2_penalty",
-    "loop_cycles",
-    "tmu_threads",
-    "retry_footprints",
-    "fetches_per_trip",
-    "tiles",
-    "compare_modes",
-    "print_config",
-];
-
-/// Arguments of plain addresses.
+/// Plain addresses in place of a trace.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Plain addresses")]
-pub struct AddressArgs {
+pub struct AddressInput {
     /// Plain addresses in place of a trace, gzip or zstd or neither; - is standard input
-    #[arg(long, value_name = "FILE", conflicts_with_all = OF_TRACES)]
+    #[arg(long, value_name = "FILE")]
     addresses: Option<PathBuf>,
     /// Form of the addresses [default: by name (.u32, .u64, .din, .gem5) or content]
     #[arg(long, value_name = "FORM")]
@@ -75,6 +48,88 @@ pub struct AddressArgs {
     /// Kinds of access that the caches see [default: all]
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Option<Vec<KindName>>,
+}
+
+impl AddressInput {
+    /// Where the addresses are, if they were asked for.
+    ///
+    /// # Errors
+    /// A flag that means nothing without addresses, or one of `machine` that means nothing with them.
+    /// (Clap does not ask for an argument that conflicts with the trace.)
+    pub fn path(&self, machine: &ConfigArgs) -> Result<Option<&Path>> {
+        let Some(path) = &self.addresses else {
+            let flags = [
+                ("--address-form", self.address_form.is_some()),
+                ("--kinds", self.kinds.is_some()),
+            ];
+            only_with_addresses(&flags)?;
+            return Ok(None);
+        };
+        if let Some(flag) = machine.first_of_traces() {
+            bail!(
+                "{flag} cannot be used with --addresses: it is about tiles, textures or the texture unit"
+            );
+        }
+        Ok(Some(path))
+    }
+
+    /// The file of `--addresses`; none for standard input.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        self.addresses
+            .as_deref()
+            .filter(|path| *path != Path::new("-"))
+    }
+
+    /// Opens what is at `path`.
+    ///
+    /// # Errors
+    /// It cannot be read, or its form is not known.
+    pub fn open(&self, path: &Path) -> Result<AddressFile<'static>> {
+        let form = self.address_form.map(|form| match form {
+            FormName::U32 => AddressForm::U32,
+            FormName::U64 => AddressForm::U64,
+            FormName::Din => AddressForm::Din,
+            FormName::Gem5 => AddressForm::Gem5,
+        });
+        Ok(AddressFile::open(path, form)?)
+    }
+
+    /// The kinds of access that count.
+    #[must_use]
+    pub fn kinds(&self) -> KindSet {
+        let kind = |name: &KindName| match name {
+            KindName::Read => AccessKind::Read,
+            KindName::Write => AccessKind::Write,
+            KindName::Fetch => AccessKind::Fetch,
+        };
+        self.kinds.as_ref().map_or(KindSet::ALL, |names| {
+            KindSet::of(&names.iter().map(kind).collect::<Vec<_>>())
+        })
+    }
+}
+
+/// Refuses the first flag that was given.
+fn only_with_addresses(flags: &[(&str, bool)]) -> Result<()> {
+    match flags.iter().find(|(_, given)| *given) {
+        Some((flag, _)) => bail!("{flag}: only with --addresses"),
+        None => Ok(()),
+    }
+}
+
+/// What plain addresses are called.
+#[must_use]
+pub fn name_of(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// Arguments of `replay run --addresses`.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Plain addresses")]
+pub struct AddressArgs {
+    #[command(flatten)]
+    input: AddressInput,
     /// Several L1/L2 sizes in KiB, replayed in one pass if LRU
     #[arg(
         long,
@@ -91,20 +146,13 @@ impl AddressArgs {
     /// Where the addresses are, if they were asked for.
     ///
     /// # Errors
-    /// A flag that means nothing without addresses. (Clap does not ask for an argument that conflicts
-    /// with the trace.)
-    pub fn path(&self) -> Result<Option<&Path>> {
-        let flags = [
-            ("--address-form", self.address_form.is_some()),
-            ("--kinds", self.kinds.is_some()),
-            ("--caches", self.caches.is_some()),
-            ("--csv", self.csv),
-        ];
-        let given = flags.into_iter().find(|(_, given)| *given);
-        match (&self.addresses, given) {
-            (None, Some((flag, _))) => bail!("{flag}: only with --addresses"),
-            (path, _) => Ok(path.as_deref()),
+    /// As [`AddressInput::path`].
+    pub fn path(&self, machine: &ConfigArgs) -> Result<Option<&Path>> {
+        let path = self.input.path(machine)?;
+        if path.is_none() {
+            only_with_addresses(&[("--caches", self.caches.is_some()), ("--csv", self.csv)])?;
         }
+        Ok(path)
     }
 
     /// Replays the addresses at `path` and prints what the caches made of them.
@@ -113,22 +161,9 @@ impl AddressArgs {
     /// Wrong cache sizes, unreadable input.
     pub fn run(&self, path: &Path, config: &RunConfig, json: bool) -> Result<ExitCode> {
         let configs = self.configs(config)?;
-        let form = self.address_form.map(|form| match form {
-            FormName::U32 => AddressForm::U32,
-            FormName::U64 => AddressForm::U64,
-            FormName::Din => AddressForm::Din,
-            FormName::Gem5 => AddressForm::Gem5,
-        });
-        let kind = |name: &KindName| match name {
-            KindName::Read => AccessKind::Read,
-            KindName::Write => AccessKind::Write,
-            KindName::Fetch => AccessKind::Fetch,
-        };
-        let kinds = self.kinds.as_ref().map_or(KindSet::ALL, |names| {
-            KindSet::of(&names.iter().map(kind).collect::<Vec<_>>())
-        });
+        let kinds = self.input.kinds();
         let start = Instant::now();
-        let file = AddressFile::open(path, form)?;
+        let file = self.input.open(path)?;
         let read_as = match file.compression() {
             None => file.form().name().to_owned(),
             Some(compression) => format!("{} in {}", file.form().name(), compression.name()),
@@ -140,10 +175,7 @@ impl AddressArgs {
             "{:.1} M accesses/s ({accesses} accesses in {seconds:.3} s, read as {read_as})",
             accesses as f64 / seconds / 1e6,
         ));
-        let name = path
-            .file_name()
-            .unwrap_or(path.as_os_str())
-            .to_string_lossy();
+        let name = name_of(path);
         super::print(&match (json, self.csv) {
             (true, _) => report::json(&name, &outcome)?,
             (_, true) => report::csv(&outcome),

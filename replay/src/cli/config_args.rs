@@ -1,8 +1,8 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
 use crate::config::{
-    AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr, LodFormula, Mode, Order,
-    Replacement, RunConfig, TextureOrder,
+    AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr, LodFormula, Mode,
+    Order, Replacement, RunConfig, TextureOrder,
 };
 use crate::size::{format_bytes, parse_bytes};
 use anyhow::{Context, Result, anyhow, ensure};
@@ -182,6 +182,41 @@ impl ConfigArgs {
         self.apply(&mut config)?;
         config.validate()?;
         Ok(config)
+    }
+
+    /// The first flag that means something for tiles, textures or the texture unit alone, not for plain
+    /// addresses.
+    #[must_use]
+    pub fn first_of_traces(&self) -> Option<&'static str> {
+        let flags = [
+            ("--order", self.order.is_some()),
+            ("--mode", self.mode.is_some()),
+            ("--cores", self.cores.is_some()),
+            ("--assign", self.assign.is_some()),
+            ("--between-frames", self.between_frames.is_some()),
+            ("--hsr", self.hsr.is_some()),
+            ("--filter", self.filter.is_some()),
+            ("--lod", self.lod.is_some()),
+            ("--lod-bias", self.lod_bias.is_some()),
+            ("--max-anisotropy", self.max_anisotropy.is_some()),
+            ("--anisotropy", self.anisotropy.is_some()),
+            ("--helper-lanes", self.helper_lanes),
+            ("--texel-format", self.texel_format.is_some()),
+            ("--block-order", self.block_order.is_some()),
+            ("--uncompressed-order", self.uncompressed_order.is_some()),
+            ("--base-align", self.base_align.is_some()),
+            ("--texture-order", self.texture_order.is_some()),
+            ("--l1-penalty", self.l1_penalty.is_some()),
+            ("--l2-penalty", self.l2_penalty.is_some()),
+            ("--loop-cycles", self.loop_cycles.is_some()),
+            ("--tmu-threads", self.tmu_threads.is_some()),
+            ("--retry-footprints", self.retry_footprints.is_some()),
+            ("--fetches-per-trip", self.fetches_per_trip.is_some()),
+        ];
+        flags
+            .into_iter()
+            .find(|(_, given)| *given)
+            .map(|(flag, _)| flag)
     }
 
     /// The file of `--config`.

@@ -1,17 +1,18 @@
 //! `replay locality`: reuse distances and what follows from them, order beside order.
 
 use super::ConfigArgs;
+use super::addresses::{AddressInput, name_of};
 use super::experiment_args::{page_outputs, parse_orders};
 use super::subjects::Traces;
-use crate::config::RunConfig;
+use crate::config::{Order, RunConfig};
 use crate::experiment::frame_count;
 use crate::files::{self, write_atomically};
-use crate::locality::analyse;
+use crate::locality::{analyse, analyse_addresses};
 use crate::report::locality::{LocalityReport, TraceFigures};
 use crate::stream::TileSource;
 use anyhow::{Context, Result, ensure};
 use shell::{Output, Progress, is_stdout};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments of `replay locality`.
@@ -21,11 +22,18 @@ use std::process::ExitCode;
   replay locality c.textrace --orders all --html locality.html
   replay locality c.textrace --orders morton,z2-sta --l1 16KiB --json
   replay locality c.textrace --csv tables
+  replay locality --addresses gcc.din.gz --l1 32KiB --l2 256KiB --line 64
 docs/locality.md defines every figure.")]
 pub struct Args {
     /// Texture traces
-    #[arg(required = true, value_name = "TRACE")]
+    #[arg(
+        required_unless_present = "addresses",
+        value_name = "TRACE",
+        conflicts_with = "addresses"
+    )]
     traces: Vec<PathBuf>,
+    #[command(flatten)]
+    addresses: AddressInput,
     #[command(flatten)]
     machine: ConfigArgs,
     /// Orders to compare, comma-separated, or `all`
@@ -64,28 +72,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     );
     let orders = parse_orders(&args.orders)?;
     let prints = check_outputs(args)?;
-    let traces = Traces::open(&args.traces)?;
-    let subjects = traces.subjects();
-    let frames = |source: &dyn TileSource| u64::from(frame_count(source.tables()));
-    let steps: u64 = subjects.iter().map(|s| frames(s.source)).sum();
-    let progress = Progress::new("analysing", steps * orders.len() as u64, "frames");
-    let mut figures = Vec::new();
-    for subject in &subjects {
-        let done = |steps| progress.advance(steps);
-        let orders = analyse(subject.source, &config, &orders, args.merged, &done)
-            .with_context(|| subject.label.clone())?;
-        figures.push(TraceFigures {
-            label: subject.label.clone(),
-            id: subject.id.clone(),
-            frames: frame_count(subject.source.tables()),
-            orders,
-        });
-    }
-    drop(progress);
-    let report = LocalityReport {
-        traces: figures,
-        config,
+    let traces = match args.addresses.path(&args.machine)? {
+        Some(path) => vec![of_addresses(args, path, &config)?],
+        None => of_traces(args, &config, &orders)?,
     };
+    let report = LocalityReport { traces, config };
     if let Some(folder) = &args.csv {
         for (name, text) in report.csv_files() {
             write_atomically(&folder.join(name), text.as_bytes())?;
@@ -110,6 +101,43 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Analyses the traces in every order.
+fn of_traces(args: &Args, config: &RunConfig, orders: &[Order]) -> Result<Vec<TraceFigures>> {
+    let traces = Traces::open(&args.traces)?;
+    let subjects = traces.subjects();
+    let frames = |source: &dyn TileSource| u64::from(frame_count(source.tables()));
+    let steps: u64 = subjects.iter().map(|s| frames(s.source)).sum();
+    let progress = Progress::new("analysing", steps * orders.len() as u64, "frames");
+    let mut figures = Vec::new();
+    for subject in &subjects {
+        let done = |steps| progress.advance(steps);
+        let orders = analyse(subject.source, config, orders, args.merged, &done)
+            .with_context(|| subject.label.clone())?;
+        figures.push(TraceFigures {
+            label: subject.label.clone(),
+            id: Some(subject.id.clone()),
+            frames: frame_count(subject.source.tables()),
+            orders,
+        });
+    }
+    Ok(figures)
+}
+
+/// Analyses plain addresses.
+fn of_addresses(args: &Args, path: &Path, config: &RunConfig) -> Result<TraceFigures> {
+    ensure!(
+        !args.merged,
+        "--merged cannot be used with --addresses: there are no cores"
+    );
+    let file = args.addresses.open(path)?;
+    Ok(TraceFigures {
+        label: name_of(path),
+        id: None,
+        frames: 1,
+        orders: vec![analyse_addresses(file, config, args.addresses.kinds())?],
+    })
+}
+
 /// Checks the outputs; true where standard output is left for the result.
 fn check_outputs(args: &Args) -> Result<bool> {
     let csv: Vec<PathBuf> = args
@@ -122,6 +150,7 @@ fn check_outputs(args: &Args) -> Result<bool> {
     outputs.extend(pages.flat_map(|path| page_outputs("--html", path)));
     outputs.extend(args.json.then(|| Output::result("--json")));
     let inputs = args.traces.iter().map(PathBuf::as_path);
+    let inputs = inputs.chain(args.addresses.file());
     files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
     Ok(!args.html.iter().any(|path| is_stdout(path)))
 }

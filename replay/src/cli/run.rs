@@ -21,7 +21,7 @@ use std::time::Instant;
   replay convert c.textrace --to u32 | replay run --addresses - --address-form u32 --caches 8/128,16/256")]
 pub struct Args {
     /// Texture trace; may be left out with --addresses and --print-config
-    #[arg(required_unless_present_any = ["print_config", "addresses"])]
+    #[arg(required_unless_present_any = ["print_config", "addresses"], conflicts_with = "addresses")]
     trace: Option<PathBuf>,
     #[command(flatten)]
     machine: ConfigArgs,
@@ -31,13 +31,13 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     /// Also count by tile (in the JSON)
-    #[arg(long, requires = "json")]
+    #[arg(long, requires = "json", conflicts_with = "addresses")]
     tiles: bool,
     /// Replay in both modes and print the difference
-    #[arg(long, conflicts_with = "mode")]
+    #[arg(long, conflicts_with_all = ["mode", "addresses"])]
     compare_modes: bool,
     /// Print the whole configuration as TOML and stop
-    #[arg(long, conflicts_with_all = ["json", "compare_modes"])]
+    #[arg(long, conflicts_with_all = ["json", "compare_modes", "addresses"])]
     print_config: bool,
     #[command(flatten)]
     threads: shell::Threads,
@@ -49,7 +49,7 @@ pub struct Args {
 /// An impossible configuration or an unreadable trace.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut config = args.machine.resolve()?;
-    if let Some(path) = args.addresses.path()? {
+    if let Some(path) = args.addresses.path(&args.machine)? {
         args.threads.start()?;
         return args.addresses.run(path, &config, args.json);
     }

@@ -1,7 +1,7 @@
 //! Locality: how far apart the uses of lines lie, and what that means for caches of every size.
 //!
 //! [`Profile`] analyses one stream of lines, which it is told line by line, each with its place;
-//! [`analyse`] makes the streams of a trace, one pass an order. `docs/locality.md` defines every
+//! [`analyse`] makes the streams of a trace, one pass an order, [`analyse_addresses`] those of plain addresses. `docs/locality.md` defines every
 //! figure.
 
 mod axis;
@@ -11,6 +11,7 @@ mod last_use;
 mod opt;
 mod orders;
 mod place;
+mod plain;
 mod profile;
 mod set_associative;
 mod split;
@@ -20,8 +21,9 @@ mod working_set;
 
 pub use distances::{DistanceBin, Distances};
 pub use figures::Figures;
-pub use orders::{OrderFigures, Stream, analyse};
+pub use orders::{OrderFigures, Sequence, Stream, analyse};
 pub use place::{ByOrigin, Origin, Place};
+pub use plain::analyse_addresses;
 pub use profile::{Profile, StreamCache};
 pub use set_associative::CacheHits;
 pub use split::MissSplit;

@@ -46,11 +46,40 @@ impl Stream {
     }
 }
 
-/// What an order makes of the locality of a trace.
+/// What puts accesses one after another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sequence {
+    /// A tile order.
+    Order(Order),
+    /// Plain addresses: the file.
+    AsGiven,
+}
+
+impl Sequence {
+    /// Name in columns.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Order(order) => order.name(),
+            Self::AsGiven => "as-given",
+        }
+    }
+
+    /// Name in headings.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Order(order) => order.title(),
+            Self::AsGiven => "as given",
+        }
+    }
+}
+
+/// What a sequence of accesses makes of locality.
 #[derive(Clone, Debug)]
 pub struct OrderFigures {
-    /// The order.
-    pub order: Order,
+    /// The sequence.
+    pub order: Sequence,
     /// Figures of each stream.
     pub streams: Vec<(Stream, Figures)>,
 }
@@ -265,7 +294,10 @@ impl Analysis {
         let mut streams = vec![(Stream::L1, l1), (Stream::L2, self.l2.profile.finish())];
         let merged = self.merged.map(|shared| shared.profile.finish());
         streams.extend(merged.map(|figures| (Stream::Merged, figures)));
-        OrderFigures { order, streams }
+        OrderFigures {
+            order: Sequence::Order(order),
+            streams,
+        }
     }
 }
 

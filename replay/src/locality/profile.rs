@@ -75,6 +75,9 @@ pub struct Profile {
 }
 
 impl Profile {
+    /// Largest size of the curves over the configured one, rounded up to a power of two.
+    pub(super) const LARGEST_OVER_CONFIGURED: u64 = 1 << *SIZES.end();
+
     /// An analysis before its first line.
     ///
     /// # Errors

@@ -203,7 +203,9 @@ fn misses_are_those_of_a_replay() {
         };
         let figures = analyse(&trace, &config, &orders, true, &|_| ()).unwrap();
         for of_order in figures {
-            let order = of_order.order;
+            let Sequence::Order(order) = of_order.order else {
+                panic!("traces are analysed in tile orders");
+            };
             let result = replay(&trace, &RunConfig { order, ..config }).unwrap();
             for (stream, figures) in &of_order.streams {
                 let level = match stream {

@@ -51,7 +51,7 @@ fn level<'a, 'r>(
     ]
 }
 
-fn count<'a, 'r, V: Into<super::columns::Value>>(
+fn count<'a, 'r, V: super::columns::Cell>(
     key: String,
     name: String,
     value: impl Fn(&PointRow<'r>) -> V + 'a,

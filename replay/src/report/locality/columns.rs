@@ -1,7 +1,9 @@
 //! The tables' rows and their columns, a line each.
 
-use crate::config::{CacheConfig, Order};
-use crate::locality::{ByOrigin, CacheHits, Figures, MissSplit, Origin, Stream, WorkingSet};
+use crate::config::CacheConfig;
+use crate::locality::{
+    ByOrigin, CacheHits, Figures, MissSplit, Origin, Sequence, Stream, WorkingSet,
+};
 use crate::report::columns::{Column, Show};
 
 /// What a row is about.
@@ -9,8 +11,8 @@ use crate::report::columns::{Column, Show};
 pub struct Subject<'a> {
     /// Label of the trace.
     pub trace: &'a str,
-    /// The order.
-    pub order: Order,
+    /// What puts the accesses one after another.
+    pub order: Sequence,
     /// The stream.
     pub stream: Stream,
     /// Bytes of a line.
@@ -101,7 +103,7 @@ where
 {
     vec![
         Column::text("trace", "trace", move |r| of(r).trace),
-        Column::text("order", "order", move |r| of(r).order.name()),
+        Column::text("order", "order", move |r| of(r).order.key()),
         Column::text("stream", "stream", move |r| of(r).stream.key()),
     ]
 }

@@ -19,8 +19,8 @@ pub const SCHEMA: &str = "replay.locality/1";
 pub struct TraceFigures {
     /// Short name, unique in the report.
     pub label: String,
-    /// Scene and checksum.
-    pub id: TraceId,
+    /// Scene and checksum; none of plain addresses.
+    pub id: Option<TraceId>,
     /// Frames that it renders.
     pub frames: u32,
     /// By order.
@@ -52,7 +52,7 @@ struct Document<'r, 'a> {
 struct TraceFacts<'a> {
     label: &'a str,
     #[serde(flatten)]
-    id: &'a TraceId,
+    id: Option<&'a TraceId>,
     frames: u32,
 }
 
@@ -60,7 +60,7 @@ impl<'a> TraceFacts<'a> {
     fn of(trace: &'a TraceFigures) -> Self {
         Self {
             label: &trace.label,
-            id: &trace.id,
+            id: trace.id.as_ref(),
             frames: trace.frames,
         }
     }

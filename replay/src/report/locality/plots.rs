@@ -2,7 +2,7 @@
 
 use super::LocalityReport;
 use super::columns::{CurvePoint, Reuses, Summary};
-use crate::locality::{CacheHits, Origin};
+use crate::locality::{CacheHits, Origin, Sequence};
 use crate::report::plots::SeriesStyle;
 use crate::report::plots::bars::{BarChart, BarGroup};
 use crate::report::plots::lines::{Axis, Doublings, LineChart, LineSeries, Mark};
@@ -12,7 +12,10 @@ use crate::report::theme;
 fn style(summary: &Summary) -> SeriesStyle {
     SeriesStyle {
         name: summary.of.order.title().to_owned(),
-        color: theme::color(summary.of.order.color()),
+        color: match summary.of.order {
+            Sequence::Order(order) => theme::color(order.color()),
+            Sequence::AsGiven => theme::INK,
+        },
     }
 }
 
