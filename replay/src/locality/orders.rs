@@ -7,7 +7,8 @@ use crate::config::{ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::order::{self, Phase};
 use crate::stream::{
-    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, shaded,
+    Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, TraceCounts,
+    interleave, shaded,
 };
 use formats::textrace::Pass;
 use formats::view::Eye;
@@ -112,6 +113,14 @@ pub fn analyse(
     let mut figures = Vec::new();
     for orders in orders.chunks(together.max(1)) {
         let expander = Expander::new(&shaded, config)?;
+        let tiles = expander.bins().tiles();
+        if tiles > Place::MOST_TILES as usize {
+            return Err(StreamError::Tables(format!(
+                "passes have {tiles} tiles: expected at most {}",
+                Place::MOST_TILES
+            ))
+            .into());
+        }
         let mut counts = TraceCounts::new(expander.bins());
         let analyses: Result<Vec<Option<Analysis>>, ConfigError> = orders
             .iter()
