@@ -296,7 +296,7 @@ fn bad_plans_and_outputs_are_refused_before_the_work() {
         &["--shard", "1/2"][..],
         &["--merge-only"],
         &["--emit-slurm", "2"],
-        &["--plan"],
+        &["--plan", "--json"],
     ] {
         refuse(
             &mut sweep.command_of("bad.toml", "out", flags),
@@ -325,10 +325,7 @@ fn bad_plans_and_outputs_are_refused_before_the_work() {
             "the same output twice",
         ),
     ] {
-        refuse(
-            &mut sweep.command("out", &["--parquet", path]),
-            &["--parquet", expected][1..],
-        );
+        refuse(&mut sweep.command("out", &["--parquet", path]), &[expected]);
     }
     assert!(sweep.points("out").is_empty());
 }
