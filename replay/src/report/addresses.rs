@@ -21,6 +21,9 @@ impl PointRow<'_> {
     }
 }
 
+/// A level of a point.
+type OfLevel = fn(&Point) -> &LevelCounts;
+
 /// Names of the kinds of access, in the order of the counters.
 const KINDS: [&str; 3] = ["reads", "writes", "fetches"];
 
@@ -28,7 +31,7 @@ const KINDS: [&str; 3] = ["reads", "writes", "fetches"];
 fn level<'a, 'r>(
     key: &'static str,
     name: &'static str,
-    of: fn(&Point) -> &LevelCounts,
+    of: OfLevel,
 ) -> [Column<'a, PointRow<'r>>; 3] {
     let key = |end: &str| format!("{key}.{end}");
     let name = |end: &str| format!("{name} {end}");
@@ -107,8 +110,7 @@ fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
     );
     for (kind, name) in KINDS.into_iter().enumerate() {
         let only_reads = |r: &PointRow<'r>| r.outcome.totals.accesses[1..] == [0, 0];
-        let levels: [(&str, fn(&Point) -> &LevelCounts); 2] =
-            [("L1", |point| &point.l1), ("L2", |point| &point.l2)];
+        let levels: [(&str, OfLevel); 2] = [("L1", |point| &point.l1), ("L2", |point| &point.l2)];
         for (level, of) in levels {
             let key = format!("{name}.{}_line_misses", level.to_lowercase());
             columns.push(count(key, format!("{level} {name}"), move |r| {
