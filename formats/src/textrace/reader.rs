@@ -13,6 +13,9 @@ use nom::Parser;
 use nom::multi::count;
 use std::path::Path;
 
+/// Most records that memory is set aside for before any was read.
+const MOST_RESERVED: u32 = 1 << 16;
+
 /// What the index says about a tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileStats {
@@ -150,8 +153,9 @@ impl Textrace {
 
     fn decode_entry(&self, entry: &IndexEntry, out: &mut Tile) -> Result<()> {
         let IndexEntry { runs, records, .. } = *entry;
-        out.runs.reserve(runs as usize);
-        out.records.reserve(records as usize);
+        // Records of a few bits can be many; more than a usual tile's take memory as they come.
+        out.runs.reserve(runs.min(MOST_RESERVED) as usize);
+        out.records.reserve(records.min(MOST_RESERVED) as usize);
         tile_chunk(&self.container).parse(&entry.span, |input| match entry.encoding {
             Encoding::Raw => raw::decode(runs, records, input, out),
             Encoding::Delta => delta::decode(runs, records, input, out),

@@ -15,6 +15,7 @@ const FEW_ENTRIES: usize = 1 << 9;
 /// A prefix code, for both directions.
 pub(super) struct Code {
     /// Its place in [`LENGTHS`].
+    #[cfg_attr(not(test), expect(dead_code, reason = "training counts by it"))]
     pub number: usize,
     /// By the next [`MOST_BITS`] bits: symbol * 16 + length.
     by_bits: Box<[u16; ENTRIES]>,
@@ -66,7 +67,7 @@ impl Code {
     pub fn decode(&self, bits: u64) -> (u32, u32) {
         let entry = lookup(&self.by_few_bits, bits);
         let entry = if entry == 0 {
-            lookup(&*self.by_bits, bits)
+            lookup(&self.by_bits, bits)
         } else {
             entry
         };

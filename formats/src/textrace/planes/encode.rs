@@ -341,9 +341,12 @@ fn first_pairs(quad: &Quad, expected: &Expected) -> [[i32; 2]; 4] {
     ]
 }
 
+/// A pair, its class and the bits that name it in the class.
+type Classified = ([i32; 2], (u32, u32));
+
 /// Residuals in the order in which they are written, dx, dy, cross, uv, with their classes; the
 /// classes as one number, too.
-fn classes(left: &Quad) -> (u32, [([i32; 2], (u32, u32)); 4]) {
+fn classes(left: &Quad) -> (u32, [Classified; 4]) {
     let [uv, dx, dy, cross] = *left;
     let pairs = [dx, dy, cross, uv].map(|pair| (pair, classify(pair)));
     let joined = pairs

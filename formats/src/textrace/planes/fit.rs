@@ -46,6 +46,10 @@ struct Equations([[f64; UNKNOWNS + 1]; UNKNOWNS]);
 
 impl Equations {
     /// Adds the eight numbers of a quad, `at` pixels from the origin.
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "several arrays have the same index"
+    )]
     fn add(&mut self, plane: &Plane, at: [f64; 2], quad: &Quad) {
         let lanes = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
         let places = lanes.map(|[i, j]| [at[0] + i, at[1] + j]);

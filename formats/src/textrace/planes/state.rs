@@ -118,7 +118,7 @@ impl State {
         let rest = 15 & !covered.unwrap_or_default();
         // Without branches, which would be hard to predict.
         let swaps = (rest != 0) & ((mask == 15) | (mask == rest));
-        mask ^ (15 ^ rest) * u8::from(swaps)
+        mask ^ ((15 ^ rest) * u8::from(swaps))
     }
 
     /// Takes in a record's place, mask and group.

@@ -26,9 +26,6 @@ struct Counts {
 impl Sink for Counts {
     fn bits(&mut self, _: u32, count: u32) {
         self.bits[self.last][1] += u64::from(count);
-        if count == 1 {
-            // A run's header begins a stretch that belongs to no code.
-        }
     }
 
     fn symbol(&mut self, code: &Code, symbol: u32, escape: u32) -> bool {
