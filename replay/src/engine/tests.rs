@@ -564,8 +564,9 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             let single = replay(&one, &config).unwrap();
             let [kept, flushed] = [config, flush].map(|c| replay(&three, &c).unwrap());
             assert_eq!(flushed.footprints, 3 * single.footprints);
-            assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
+            // Whom random replacement hits differs from frame to frame.
             if policy != crate::config::Replacement::RANDOM {
+                assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
                 assert_eq!(
                     flushed.l1.misses,
                     3 * single.l1.misses,
