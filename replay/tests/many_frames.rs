@@ -27,7 +27,7 @@ fn write(source: &dyn TileSource, frames: u32, path: &Path) {
     for frame in 0..frames {
         let again = of_frame.iter().map(|(_, pass)| Pass {
             frame,
-            ..(*pass).clone()
+            ..**pass
         });
         tables.passes.extend(again);
     }
