@@ -25,10 +25,7 @@ fn write(source: &dyn TileSource, frames: u32, path: &Path) {
     let views = old.meta.frames[first as usize].clone();
     tables.meta.frames = vec![views; frames as usize];
     for frame in 0..frames {
-        let again = of_frame.iter().map(|(_, pass)| Pass {
-            frame,
-            ..**pass
-        });
+        let again = of_frame.iter().map(|(_, pass)| Pass { frame, ..**pass });
         tables.passes.extend(again);
     }
     let mut writer = TextraceWriter::create(path, &tables).unwrap();
