@@ -21,8 +21,9 @@ use std::collections::HashMap;
 /// Passes whose machines are kept from frame to frame; beyond them a stream is expanded again.
 const WAVE: usize = 256;
 
-/// Configurations that share a pass at most: their counters are large.
-const MOST_TOGETHER: usize = 1024;
+/// Configurations that share a pass at most: their counters are large, and several passes keep several cores busy.
+/// It does not depend on the number of cores, so that shards of a sweep agree.
+const MOST_TOGETHER: usize = 256;
 
 /// What a batch of replays shared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
