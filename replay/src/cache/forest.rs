@@ -79,10 +79,20 @@ impl Forest {
     }
 
     /// Accesses a line. `depths` gets, for each number of sets, how deep the line lay in its
-    /// stack: a cache of more ways than that had it.
+    /// stack: a cache of more ways than that had it. The line lay on top for all numbers of sets from the
+    /// returned one on.
     #[inline(always)]
-    pub fn access(&mut self, line: u32, depths: &mut [u8]) {
-        deepest(&mut self.trees, line, depths);
+    pub fn access(&mut self, line: u32, depths: &mut [u8]) -> usize {
+        let mut searched = self.trees.len();
+        for (tree, (stacks, depth)) in self.trees.iter_mut().zip(depths.iter_mut()).enumerate() {
+            *depth = stacks.access(line);
+            if *depth == 0 {
+                searched = tree;
+                break;
+            }
+        }
+        depths[searched..].fill(0);
+        searched
     }
 }
 

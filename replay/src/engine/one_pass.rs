@@ -261,11 +261,12 @@ impl OnePass {
         }
         for under in &mut self.under {
             let l2_trees = under.level.tallies.len();
-            let mut missing = 0;
+            let (mut missing, mut searched) = (0, 0);
             for (&line, depths) in lines.iter().zip(depths.chunks(trees)) {
                 if u32::from(depths[under.tree]) >= under.ways {
                     let l2_depths = &mut self.l2_depths[missing * l2_trees..];
-                    under.forest.access(line, &mut l2_depths[..l2_trees]);
+                    let on_top = under.forest.access(line, &mut l2_depths[..l2_trees]);
+                    searched = searched.max(on_top);
                     missing += 1;
                 }
             }
@@ -273,7 +274,8 @@ impl OnePass {
                 continue;
             }
             let depths = &self.l2_depths[..missing * l2_trees];
-            for (tree, tally) in under.level.tallies.iter_mut().enumerate() {
+            // Larger numbers of sets have all lines on top.
+            for (tree, tally) in under.level.tallies[..searched].iter_mut().enumerate() {
                 let of = tally.count(cell, depths.iter().skip(tree).step_by(l2_trees).copied());
                 for &missing in of.lines.iter().take(of.count.into()) {
                     tally.tile(tile, missing);
