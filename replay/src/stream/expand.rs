@@ -22,7 +22,8 @@ pub struct LineMemory {
 }
 
 impl LineMemory {
-    /// What is kept unless said otherwise: four stereo frames of the size of the Z2 paper's.
+    /// What is kept unless said otherwise: four stereo frames of the size of the Z2 paper's, two where
+    /// points are timed.
     pub const USUAL_BYTES: u64 = 384 << 20;
 
     /// So much memory.
