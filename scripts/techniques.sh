@@ -13,7 +13,7 @@ say() { printf '[%3ds] %s\n' "$(($(date +%s) - start))" "$*"; }
 set --
 for scene in plant atrium jungle; do
     say "measure $scene"
-    "$bin/tracegen" techniques "$scene" --path head --repeats 2 -o "$out/$scene"
+    "$bin/tracegen" techniques "$scene" --path head --frames 2 --repeats 2 -o "$out/$scene"
     set -- "$@" "$out/$scene"
 done
 say "replay the traces, compare the pictures"

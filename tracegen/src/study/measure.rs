@@ -2,6 +2,7 @@
 
 use super::folder::{Folder, FrameRecord, RowRecord};
 use super::memory;
+use super::processor;
 use super::rows::Row;
 use super::world::{Shot, Tracer, World};
 use formats::textrace::TextraceWriter;
@@ -251,7 +252,7 @@ pub fn time<'s>(
             0 => planner(frame),
             _ => &baseline,
         },
-        |contestant, frame, shot| {
+        |contestant, frame, shot, _| {
             if contestant == 0 {
                 times[frame].add(shot);
                 advance();
@@ -265,7 +266,8 @@ pub fn time<'s>(
 
 /// Renders each measured frame with every contestant, one after the other, as often as `extent` says;
 /// `planner` tells what a contestant renders a frame with. `took`
-/// hears the contestant's number, the position of the frame among the measured ones, and what was rendered.
+/// hears the contestant's number, the position of the frame among the measured ones, what was rendered, and the
+/// processors' time that it took, where the system tells.
 ///
 /// # Errors
 /// Driver errors.
@@ -275,7 +277,7 @@ pub fn in_turns<'s>(
     extent: &Extent,
     contestants: usize,
     planner: impl Fn(usize, u32) -> &'s Planner,
-    mut took: impl FnMut(usize, usize, &Shot),
+    mut took: impl FnMut(usize, usize, &Shot, Option<Duration>),
 ) -> anyhow::Result<()> {
     let frames = extent.frames();
     let remembers = (frames.iter())
@@ -288,9 +290,14 @@ pub fn in_turns<'s>(
                 // Whoever comes later finds warmer caches: they take turns at that as well.
                 let contestant = (place + repeat + 1) % contestants;
                 let memory = &mut memories[contestant];
+                let before = processor::time();
                 let shot = world.shoot(backend, planner(contestant, number), number, memory)?;
                 if is_measured {
-                    took(contestant, measured, &shot);
+                    let now = processor::time();
+                    let worked = now
+                        .zip(before)
+                        .map(|(now, before)| now.saturating_sub(before));
+                    took(contestant, measured, &shot, worked);
                 }
             }
             measured += usize::from(is_measured);

@@ -6,5 +6,6 @@ pub mod folder;
 pub mod frames;
 pub mod measure;
 pub mod memory;
+pub mod processor;
 pub mod rows;
 pub mod world;

@@ -69,6 +69,12 @@ pub struct Lavapipe {
 }
 
 impl Lavapipe {
+    /// The device is the processor.
+    #[must_use]
+    pub fn is_software(&self) -> bool {
+        self.gpu.is_software
+    }
+
     /// Opens lavapipe and uploads the scene, see [`Self::on`].
     ///
     /// # Errors

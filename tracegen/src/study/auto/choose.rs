@@ -60,6 +60,7 @@ pub fn choose(
         "techniques alone, and combinations",
     );
     let mut bench = Bench {
+        is_software: backend.is_software(),
         world,
         backend,
         budget,

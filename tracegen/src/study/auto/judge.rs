@@ -24,6 +24,8 @@ pub struct Bench<'a> {
     pub world: &'a mut World,
     /// The device.
     pub backend: &'a mut Lavapipe,
+    /// The device is the processor.
+    pub is_software: bool,
     /// What errors are measured in.
     pub budget: Budget,
     /// Frames and repeats of the search.
@@ -140,14 +142,17 @@ impl Judge for Bench<'_> {
             "frames with each of the cheapest, in turns",
         );
         let mut times = vec![vec![Vec::new(); frames]; rows.len()];
+        // A processor's frame time is its work, which the machine's other work does not change.
+        let is_software = self.is_software;
         in_turns(
             self.world,
             self.backend,
             &extent,
             rows.len(),
             |contestant, _| &*planners[contestant],
-            |contestant, frame, shot| {
-                times[contestant][frame].push(shot.total);
+            |contestant, frame, shot, worked| {
+                let worked = worked.filter(|_| is_software);
+                times[contestant][frame].push(worked.unwrap_or(shot.total));
                 if contestant == 0 {
                     self.progress.advance(1);
                 }

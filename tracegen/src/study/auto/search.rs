@@ -29,8 +29,8 @@ pub trait Judge {
     /// Its own.
     fn judge(&mut self, row: &Row) -> Result<Verdict, Self::Error>;
 
-    /// Times the baseline, which comes first, and combinations that were judged, in turns and more
-    /// often: the ratio of each one's frame time to the baseline's.
+    /// Times the baseline, which comes first, and combinations that were judged, in turns, more often and as
+    /// exactly as can be: the ratio of each one's frame time to the baseline's.
     ///
     /// # Errors
     /// Its own.
