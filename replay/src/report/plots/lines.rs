@@ -75,10 +75,13 @@ impl Axis {
         }
     }
 
-    /// Writes what is at a place on the axis; nothing between doublings.
+    /// Writes what is at a place on the axis; nothing between doublings, but numbers on an axis that has few.
     fn tick(&self, range: &Range<f64>) -> Box<dyn Fn(&f64) -> String> {
         match self.doublings {
             None => Box::new(tick_format(range)),
+            Some(Doublings::Numbers) if range.end - range.start < 3.0 => {
+                Box::new(|place| theme::group_thousands(&format!("{:.1}", place.exp2())))
+            }
             Some(of) => Box::new(move |place| {
                 let whole = place.round();
                 let value = whole.exp2();
