@@ -128,9 +128,21 @@ fn check_frame(key: &str, frame: &Frame, is_baseline: bool) -> Checked {
         format!("{times} times, one for each of `frame_s`"),
         baseline,
     )?;
+    let beside = frame.baseline_processor_s.len();
+    ensure(
+        frame.processor_s.len() == beside,
+        format!("{key}.baseline_processor_s"),
+        format!(
+            "{} times, as many as `processor_s`",
+            frame.processor_s.len()
+        ),
+        beside,
+    )?;
     for (name, list) in [
         ("frame_s", &frame.frame_s),
         ("baseline_s", &frame.baseline_s),
+        ("processor_s", &frame.processor_s),
+        ("baseline_processor_s", &frame.baseline_processor_s),
     ] {
         for (i, time) in list.iter().enumerate() {
             positive(&format!("{key}.{name}[{i}]"), *time)?;

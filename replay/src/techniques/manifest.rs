@@ -123,6 +123,12 @@ pub struct Frame {
     /// Times of the baseline's same frame, each measured right beside the repeat.
     #[serde(default)]
     pub baseline_s: Vec<f64>,
+    /// What processors worked for the frame, one a repeat; none where the system did not tell.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub processor_s: Vec<f64>,
+    /// What they worked for the baseline's.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub baseline_processor_s: Vec<f64>,
     /// Time by stage.
     #[serde(default)]
     pub stages_s: Map<String, Value>,

@@ -46,6 +46,11 @@ impl Spread {
 pub struct Timing {
     /// Time over the baseline's that was measured beside it, over all frames and repeats.
     pub ratio: Spread,
+    /// What processors worked over what they worked for the baseline: of each frame the least of the repeats,
+    /// which nothing disturbs, all frames together. None where the system did not tell.
+    pub processor_ratio: Option<f64>,
+    /// The same by frame, spread over the frames.
+    pub processor_ratios: Option<Spread>,
     /// Time in ms over all frames and repeats.
     pub frame_ms: Spread,
     /// Percent of all measurements beyond the period of each of [`REFRESH_HZ`], where times are
@@ -94,7 +99,14 @@ impl Timing {
         let median = |values: Vec<f64>| Spread::of(values).map_or(0.0, |s| s.median);
         let of_frame =
             |f: &super::manifest::Frame| median(f.frame_s.iter().map(|s| ms(*s)).collect());
+        let least = |times: &[f64]| times.iter().copied().reduce(f64::min);
+        let worked: Vec<(f64, f64)> = (row.frames.iter())
+            .filter_map(|f| least(&f.processor_s).zip(least(&f.baseline_processor_s)))
+            .collect();
+        let (own_s, base_s) = (worked.iter()).fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
         Some(Self {
+            processor_ratio: (base_s > 0.0).then(|| own_s / base_s),
+            processor_ratios: Spread::of(worked.iter().map(|(own, base)| own / base)),
             ratio: Spread::of(times().zip(beside()).map(|(own, base)| own / base))?,
             frame_ms: Spread::of(times().map(ms))?,
             beyond_pct: REFRESH_HZ.map(beyond),
@@ -128,6 +140,19 @@ mod tests {
         assert!((timing.ratio.median - 0.8).abs() < 1e-12);
         assert!((timing.ratio.p99 - timing.ratio.p1).abs() < 1e-12);
         assert!((timing.frame_ms.median - 400.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn of_the_processors_work_the_least_of_each_frames_repeats_counts() {
+        let mut row = row("a", 2);
+        assert_eq!(Timing::of(&row).unwrap().processor_ratio, None);
+        for (frame, [own, base]) in row.frames.iter_mut().zip([[1.0, 2.0], [3.0, 4.0]]) {
+            frame.processor_s = vec![own, 9.0, own];
+            frame.baseline_processor_s = vec![7.0, base, base];
+        }
+        let timing = Timing::of(&row).unwrap();
+        assert_eq!(timing.processor_ratio, Some(4.0 / 6.0));
+        assert_eq!(timing.processor_ratios.unwrap().median, 0.625);
     }
 
     #[test]

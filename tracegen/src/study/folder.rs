@@ -119,6 +119,12 @@ pub struct FrameRecord {
     pub frame_s: Vec<f64>,
     /// Times of the baseline's frame, each measured beside the repeat.
     pub baseline_s: Vec<f64>,
+    /// What processors worked for the frame in each repeat, all threads together, where the system tells.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub processor_s: Vec<f64>,
+    /// What they worked for the baseline's beside it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub baseline_processor_s: Vec<f64>,
     /// Processor time by stage, the median of the repeats.
     pub stages_s: BTreeMap<String, f64>,
     /// Left and right picture, relative to the folder.

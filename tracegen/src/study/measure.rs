@@ -80,6 +80,10 @@ pub struct Times {
     pub frame: Vec<Duration>,
     /// The baseline's, each beside the other's.
     pub baseline: Vec<Duration>,
+    /// What processors worked for the frame, where the system tells.
+    pub processor: Vec<Duration>,
+    /// What they worked for the baseline's.
+    pub baseline_processor: Vec<Duration>,
     /// By stage, with the settings that are measured.
     pub stages: BTreeMap<&'static str, Vec<Duration>>,
 }
@@ -102,6 +106,8 @@ impl Bench<'_> {
             let seconds = |times: &[Duration]| times.iter().map(Duration::as_secs_f64).collect();
             frame.frame_s = seconds(&times.frame);
             frame.baseline_s = seconds(&times.baseline);
+            frame.processor_s = seconds(&times.processor);
+            frame.baseline_processor_s = seconds(&times.baseline_processor);
             frame.stages_s = (times.stages.iter())
                 .map(|(stage, times)| ((*stage).to_owned(), median_s(times)))
                 .collect();
@@ -193,6 +199,8 @@ impl Bench<'_> {
                 bytes_uploaded: work.bytes_uploaded,
                 frame_s: Vec::new(),
                 baseline_s: Vec::new(),
+                processor_s: Vec::new(),
+                baseline_processor_s: Vec::new(),
                 stages_s: BTreeMap::new(),
                 images,
                 predicted: shot.frame.plan.predicted,
@@ -252,12 +260,14 @@ pub fn time<'s>(
             0 => planner(frame),
             _ => &baseline,
         },
-        |contestant, frame, shot, _| {
+        |contestant, frame, shot, worked| {
             if contestant == 0 {
                 times[frame].add(shot);
+                times[frame].processor.extend(worked);
                 advance();
             } else {
                 times[frame].baseline.push(shot.total);
+                times[frame].baseline_processor.extend(worked);
             }
         },
     )?;

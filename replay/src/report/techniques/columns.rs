@@ -8,12 +8,13 @@ use crate::techniques::{CacheFigures, Count, Measured, OrderGain};
 pub type Figure<'a> = Column<'a, &'a Measured<'a>>;
 
 /// Keys of the table for a terminal, where it has them.
-pub const SHORT: [&str; 16] = [
+pub const SHORT: [&str; 17] = [
     "scene",
     "technique",
     "frame_time_ratio",
     "frame_time_ratio_q1",
     "frame_time_ratio_q3",
+    "processor_time_ratio",
     "beyond_90hz_pct",
     "cull_tests_ratio",
     "false_negatives",
@@ -61,6 +62,10 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
         Figure::real("frame_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q3),
         Figure::real("frame_time_ratio_p1", "1 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p1),
         Figure::real("frame_time_ratio_p99", "99 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p99),
+        Figure::real("processor_time_ratio", "processors", "\u{d7} baseline", 3, |m| m.timing.processor_ratio)
+            .about("what processors worked for all frames over what they worked for the baseline's, of each frame the least of its repeats: steadier than the clock's time where others use the machine"),
+        Figure::real("processor_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.processor_ratios.map(|r| r.q1)),
+        Figure::real("processor_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.processor_ratios.map(|r| r.q3)),
         Figure::real("frame_ms", "frame", "ms", 2, |m| m.timing.frame_ms.median)
             .about("median frame time without capture"),
         Figure::real("frame_ms_p1", "1 %", "ms", 2, |m| m.timing.frame_ms.p1),

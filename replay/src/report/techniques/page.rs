@@ -12,11 +12,12 @@ use formats::view::Eye;
 use maud::{Markup, html};
 
 /// Keys of the columns that the page's table shows; CSV and JSON have them all.
-const SHOWN: [&str; 26] = [
+const SHOWN: [&str; 27] = [
     "technique",
     "frame_time_ratio",
     "frame_time_ratio_q1",
     "frame_time_ratio_q3",
+    "processor_time_ratio",
     "frame_ms",
     "frame_ms_p99",
     "beyond_90hz_pct",

@@ -17,6 +17,8 @@ use visibility::Occlusion;
 
 /// Times of each frame in the run-off: of so many one is hardly disturbed.
 const RUN_OFF_REPEATS: u32 = 6;
+/// Frames that the search did not see and on which its winner must win, too.
+const ELSEWHERE_FRAMES: u32 = 8;
 
 /// Renders combinations and the baseline beside them.
 pub struct Bench<'a> {
@@ -66,6 +68,36 @@ impl Bench<'_> {
             self.references.insert(frame, references);
         }
         Ok(worst)
+    }
+
+    /// Renders frames with each of the rows, the baseline first, in turns: each row's time over the baseline's.
+    fn race(&mut self, rows: &[&Row], extent: &Extent) -> anyhow::Result<Vec<f64>> {
+        let planners: Vec<Arc<Planner>> = (rows.iter())
+            .map(|row| self.planner(&row.settings))
+            .collect::<anyhow::Result<_>>()?;
+        let mut times = vec![vec![Vec::new(); extent.frames().len()]; rows.len()];
+        // A processor's frame time is its work, which the machine's other work does not change.
+        let is_software = self.is_software;
+        in_turns(
+            self.world,
+            self.backend,
+            extent,
+            rows.len(),
+            |contestant, _| &*planners[contestant],
+            |contestant, frame, shot, worked| {
+                let worked = worked.filter(|_| is_software);
+                times[contestant][frame].push(worked.unwrap_or(shot.total));
+                if contestant == 0 {
+                    self.progress.advance(1);
+                }
+            },
+        )?;
+        let total_s = |times: &Vec<Vec<Duration>>| undisturbed_s(times.iter().map(|t| &**t));
+        let baseline_s = total_s(&times[0]);
+        Ok(times
+            .iter()
+            .map(|times| total_s(times) / baseline_s)
+            .collect())
     }
 
     /// The planner of some settings: what it has worked out is kept.
@@ -128,43 +160,49 @@ impl Judge for Bench<'_> {
     }
 
     fn run_off(&mut self, rows: &[&Row]) -> anyhow::Result<Vec<f64>> {
-        let planners: Vec<Arc<Planner>> = (rows.iter())
-            .map(|row| self.planner(&row.settings))
-            .collect::<anyhow::Result<_>>()?;
         let extent = Extent {
             repeats: RUN_OFF_REPEATS,
             ..self.extent.clone()
         };
-        let frames = extent.frames().len();
         self.progress.stage(
             "deciding",
-            u64::from(RUN_OFF_REPEATS) * frames as u64,
+            u64::from(RUN_OFF_REPEATS) * extent.frames().len() as u64,
             "frames with each of the cheapest, in turns",
         );
-        let mut times = vec![vec![Vec::new(); frames]; rows.len()];
-        // A processor's frame time is its work, which the machine's other work does not change.
-        let is_software = self.is_software;
-        in_turns(
-            self.world,
-            self.backend,
-            &extent,
-            rows.len(),
-            |contestant, _| &*planners[contestant],
-            |contestant, frame, shot, worked| {
-                let worked = worked.filter(|_| is_software);
-                times[contestant][frame].push(worked.unwrap_or(shot.total));
-                if contestant == 0 {
-                    self.progress.advance(1);
-                }
-            },
-        )?;
-        let total_s = |times: &Vec<Vec<Duration>>| undisturbed_s(times.iter().map(|t| &**t));
-        let baseline_s = total_s(&times[0]);
-        Ok(times
-            .iter()
-            .map(|times| total_s(times) / baseline_s)
-            .collect())
+        self.race(rows, &extent)
     }
+
+    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> anyhow::Result<Option<Vec<f64>>> {
+        let path_frames = self.world.views.len() as u32;
+        let frames = elsewhere(path_frames, &self.extent.frames());
+        if frames.is_empty() {
+            return Ok(None);
+        }
+        let extent = Extent {
+            runs: frames.iter().map(|frame| vec![*frame]).collect(),
+            repeats: RUN_OFF_REPEATS,
+            ..self.extent.clone()
+        };
+        self.progress.stage(
+            "confirming",
+            u64::from(RUN_OFF_REPEATS) * frames.len() as u64,
+            "frames that the search did not see",
+        );
+        self.race(rows, &extent).map(Some)
+    }
+}
+
+/// Frames spread over the path, apart from those of the search and alternately even and odd.
+fn elsewhere(path_frames: u32, searched: &[u32]) -> Vec<u32> {
+    let count = ELSEWHERE_FRAMES.min(path_frames);
+    let spread = (0..count).map(|i| {
+        let even = (u64::from(path_frames) * u64::from(i) / u64::from(count)) as u32 & !1;
+        (even + i % 2).min(path_frames - 1)
+    });
+    let mut frames: Vec<u32> = spread.filter(|frame| !searched.contains(frame)).collect();
+    frames.sort_unstable();
+    frames.dedup();
+    frames
 }
 
 /// A picture without its alpha.
@@ -172,5 +210,21 @@ fn of_rgba(size_px: [u32; 2], rgba: &[u8]) -> Picture {
     Picture {
         size_px,
         pixels: rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_winner_is_confirmed_on_frames_of_either_parity_that_the_search_did_not_see() {
+        assert_eq!(elsewhere(72, &[12, 37, 60]), [0, 9, 18, 27, 36, 45, 54, 63]);
+        assert_eq!(elsewhere(1, &[0]), [0; 0]);
+        for path in 2..40 {
+            let frames = elsewhere(path, &[1]);
+            assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
+            assert!(frames.iter().all(|frame| *frame < path && *frame != 1));
+        }
     }
 }

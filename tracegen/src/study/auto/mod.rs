@@ -15,4 +15,4 @@ pub use choose::{Choice, choose};
 pub use guard::{Held, hold};
 pub use judge::Bench;
 pub use record::AutoRecord;
-pub use search::{Found, Infeasible, Judge, Verdict, search};
+pub use search::{Elsewhere, Found, Infeasible, Judge, Verdict, search};

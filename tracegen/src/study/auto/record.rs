@@ -2,7 +2,7 @@
 
 use super::budget::Budget;
 use super::guard::Held;
-use super::search::{Found, Tried, Verdict};
+use super::search::{Elsewhere, Found, Tried, Verdict};
 use serde::{Deserialize, Serialize};
 use techniques::Settings;
 
@@ -25,6 +25,9 @@ pub struct AutoRecord {
     pub worst_error: Option<f64>,
     /// The best single technique that keeps the budget.
     pub best_single: Chosen,
+    /// Both on frames that the search did not see, where the path has more than those.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elsewhere: Option<Elsewhere>,
     /// Everything that the search tried.
     pub tried: Vec<Chosen>,
 }
@@ -82,6 +85,7 @@ impl AutoRecord {
             fallbacks,
             worst_error: held.errors.iter().copied().reduce(f64::max),
             best_single: (&found.best_single).into(),
+            elsewhere: found.elsewhere,
             tried: found.tried.iter().map(Chosen::from).collect(),
         }
     }
@@ -113,6 +117,16 @@ fn reason(budget: Budget, found: &Found, held: &Held) -> String {
             " (the {} cheapest and the baseline timed again, in turns)",
             found.finalists - 1
         );
+    }
+    if let Some(elsewhere) = found.elsewhere {
+        text += &format!(
+            "; on frames that the search did not see {:.2} and {:.2}",
+            elsewhere.chosen, elsewhere.best_single
+        );
+        if elsewhere.overruled {
+            text +=
+                ", where what was cheapest before was not, and something simpler took its place";
+        }
     }
     let fallen = held.fallen_back().len();
     if let Some(worst) = held.errors.iter().copied().reduce(f64::max) {

@@ -35,6 +35,12 @@ pub trait Judge {
     /// # Errors
     /// Its own.
     fn run_off(&mut self, rows: &[&Row]) -> Result<Vec<f64>, Self::Error>;
+
+    /// The same on frames of the path that the search did not see; none where there are none.
+    ///
+    /// # Errors
+    /// Its own.
+    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> Result<Option<Vec<f64>>, Self::Error>;
 }
 
 /// A combination that was tried.
@@ -57,6 +63,19 @@ pub struct Found {
     pub tried: Vec<Tried>,
     /// How many were timed again, in turns; their verdicts hold those times.
     pub finalists: usize,
+    /// The chosen combination and the best single technique on frames that the search did not see.
+    pub elsewhere: Option<Elsewhere>,
+}
+
+/// Frame times over the baseline's on frames that the search did not see, all three in turns.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Elsewhere {
+    /// Of the chosen combination.
+    pub chosen: f64,
+    /// Of the best single technique.
+    pub best_single: f64,
+    /// What was cheapest on the frames of the search was not here, and something simpler took its place.
+    pub overruled: bool,
 }
 
 /// Nothing keeps the budget.
@@ -77,8 +96,9 @@ const WORST_ALONE: f64 = 1.10;
 
 /// The best combination of `options` under a budget: alone, then the cheapest with one more option
 /// (or another one of the same kind) as long as that saves time; the cheapest few single ones and
-/// combinations are then timed again, in turns, and that decides. Where time is bounded, errors are
-/// added only as long as the time is not kept.
+/// combinations are then timed again, in turns; what wins must win on frames that the search did not see, too, or
+/// gives way to the best single technique, and that to the baseline. Where time is bounded, errors are added only
+/// as long as the time is not kept.
 ///
 /// # Errors
 /// The judge's; the inner result tells where nothing keeps the budget.
@@ -142,6 +162,7 @@ pub fn search<J: Judge>(
                 best_single,
                 tried: search.tried,
                 finalists: 0,
+                elsewhere: None,
             }))
         }
     }
@@ -232,11 +253,30 @@ impl<J: Judge> Search<'_, J> {
             }
             best.clone()
         };
+        let (mut chosen, mut best_single) = (best_of(usize::MAX), best_of(1));
+        let rows = [&Row::baseline(), &best_single.row, &chosen.row];
+        let times = self.judge.run_off_elsewhere(&rows)?;
+        let elsewhere = times.map(|times| {
+            let (mut single, mut winner) = (times[1], times[2]);
+            let overruled = winner > single || single > 1.0;
+            if single > 1.0 {
+                (single, best_single) = (1.0, self.tried[0].clone());
+            }
+            if winner > single {
+                (winner, chosen) = (single, best_single.clone());
+            }
+            Elsewhere {
+                chosen: winner,
+                best_single: single,
+                overruled,
+            }
+        });
         Ok(Found {
-            chosen: best_of(usize::MAX),
-            best_single: best_of(1),
+            chosen,
+            best_single,
             finalists: finalists.len(),
             tried: self.tried,
+            elsewhere,
         })
     }
 

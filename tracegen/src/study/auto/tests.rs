@@ -11,6 +11,8 @@ struct Made<'a> {
     parts: &'a [(&'a str, f64, f64)],
     /// What a single timing is off by: name and factor.
     noise: &'a [(&'a str, f64)],
+    /// By what costs differ on frames that the search does not see.
+    elsewhere: &'a [(&'a str, f64)],
     judged: usize,
     ran_off: Vec<String>,
 }
@@ -58,6 +60,16 @@ impl Judge for Made<'_> {
         self.ran_off = rows.iter().map(|row| row.name.clone()).collect();
         Ok(rows.iter().map(|row| self.cost(row)).collect())
     }
+
+    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> Result<Option<Vec<f64>>, Infallible> {
+        assert_eq!(rows[0].settings, Row::baseline().settings);
+        let factor = |row: &Row| {
+            let known = self.elsewhere.iter().find(|(name, _)| *name == row.name);
+            known.map_or(1.0, |(_, factor)| *factor)
+        };
+        let times = rows.iter().map(|row| self.cost(row) * factor(row));
+        Ok(Some(times.collect()))
+    }
 }
 
 fn part(name: &str) -> Part {
@@ -68,18 +80,20 @@ fn part(name: &str) -> Part {
 }
 
 fn found(parts: &[(&str, f64, f64)], budget: Budget) -> Result<Found, Infeasible> {
-    found_in_noise(parts, &[], budget)
+    found_in_noise(parts, &[], &[], budget)
 }
 
 fn found_in_noise(
     parts: &[(&str, f64, f64)],
     noise: &[(&str, f64)],
+    elsewhere: &[(&str, f64)],
     budget: Budget,
 ) -> Result<Found, Infeasible> {
     let options: Vec<Part> = parts.iter().map(|(name, ..)| part(name)).collect();
     let mut made = Made {
         parts,
         noise,
+        elsewhere,
         judged: 0,
         ran_off: Vec::new(),
     };
@@ -122,7 +136,7 @@ fn what_a_single_timing_flatters_does_not_win() {
         ("hidden-area-mask", 0.9, 0.0),
     ];
     let noise = [("round-robin", 0.8), ("hidden-area-mask", 1.08)];
-    let found = found_in_noise(&costs, &noise, Budget::Flip(0.01)).unwrap();
+    let found = found_in_noise(&costs, &noise, &[], Budget::Flip(0.01)).unwrap();
     assert_eq!(found.best_single.row.name, "hidden-area-mask");
     assert!((found.best_single.verdict.frame_time_ratio - 0.9).abs() < 1e-12);
     let cost = |tried: &Tried| tried.verdict.frame_time_ratio;
@@ -132,13 +146,34 @@ fn what_a_single_timing_flatters_does_not_win() {
 }
 
 #[test]
+fn what_wins_on_the_frames_of_the_search_alone_gives_way_to_something_simpler() {
+    let costs = [("conical", 0.8, 0.0), ("hidden-area-mask", 0.9, 0.0)];
+    let won = |elsewhere: &[(&str, f64)]| {
+        let found = found_in_noise(&costs, &[], elsewhere, Budget::Flip(0.01)).unwrap();
+        (found.chosen.row.name, found.elsewhere.unwrap())
+    };
+    let (combination, here) = won(&[]);
+    assert!(
+        combination.contains('+') && !here.overruled,
+        "{combination}"
+    );
+    assert!(here.chosen < here.best_single);
+    let (single, here) = won(&[(&combination, 1.2)]);
+    assert_eq!(single, "conical");
+    assert!(here.overruled && here.chosen == here.best_single);
+    let (none, here) = won(&[(&combination, 1.6), ("conical", 1.3)]);
+    assert_eq!(none, Row::baseline().name);
+    assert!(here.overruled && here.chosen == 1.0);
+}
+
+#[test]
 fn a_combination_that_saves_nothing_over_a_part_of_it_is_not_chosen() {
     let costs = [("conical", 0.8, 0.0), ("hidden-area-mask", 0.999, 0.0)];
     let noise = [
         ("conical+hidden-area-mask", 0.9),
         ("hidden-area-mask+conical", 0.9),
     ];
-    let found = found_in_noise(&costs, &noise, Budget::Flip(0.01)).unwrap();
+    let found = found_in_noise(&costs, &noise, &[], Budget::Flip(0.01)).unwrap();
     assert_eq!(found.chosen.row.name, "conical");
 }
 
