@@ -124,7 +124,7 @@ impl ExperimentArgs {
     ///
     /// # Errors
     /// A label that no trace has, a file that is no picture.
-    pub fn pictures(&self, report: &PaperReport) -> Result<Vec<EmbeddedPicture>> {
+    fn pictures(&self, report: &PaperReport) -> Result<Vec<EmbeddedPicture>> {
         let known: Vec<&str> = report.traces.iter().map(|t| t.label.as_str()).collect();
         self.images
             .iter()
@@ -146,6 +146,15 @@ impl ExperimentArgs {
             })
             .collect()
     }
+
+    /// Writes the report's page, and the same numbers beside it as JSON and CSV.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn, a file that cannot be written.
+    pub fn write_page(&self, report: &PaperReport, path: &Path) -> Result<()> {
+        let html = page::page(report, &self.pictures(report)?)?;
+        write_page(path, &html, &report.json()?, &report.csv())
+    }
 }
 
 /// The page at `path`, and JSON and CSV with the same numbers beside it; a page that goes to
@@ -159,18 +168,16 @@ pub fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
     outputs
 }
 
-/// Writes the page, and the same numbers beside it as JSON and CSV.
+/// Writes a page, and the same numbers beside it as JSON and CSV.
 ///
 /// # Errors
-/// A plot that cannot be drawn, a file that cannot be written.
-pub fn write_page(report: &PaperReport, pictures: &[EmbeddedPicture], path: &Path) -> Result<()> {
-    let html = page::page(report, pictures)?;
+/// A file that cannot be written.
+pub fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> {
     if !is_stdout(path) {
-        let json = report.json()? + "\n";
-        write_atomically(&path.with_extension("json"), json.as_bytes())?;
-        write_atomically(&path.with_extension("csv"), report.csv().as_bytes())?;
+        write_atomically(&path.with_extension("json"), format!("{json}\n").as_bytes())?;
+        write_atomically(&path.with_extension("csv"), csv.as_bytes())?;
     }
-    write_atomically(path, html.as_bytes())
+    write_atomically(path, page.as_bytes())
 }
 
 /// Orders by name, comma-separated, or `all`.

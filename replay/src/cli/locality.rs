@@ -2,7 +2,7 @@
 
 use super::ConfigArgs;
 use super::addresses::{AddressInput, name_of};
-use super::experiment_args::{page_outputs, parse_orders};
+use super::experiment_args::{page_outputs, parse_orders, write_page};
 use super::subjects::Traces;
 use crate::config::{Order, RunConfig};
 use crate::experiment::frame_count;
@@ -83,13 +83,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     }
     if let Some(path) = &args.html {
-        let page = report.page()?;
-        if !is_stdout(path) {
-            let json = report.json()? + "\n";
-            write_atomically(&path.with_extension("json"), json.as_bytes())?;
-            write_atomically(&path.with_extension("csv"), report.csv().as_bytes())?;
-        }
-        write_atomically(path, page.as_bytes())?;
+        write_page(path, &report.page()?, &report.json()?, &report.csv())?;
     }
     if prints {
         super::print(&if args.json {

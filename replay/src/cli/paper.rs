@@ -1,6 +1,6 @@
 //! `replay paper`: the Z2 paper's experiment as a table.
 
-use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
+use super::experiment_args::{ExperimentArgs, page_outputs};
 use super::parquet_arg::ParquetArg;
 use crate::files::write_atomically;
 use crate::report::z2::model::PaperReport;
@@ -65,7 +65,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         args.parquet.write(|| report.table())?;
         if let Some(path) = &args.html {
-            write_page(report, &args.experiment.pictures(report)?, path)?;
+            args.experiment.write_page(report, path)?;
         }
         if prints {
             super::print(&if args.json {

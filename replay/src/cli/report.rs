@@ -1,6 +1,6 @@
 //! `replay report`: the Z2 paper's experiment as a page.
 
-use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
+use super::experiment_args::{ExperimentArgs, page_outputs};
 use super::parquet_arg::ParquetArg;
 use anyhow::Result;
 use shell::is_stdout;
@@ -31,7 +31,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut outputs = page_outputs("--output", &args.output);
     outputs.extend(args.parquet.output());
     args.experiment.run(&outputs, true, true, |report| {
-        write_page(report, &args.experiment.pictures(report)?, &args.output)?;
+        args.experiment.write_page(report, &args.output)?;
         args.parquet.write(|| report.table())?;
         if !is_stdout(&args.output) && !args.parquet.takes_stdout() {
             super::print(&args.output.display().to_string())?;

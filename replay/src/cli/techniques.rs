@@ -1,7 +1,7 @@
 //! `replay techniques`: what `tracegen techniques` measured and rendered, held against each other.
 
 use super::ConfigArgs;
-use super::experiment_args::{page_outputs, parse_orders};
+use super::experiment_args::{page_outputs, parse_orders, write_page};
 use super::parquet_arg::ParquetArg;
 use super::subjects::Traces;
 use crate::config::{Mode, Order, RunConfig};
@@ -15,10 +15,10 @@ use crate::techniques::{
     CacheFigures, Difference, Folder, Measured, Measures, PictureFigures, Sharing, Timing,
     differences, picture_figures, sharing,
 };
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use shell::{Output, Progress, is_stdout};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments of `replay techniques`.
@@ -69,6 +69,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     })?;
     let folders = args.folders.iter().map(|path| Folder::open(path));
     let folders = folders.collect::<Result<Vec<_>, _>>()?;
+    check_once(&args.folders)?;
     let prints = check_outputs(args, &folders)?;
     let mut orders = parse_orders(&args.orders)?;
     for order in [Order::MORTON, config.order] {
@@ -118,13 +119,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 embedded(folder, differences)
             })
             .collect::<Result<Vec<_>>>()?;
-        let page = report.page(&scenes)?;
-        if !is_stdout(path) {
-            let json = report.json()? + "\n";
-            write_atomically(&path.with_extension("json"), json.as_bytes())?;
-            write_atomically(&path.with_extension("csv"), report.csv().as_bytes())?;
-        }
-        write_atomically(path, page.as_bytes())?;
+        write_page(path, &report.page(&scenes)?, &report.json()?, &report.csv())?;
     }
     if prints {
         super::print(&if args.json {
@@ -134,6 +129,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         })?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a folder that is given twice, whatever its names.
+fn check_once(folders: &[PathBuf]) -> Result<()> {
+    let place = |folder: &Path| folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    for (index, folder) in folders.iter().enumerate() {
+        let before = folders[..index]
+            .iter()
+            .find(|other| place(other) == place(folder));
+        if let Some(other) = before {
+            bail!(
+                "{}: the same folder as {}",
+                folder.display(),
+                other.display()
+            );
+        }
+    }
+    Ok(())
 }
 
 /// Checks the outputs against all files that the folders hold; true where standard output is left.
@@ -324,6 +337,21 @@ mod tests {
         line.extend(["--html".to_owned(), page.display().to_string()]);
         line.extend(folders.iter().map(|f| f.display().to_string()));
         run(&Line::try_parse_from(line).unwrap().args)
+    }
+
+    #[test]
+    fn a_folder_by_two_names_is_the_same_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let (one, other) = (folder.path().join("a"), folder.path().join("b"));
+        for path in [&one, &other] {
+            std::fs::create_dir(path).unwrap();
+        }
+        check_once(&[one.clone(), other.clone()]).unwrap();
+        let error = check_once(&[one.clone(), other, folder.path().join("b/../a")]).unwrap_err();
+        assert!(
+            error.to_string().contains(&one.display().to_string()),
+            "{error}"
+        );
     }
 
     #[test]

@@ -27,6 +27,13 @@ pub struct TraceFigures {
     pub orders: Vec<OrderFigures>,
 }
 
+impl TraceFigures {
+    /// Tiles of two eyes in an order, and no plain addresses.
+    fn is_rendered(&self) -> bool {
+        self.id.is_some()
+    }
+}
+
 /// What is found of some traces.
 pub struct LocalityReport {
     /// The traces.

@@ -1,7 +1,7 @@
 //! The page: plots and tables of every trace and stream.
 
 use super::columns::Summary;
-use super::{LocalityReport, plots};
+use super::{LocalityReport, TraceFigures, plots};
 use crate::locality::Stream;
 use crate::report::html::{self, Section, figures};
 use crate::report::plots::PlotError;
@@ -53,8 +53,8 @@ impl LocalityReport {
                 .only("trace", of.trace)
                 .only("stream", of.stream.key());
             let trace = self.traces.iter().find(|t| t.label == of.trace);
-            let one_frame = trace.is_some_and(|trace| trace.frames < 2);
-            let body = stream(rows, &table, one_frame)?;
+            let Some(trace) = trace else { continue };
+            let body = stream(rows, &table, trace)?;
             sections.push(Section::new(
                 format!("{}: {}", of.trace, of.stream.title()),
                 body,
@@ -68,13 +68,17 @@ impl LocalityReport {
             ),
         ));
         let names: Vec<&str> = self.traces.iter().map(|t| t.label.as_str()).collect();
+        let rendered = self.traces.iter().any(TraceFigures::is_rendered);
         let lead = html! {
             p {
-                "How far apart the uses of cache lines lie in " (names.join(", ")) ", in each tile order, and what that means for caches of every size, without latencies. "
+                "How far apart the uses of cache lines lie in " (names.join(", ")) @if rendered { ", in each tile order" }
+                ", and what that means for caches of every size, without latencies. "
                 "The JSON file beside this page has every number of the plots, the CSV file the tables."
             }
-            p {
-                "A reuse belongs to where the use before it was: in the same tile, in another tile, in a tile of the other eye, or in an earlier frame."
+            @if rendered {
+                p {
+                    "A reuse belongs to where the use before it was: in the same tile, in another tile, in a tile of the other eye, or in an earlier frame."
+                }
             }
         };
         Ok(html::page("Parallax: locality", &lead, &sections))
@@ -82,7 +86,8 @@ impl LocalityReport {
 }
 
 /// A stream of a trace: its table and plots.
-fn stream(rows: &[Summary], table: &Table, one_frame: bool) -> Result<Markup, PlotError> {
+fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Markup, PlotError> {
+    let (rendered, one_frame) = (trace.is_rendered(), trace.frames < 2);
     let plain = |svg: String| (svg, String::new());
     // Where a bin begins.
     let far_from = (rows[0].figures.configured_lines / 8)
@@ -97,16 +102,26 @@ fn stream(rows: &[Summary], table: &Table, one_frame: bool) -> Result<Markup, Pl
     let keys = SHOWN.into_iter();
     let shown = table.picked(keys.filter(|key| !(one_frame && key.contains("earlier"))));
     let shown = shown.without_empty_columns();
+    let mut by_size = vec![plain(plots::miss_ratio(rows).svg()?)];
+    if rendered {
+        by_size.push(plain(plots::other_eye(rows).svg()?));
+    }
+    by_size.push(plain(plots::above_opt(rows).svg()?));
+    let together = if rendered {
+        "Two tiles that are rendered together take two tiles' time, and their lines belong to both."
+    } else {
+        ""
+    };
+    let mut working_sets = vec![(plots::working_sets(rows).svg()?, together.to_owned())];
+    if rendered {
+        working_sets.push(plain(plots::shared_working_sets(rows).svg()?));
+    }
     Ok(html! {
-        p { (about(rows)) }
+        p { (about(rows, rendered)) }
         (shown.markup())
         (meanings(&shown))
         h3 { "Misses by size" }
-        (figures(&[
-            plain(plots::miss_ratio(rows).svg()?),
-            plain(plots::other_eye(rows).svg()?),
-            plain(plots::above_opt(rows).svg()?),
-        ]))
+        (figures(&by_size))
         h3 { "The configured cache" }
         (figures(&[
             (plots::causes(rows).svg()?, "Compulsory: first uses. Conflict: a fully associative cache of the size hits. Capacity: it misses, too.".to_owned()),
@@ -120,10 +135,7 @@ fn stream(rows: &[Summary], table: &Table, one_frame: bool) -> Result<Markup, Pl
             (figures(&all))
         }
         h3 { "Working sets" }
-        (figures(&[
-            (plots::working_sets(rows).svg()?, "Two tiles that are rendered together take two tiles' time, and their lines belong to both.".to_owned()),
-            plain(plots::shared_working_sets(rows).svg()?),
-        ]))
+        (figures(&working_sets))
         details {
             summary { "miss ratio by size and ways, order by order" }
             (figures(&ways))
@@ -144,9 +156,11 @@ fn distances(rows: &[Summary], from: u64) -> Result<Vec<(String, String)>, PlotE
     charts.iter().zip(rows).map(figure).collect()
 }
 
-fn about(rows: &[Summary]) -> String {
+fn about(rows: &[Summary], rendered: bool) -> String {
     let (of, cache) = (rows[0].of, rows[0].cache);
     let sees = match of.stream {
+        Stream::L1 if !rendered => "What asks for the lines of the L1, in the trace's order",
+        Stream::L2 if !rendered => "What misses the configured L1",
         Stream::L1 => {
             "What each core asks its own L1 for; counts are sums over the cores, and a size is that of each core's cache"
         }
