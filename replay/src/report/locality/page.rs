@@ -100,7 +100,9 @@ fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Marku
         .map(|row| Ok(plain(plots::associativity(row).svg()?)));
     let ways = ways.collect::<Result<Vec<_>, PlotError>>()?;
     let keys = SHOWN.into_iter();
-    let shown = table.picked(keys.filter(|key| !(one_frame && key.contains("earlier"))));
+    let empty =
+        |key: &&str| (one_frame && key.contains("earlier")) || (!rendered && key.contains("eye"));
+    let shown = table.picked(keys.filter(|key| !empty(key)));
     let shown = shown.without_empty_columns();
     let mut by_size = vec![plain(plots::miss_ratio(rows).svg()?)];
     if rendered {
@@ -159,7 +161,9 @@ fn distances(rows: &[Summary], from: u64) -> Result<Vec<(String, String)>, PlotE
 fn about(rows: &[Summary], rendered: bool) -> String {
     let (of, cache) = (rows[0].of, rows[0].cache);
     let sees = match of.stream {
-        Stream::L1 if !rendered => "What asks for the lines of the L1, in the trace's order",
+        Stream::L1 if !rendered => {
+            "What is asked of the L1, in the trace's order; 1,024 look-ups stand for a tile"
+        }
         Stream::L2 if !rendered => "What misses the configured L1",
         Stream::L1 => {
             "What each core asks its own L1 for; counts are sums over the cores, and a size is that of each core's cache"

@@ -254,10 +254,15 @@ impl<J: Judge> Search<'_, J> {
             best.clone()
         };
         let (mut chosen, mut best_single) = (best_of(usize::MAX), best_of(1));
-        let rows = [&Row::baseline(), &best_single.row, &chosen.row];
+        let baseline = Row::baseline();
+        let mut rows = vec![&baseline, &best_single.row];
+        if chosen.row.settings != best_single.row.settings {
+            rows.push(&chosen.row);
+        }
         let times = self.judge.run_off_elsewhere(&rows)?;
         let elsewhere = times.map(|times| {
-            let (mut single, mut winner) = (times[1], times[2]);
+            let mut single = times[1];
+            let mut winner = times.get(2).copied().unwrap_or(single);
             let overruled = winner > single || single > 1.0;
             if single > 1.0 {
                 (single, best_single) = (1.0, self.tried[0].clone());

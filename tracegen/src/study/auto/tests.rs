@@ -161,6 +161,10 @@ fn what_wins_on_the_frames_of_the_search_alone_gives_way_to_something_simpler() 
     let (single, here) = won(&[(&combination, 1.2)]);
     assert_eq!(single, "conical");
     assert!(here.overruled && here.chosen == here.best_single);
+    // A single technique that wins the search runs once, not against itself.
+    let (single, here) = won(&[(&combination, 1.2), ("conical", 0.9)]);
+    assert_eq!(single, "conical");
+    assert!(here.chosen < 0.8 && here.chosen == here.best_single);
     let (none, here) = won(&[(&combination, 1.6), ("conical", 1.3)]);
     assert_eq!(none, Row::baseline().name);
     assert!(here.overruled && here.chosen == 1.0);
