@@ -471,9 +471,10 @@ impl Summary {
             ));
         }
         note(&format!(
-            "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record (44 raw)",
+            "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record ({} raw)",
             per(tile_bytes, quads),
-            per(tile_bytes, records)
+            per(tile_bytes, records),
+            record::RECORD_BYTES
         ));
         note(&format!(
             "{} draws in {} draw calls, {} regions, {} shadow maps in {:.3} s, {} pipelines, {} samplers",
