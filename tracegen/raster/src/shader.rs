@@ -55,7 +55,9 @@ pub(crate) fn source(captures: bool) -> String {
         concat!(
             include_str!("shaders/recording.wgsl"),
             "\n",
-            include_str!("shaders/capturing.wgsl")
+            include_str!("shaders/capturing.wgsl"),
+            "\n",
+            include_str!("shaders/texels.wgsl")
         )
     } else {
         include_str!("shaders/plain.wgsl")

@@ -39,7 +39,7 @@ struct View {
     // World to shadow uv and depth.
     cascades: array<mat4x4<f32>, MAX_CASCADES>,
     points: array<PointLight, MAX_POINT_LIGHTS>,
-    // x: point lights, y: records that the buffer holds.
+    // x: point lights, y: records that the buffer holds, z: slot of the texture that is checked.
     counts: vec4<u32>,
     // What the lens shows: xy: centre, zw: inverse radii, pixels.
     lens: vec4<f32>,
