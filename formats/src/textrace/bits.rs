@@ -25,12 +25,14 @@ impl BitWriter {
     /// Appends the lowest `count` bits of `value`, at most 32.
     pub(in crate::textrace) fn put(&mut self, value: u32, count: u32) {
         debug_assert!(count == 32 || u64::from(value) < 1 << count);
+        // Fewer than 32 bits are pending.
         self.pending |= u64::from(value) << self.count;
         self.count += count;
-        while self.count >= 8 {
-            self.bytes.push(self.pending.to_le_bytes()[0]);
-            self.pending >>= 8;
-            self.count -= 8;
+        if self.count >= 32 {
+            let [a, b, c, d, ..] = self.pending.to_le_bytes();
+            self.bytes.extend_from_slice(&[a, b, c, d]);
+            self.pending >>= 32;
+            self.count -= 32;
         }
     }
 
@@ -42,9 +44,9 @@ impl BitWriter {
     }
 
     pub(in crate::textrace) fn finish_unpadded(mut self) -> Vec<u8> {
-        if self.count > 0 {
-            self.bytes.push(self.pending.to_le_bytes()[0]);
-        }
+        let rest = self.count.div_ceil(8) as usize;
+        self.bytes
+            .extend(self.pending.to_le_bytes().iter().take(rest));
         self.bytes
     }
 }

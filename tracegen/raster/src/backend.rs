@@ -59,6 +59,20 @@ pub struct Marks {
     pub lens: bool,
 }
 
+/// What the visible fragments of a view sampled of one texture of their materials, row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Texels {
+    /// Filtered colour as the shader gets it: linear red, green, blue, and alpha.
+    pub colors: Vec<[f32; 4]>,
+    /// Number of the primitive, or [`Self::NO_PRIMITIVE`].
+    pub primitives: Vec<u32>,
+}
+
+impl Texels {
+    /// Nothing is visible, or something whose material has no such texture.
+    pub const NO_PRIMITIVE: u32 = u32::MAX;
+}
+
 /// What a backend has done so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
@@ -172,6 +186,23 @@ pub trait CaptureBackend {
         view: &View<'_>,
         lens: &Lens,
     ) -> Result<Vec<Marks>, RasterError>;
+
+    /// Renders a view's opaque and masked draws with the filtered texels of the materials' textures in
+    /// `slot` (0 to 5) in place of colour.
+    ///
+    /// # Errors
+    /// Driver errors, and a backend that has no such pictures.
+    fn texels(
+        &mut self,
+        _draws: &DrawList,
+        _view: &View<'_>,
+        _slot: u32,
+    ) -> Result<Texels, RasterError> {
+        Err(RasterError::Unsupported {
+            driver: self.driver().to_owned(),
+            what: "pictures of texels".into(),
+        })
+    }
 
     /// Why the driver's multiview cannot be trusted; `None` where it can.
     ///

@@ -33,6 +33,10 @@ pub(crate) enum Role {
     Mark,
     /// The same of an alpha-masked draw.
     MarkMasked,
+    /// What is sampled of one texture of the material, and which primitive does it.
+    Texel,
+    /// The same of an alpha-masked draw.
+    TexelMasked,
 }
 
 impl Role {
@@ -50,6 +54,11 @@ impl Role {
     /// It writes nothing but records.
     pub fn only_records(self) -> bool {
         matches!(self, Self::Record | Self::MaskedRecord)
+    }
+
+    /// It writes texels and primitives in place of the picture.
+    pub fn writes_texels(self) -> bool {
+        matches!(self, Self::Texel | Self::TexelMasked)
     }
 
     /// It marks draws: fragments as far as the depth count as well.
@@ -93,6 +102,8 @@ pub(crate) enum Purpose {
     Depth,
     /// Which draws are visible.
     Mark,
+    /// What visible fragments sample of one texture of their materials.
+    Texel,
 }
 
 /// Roles of a draw in the order in which it takes them.
@@ -111,9 +122,11 @@ pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
         (DrawMode::Masked, Purpose::Depth) => &[Role::DepthMasked],
         (DrawMode::Opaque | DrawMode::Blended, Purpose::Mark) => &[Role::Mark],
         (DrawMode::Masked, Purpose::Mark) => &[Role::MarkMasked],
+        (DrawMode::Opaque, Purpose::Texel) => &[Role::Texel],
+        (DrawMode::Masked, Purpose::Texel) => &[Role::TexelMasked],
         // Blended draws cast no shadow and write no depth, and an alpha test cannot be counted
         // without the replay.
-        (DrawMode::Blended, Purpose::Shadow | Purpose::Depth)
+        (DrawMode::Blended, Purpose::Shadow | Purpose::Depth | Purpose::Texel)
         | (DrawMode::Masked, Purpose::Count) => &[],
     }
 }

@@ -5,7 +5,7 @@ use crate::groups::{MATERIAL_TEXTURES, SLOTS};
 use crate::lighting::MAX_POINT_LIGHTS;
 use crate::uniforms::MAX_CASCADES;
 use formats::textrace::NO_GROUP;
-use record::{DEPTH_BYTES, RECORD_BYTES};
+use record::RECORD_BYTES;
 
 /// Bindings of group 0.
 pub(crate) const VIEW_BINDINGS: [&str; 7] = [
@@ -46,8 +46,7 @@ pub(crate) fn source(captures: bool) -> String {
     constant("MAX_CASCADES", MAX_CASCADES as u64);
     constant("MAX_POINT_LIGHTS", MAX_POINT_LIGHTS as u64);
     constant("NO_GROUP", NO_GROUP.into());
-    constant("RECORD_WORDS", RECORD_BYTES / 4);
-    constant("DEPTH_WORDS", DEPTH_BYTES / 4);
+    constant("RECORD_VECTORS", RECORD_BYTES / 16);
     text += &format!("const SHADOW_SIZE: f32 = {SHADOW_SIZE}.0;\n");
     for (number, [x, y]) in SHADOW_TAPS.iter().enumerate() {
         text += &format!("const SHADOW_TAP_{number}: vec2<i32> = vec2<i32>({x}, {y});\n");
@@ -56,7 +55,9 @@ pub(crate) fn source(captures: bool) -> String {
         concat!(
             include_str!("shaders/recording.wgsl"),
             "\n",
-            include_str!("shaders/capturing.wgsl")
+            include_str!("shaders/capturing.wgsl"),
+            "\n",
+            include_str!("shaders/texels.wgsl")
         )
     } else {
         include_str!("shaders/plain.wgsl")

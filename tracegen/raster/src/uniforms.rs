@@ -47,6 +47,12 @@ impl ViewData {
         }
     }
 
+    /// Texels are those of the materials' textures in `slot`.
+    pub fn with_texture_slot(mut self, slot: u32) -> Self {
+        self.counts[2] = slot;
+        self
+    }
+
     /// The light's view of a cascade.
     pub fn of_cascade(cascade: &Cascade, lighting: &Lighting) -> Self {
         Self::new(cascade.clip_from_world, Vec3::ZERO, lighting, 0)

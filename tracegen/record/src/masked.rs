@@ -5,7 +5,7 @@
 //! An in-order GPU with early test and late write would have: a lane survives if it is nearer than
 //! every earlier primitive of the draw whose alpha passed at that pixel.
 
-use super::raw::RawDepth;
+use super::raw::{RawDepth, RawRecord};
 
 /// Pixels along a tile's edge.
 const EDGE: usize = formats::view::TILE_SIZE_PX as usize;
@@ -32,21 +32,21 @@ impl MaskedDepth {
         self.draw = None;
     }
 
-    /// Lanes of a covered quad of `draw` that survive; quads must come in submission order. `x`
-    /// and `y` are the quad's column and row in the tile.
-    pub fn survivors(&mut self, draw: u32, x: u8, y: u8, covered: u8, record: &RawDepth) -> u8 {
-        if self.draw.replace(draw) != Some(draw) {
+    /// Covered lanes of a quad that survive; quads must come in submission order.
+    pub fn survivors(&mut self, quad: &RawRecord, depth: &RawDepth) -> u8 {
+        let (x, y) = ((quad.qx() & 7) as usize, (quad.qy() & 7) as usize);
+        if self.draw.replace(quad.draw) != Some(quad.draw) {
             self.nearest.fill(f32::INFINITY);
         }
         let mut survivors = 0;
-        for (lane, &depth) in record.depth.iter().enumerate() {
-            let pixel = (2 * usize::from(y) + (lane >> 1)) * EDGE + 2 * usize::from(x) + (lane & 1);
+        for (lane, &depth) in depth.depth.iter().enumerate() {
+            let pixel = (2 * y + (lane >> 1)) * EDGE + 2 * x + (lane & 1);
             let Some(nearest) = self.nearest.get_mut(pixel) else {
                 continue;
             };
-            if covered >> lane & 1 == 1 && depth < *nearest {
+            if quad.mask() >> lane & 1 == 1 && depth < *nearest {
                 survivors |= 1 << lane;
-                if record.passing >> lane & 1 == 1 {
+                if quad.passing >> lane & 1 == 1 {
                     *nearest = depth;
                 }
             }
@@ -59,19 +59,32 @@ impl MaskedDepth {
 mod tests {
     use super::*;
 
-    fn record(passing: u32, depth: [f32; 4]) -> RawDepth {
-        RawDepth { depth, passing }
+    /// Survivors of quad `[x, y]` of a tile, with its covered and its passing lanes.
+    fn survivors(
+        nearest: &mut MaskedDepth,
+        draw: u32,
+        [x, y]: [u32; 2],
+        [covered, passing]: [u8; 2],
+        depth: [f32; 4],
+    ) -> u8 {
+        let quad = RawRecord {
+            header: RawRecord::pack(x, y, covered, 0),
+            draw,
+            passing: passing.into(),
+            ..RawRecord::default()
+        };
+        nearest.survivors(&quad, &RawDepth { depth })
     }
 
     #[test]
     fn a_lane_behind_an_earlier_passing_primitive_is_killed() {
         let mut depth = MaskedDepth::default();
         assert_eq!(
-            depth.survivors(3, 7, 7, 0b1111, &record(0b0101, [0.5; 4])),
+            survivors(&mut depth, 3, [7, 7], [0b1111, 0b0101], [0.5; 4]),
             0b1111
         );
         assert_eq!(
-            depth.survivors(3, 7, 7, 0b1111, &record(0b1111, [0.6; 4])),
+            survivors(&mut depth, 3, [7, 7], [0b1111, 0b1111], [0.6; 4]),
             0b1010
         );
     }
@@ -79,24 +92,25 @@ mod tests {
     #[test]
     fn a_nearer_lane_survives_and_equal_depth_does_not() {
         let mut depth = MaskedDepth::default();
-        depth.survivors(3, 0, 0, 0b1111, &record(0b1111, [0.5; 4]));
-        let next = record(0, [0.4, 0.5, 0.6, 0.1]);
-        assert_eq!(depth.survivors(3, 0, 0, 0b0111, &next), 0b0001);
+        survivors(&mut depth, 3, [0, 0], [0b1111, 0b1111], [0.5; 4]);
+        let next = [0.4, 0.5, 0.6, 0.1];
+        assert_eq!(survivors(&mut depth, 3, [0, 0], [0b0111, 0], next), 0b0001);
     }
 
     #[test]
     fn a_killed_lane_writes_no_depth() {
         let mut depth = MaskedDepth::default();
-        depth.survivors(3, 0, 0, 1, &record(1, [0.5; 4]));
-        depth.survivors(3, 0, 0, 1, &record(1, [0.7; 4]));
-        assert_eq!(depth.survivors(3, 0, 0, 1, &record(1, [0.6; 4])), 0);
-        assert_eq!(depth.survivors(3, 0, 0, 1, &record(1, [0.45; 4])), 1);
+        let mut lane = |passing, at: f32| survivors(&mut depth, 3, [0, 0], [1, passing], [at; 4]);
+        lane(1, 0.5);
+        lane(1, 0.7);
+        assert_eq!(lane(1, 0.6), 0);
+        assert_eq!(lane(1, 0.45), 1);
     }
 
     #[test]
     fn draws_do_not_see_each_others_depth() {
         let mut depth = MaskedDepth::default();
-        depth.survivors(3, 0, 0, 1, &record(1, [0.5; 4]));
-        assert_eq!(depth.survivors(4, 0, 0, 1, &record(1, [0.9; 4])), 1);
+        survivors(&mut depth, 3, [0, 0], [1, 1], [0.5; 4]);
+        assert_eq!(survivors(&mut depth, 4, [0, 0], [1, 1], [0.9; 4]), 1);
     }
 }

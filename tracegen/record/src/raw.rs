@@ -16,6 +16,8 @@ pub struct RawRecord {
     pub primitive: u32,
     /// Index into the draw table.
     pub draw: u32,
+    /// Covered lanes whose alpha passes the test, like [`Self::mask`]; of masked draws alone.
+    pub passing: u32,
     /// Coordinates of the top-left lane, covered or not.
     pub uv: [f32; 2],
     /// Horizontal derivative of the top row.
@@ -58,14 +60,12 @@ impl RawRecord {
     }
 }
 
-/// What the in-order replay of an alpha-masked draw needs to know about a quad.
+/// What the in-order replay of an alpha-masked draw needs to know about a quad, beside its record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct RawDepth {
     /// Depth of each lane.
     pub depth: [f32; 4],
-    /// Covered lanes whose alpha passes the test.
-    pub passing: u32,
 }
 
 /// The raw records of one region, in no particular order.

@@ -126,13 +126,12 @@ impl TileRules {
         if self.masked.get(first.draw as usize) == Some(&true) {
             alive = 0;
             for &(_, index) in quad.iter().filter(|entry| of(entry).group() == 0) {
-                let (Some(depth), covered) =
-                    (records.depths.get(index as usize), of(&(0, index)).mask())
-                else {
+                let record = of(&(0, index));
+                let Some(depth) = records.depths.get(index as usize) else {
                     continue;
                 };
-                let survivors = scratch.depth.survivors(first.draw, x, y, covered, depth);
-                counts.masked_lanes_killed += u64::from((covered & !survivors).count_ones());
+                let survivors = scratch.depth.survivors(record, depth);
+                counts.masked_lanes_killed += u64::from((record.mask() & !survivors).count_ones());
                 alive |= survivors;
             }
         }

@@ -152,27 +152,23 @@ impl Capturer for Analytic {
         for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
             for (primitive, draw, mask) in covered(x, y) {
                 let texel = 1.0 / EDGE as f32;
+                // Lanes 0 and 2 lie in even columns.
+                let (depth, passing) = match primitive {
+                    1 => (0.5, 0b0101),
+                    _ => (0.7, 0b1111),
+                };
                 let record = RawRecord {
                     header: RawRecord::pack(x, y, mask, 0),
                     primitive,
                     draw,
+                    passing,
                     uv: [x, y].map(|q| (2.0 * q as f32 + 0.5) * texel),
                     dx: [texel, 0.0],
                     dy: [0.0, texel],
                     cross: [0.0; 2],
                 };
-                // Lanes 0 and 2 lie in even columns.
-                let depth = match primitive {
-                    1 => (0.5, 0b0101),
-                    _ => (0.7, 0b1111),
-                };
-                records.push((
-                    record,
-                    RawDepth {
-                        depth: [depth.0; 4],
-                        passing: depth.1,
-                    },
-                ));
+                let depth = [depth; 4];
+                records.push((record, RawDepth { depth }));
             }
         }
         let needed = records.len() as u64;

@@ -12,6 +12,7 @@ pub mod scenes;
 pub mod sweep;
 mod technique_args;
 pub mod techniques;
+pub mod verify;
 
 use clap::{Parser, Subcommand};
 use shell::{Common, Documents};
@@ -25,6 +26,7 @@ Examples:
   tracegen raster sponza.gltf --camera gallery --shadows -o sponza.textrace
   tracegen techniques atrium --path head -o atrium-techniques
   tracegen sweep captures.toml -o traces
+  tracegen verify atrium --tiles 200 --colour
   tracegen rays chess -o chess.raytrace --image chess.png";
 
 /// Renders a scene for both eyes and captures every texture sample or every ray into a trace.
@@ -47,6 +49,8 @@ enum Command {
     Techniques(Box<techniques::TechniquesArgs>),
     /// Capture every combination of a manifest's scenes, cameras and displays; goes on where it stopped.
     Sweep(sweep::SweepArgs),
+    /// Hold a captured frame against a reference in double precision: coverage, coordinates, levels, colours.
+    Verify(Box<verify::VerifyArgs>),
     /// Trace a stereo frame and capture its rays into a .raytrace file.
     Rays(Box<rays::RaysArgs>),
     #[command(flatten)]
@@ -64,6 +68,7 @@ pub fn main() -> ExitCode {
                 Command::Raster(args) => raster::run(&args)?,
                 Command::Techniques(args) => techniques::run(&args)?,
                 Command::Sweep(args) => sweep::run(&args)?,
+                Command::Verify(args) => verify::run(&args)?,
                 Command::Rays(args) => rays::run(&args)?,
                 Command::Documents(documents) => return documents.run::<Cli>(),
             }

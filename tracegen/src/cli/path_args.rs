@@ -35,6 +35,16 @@ pub enum Origin {
 }
 
 impl PathArgs {
+    /// The path of a single frame, which starts where every path does.
+    #[must_use]
+    pub fn still() -> Self {
+        Self {
+            path: PathSpec::Walk,
+            path_origin: None,
+            fps: DEFAULT_FPS,
+        }
+    }
+
     /// The file that the path is read from.
     #[must_use]
     pub fn file(&self) -> Option<PathBuf> {

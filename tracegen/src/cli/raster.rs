@@ -6,7 +6,7 @@ use super::scene_args::{SceneArgs, SceneSetup};
 use super::technique_args::TechniqueArgs;
 use crate::picture;
 use crate::study::auto::Budget;
-use crate::study::memory;
+use crate::study::{memory, processor};
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
@@ -272,16 +272,19 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let plain = if args.no_plain {
             None
         } else {
+            let worked = processor::time();
             let (pictures, time) = job.plain_frame(&mut backend, &frame)?;
             summary.plain += time;
+            summary.plain_work += worked_since(worked);
             Some(pictures)
         };
-        let start = Instant::now();
+        let (start, worked) = (Instant::now(), processor::time());
         let (pictures, counts, sorting) =
             job.capture_frame(&mut backend, &frame, first_pass, &mut recorder, &mut writer)?;
         first_pass += frame.plan.layers.len();
         summary.sorting += sorting;
         summary.captured += start.elapsed();
+        summary.captured_work += worked_since(worked);
         summary.counts += counts;
         summary.predicted.push(frame.plan.predicted);
         if let Some(plain) = plain {
@@ -396,6 +399,9 @@ struct Summary {
     shadows: Duration,
     plain: Duration,
     captured: Duration,
+    /// Processors' time of the plain renders and of the captures; zero where the system does not tell.
+    plain_work: Duration,
+    captured_work: Duration,
     sorting: Duration,
     counts: CaptureCounts,
     predicted: Vec<Predicted>,
@@ -471,9 +477,10 @@ impl Summary {
             ));
         }
         note(&format!(
-            "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record (44 raw)",
+            "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record ({} raw)",
             per(tile_bytes, quads),
-            per(tile_bytes, records)
+            per(tile_bytes, records),
+            record::RECORD_BYTES
         ));
         note(&format!(
             "{} draws in {} draw calls, {} regions, {} shadow maps in {:.3} s, {} pipelines, {} samplers",
@@ -508,6 +515,16 @@ impl Summary {
                 self.sorting.as_secs_f64(),
                 captured / plain
             ));
+            let (plain, captured) = (
+                self.plain_work.as_secs_f64(),
+                self.captured_work.as_secs_f64(),
+            );
+            if plain > 0.0 {
+                note(&format!(
+                    "processors     {plain:.3} s plain, {captured:.3} s with capture: {:.2} x plain",
+                    captured / plain
+                ));
+            }
             note(&format!(
                 "pictures with and without capture: {}",
                 if identical { "identical" } else { "DIFFERENT" }
@@ -524,6 +541,14 @@ impl Summary {
             ));
         }
     }
+}
+
+/// Processors' time since `before`.
+fn worked_since(before: Option<Duration>) -> Duration {
+    let since = before
+        .zip(processor::time())
+        .map(|(before, now)| now.saturating_sub(before));
+    since.unwrap_or_default()
 }
 
 /// Bytes in MiB.

@@ -1,124 +1,243 @@
-//! How well a captured pass agrees with the reference.
+//! How well the tiles of a captured pass agree with the reference.
 
-use super::reference::Fragment;
-use formats::textrace::{Draw, NO_GROUP, SUBTEXELS, Tile};
+use super::agreement::{Agreement, Side};
+use super::classes::classify;
+use super::geometry::{Geometry, Sampled};
+use super::lod::{clamped, level_of_detail, taps};
+use super::piece::center;
+use super::reference::{AlphaTest, Fragment, origin, render_tile};
+use formats::footprint::{LodFormula, SamplingOptions, footprints, quad_lod};
+use formats::textrace::{QuadRecord, SUBTEXELS, Tables, Tile, UvGroup};
+use formats::view::TILE_SIZE_PX;
 use glam::DVec2;
-use std::collections::BTreeMap;
+use raster::backend::Fragments;
 
-/// Agreement of a captured pass with the reference, fragment by fragment.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Agreement {
-    /// Fragments (pixel and primitive) in both.
-    pub both: u64,
-    /// Fragments only in the reference.
-    pub only_reference: u64,
-    /// Fragments only in the capture.
-    pub only_capture: u64,
-    /// Largest distance of coordinates, texels of the group's extent.
-    pub max_uv_error_texels: f64,
-    /// Mean distance of coordinates, texels of the group's extent.
-    pub mean_uv_error_texels: f64,
-    /// Common fragments whose mip level (from the quad's top-left derivatives) differs.
-    pub level_differs: u64,
+/// What all tiles of a comparison share.
+pub struct Comparison<'a> {
+    /// The trace's tables.
+    pub tables: &'a Tables,
+    /// The alpha test.
+    pub alpha: &'a dyn AlphaTest,
+    /// Which fragments the trace holds.
+    pub recorded: Fragments,
+    /// How the driver makes a level of detail of the derivatives; replays of the trace do the same.
+    pub formula: LodFormula,
 }
 
-impl Agreement {
-    /// Common fragments over all fragments.
-    #[must_use]
-    pub fn coverage_iou(&self) -> f64 {
-        self.both as f64 / (self.both + self.only_reference + self.only_capture).max(1) as f64
-    }
+/// A captured lane in one group: primitive and pixel of the tile, group and record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Lane {
+    pub key: u64,
+    pub group: u8,
+    pub record: u32,
 }
 
-/// A captured lane in group 0.
-#[derive(Clone, Copy, Debug)]
-pub struct Lane {
-    /// Coordinates.
-    pub uv: DVec2,
-    /// Horizontal derivative of the quad's top row.
-    pub dx: DVec2,
-    /// Vertical derivative of the quad's left column.
-    pub dy: DVec2,
-    /// Texels per unit.
-    pub extent: DVec2,
+/// Primitive and pixel of a tile as one number.
+pub(super) fn key(primitive: u32, pixel: [u32; 2]) -> u64 {
+    let [x, y] = pixel.map(|v| v % TILE_SIZE_PX);
+    u64::from(primitive) << 8 | u64::from(y * TILE_SIZE_PX + x)
 }
 
-/// Pixel and primitive of a fragment.
-pub type FragmentKey = ([u32; 2], u32);
+/// The pixel of a key, in a tile that starts at `origin`.
+pub(super) fn pixel_of(key: u64, origin: [u32; 2]) -> [u32; 2] {
+    let pixel = (key & 0xff) as u32;
+    [
+        origin[0] + pixel % TILE_SIZE_PX,
+        origin[1] + pixel / TILE_SIZE_PX,
+    ]
+}
 
-/// The lanes of a pass's tiles by pixel and primitive, those of group 0 and of draws without
-/// groups; `tiles` yields column, row and content. A lane that is recorded twice is an error.
-///
-/// # Errors
-/// Names the first duplicate.
-pub fn lanes<'a>(
-    draws: &[Draw],
-    tiles: impl Iterator<Item = ([u32; 2], &'a Tile)>,
-) -> Result<BTreeMap<FragmentKey, Lane>, String> {
-    let mut found = BTreeMap::new();
-    for ([column, row], tile) in tiles {
-        for run in &tile.runs {
-            let records = &tile.records[run.first as usize..(run.first + run.count) as usize];
-            let groups = &draws[run.draw as usize].groups;
-            for record in records
-                .iter()
-                .filter(|r| r.group == 0 || r.group == NO_GROUP)
-            {
-                let extent = groups.first().map_or(DVec2::ONE, |g| {
-                    DVec2::new(f64::from(g.extent[0]), f64::from(g.extent[1]))
+/// The lanes of a captured tile, sorted.
+pub(super) fn lanes(tile: &Tile) -> Vec<Lane> {
+    let mut lanes = Vec::with_capacity(4 * tile.records.len());
+    for run in &tile.runs {
+        for record in run.first..run.first + run.count {
+            let quad = &tile.records[record as usize];
+            for lane in (0..4).filter(|lane| quad.mask >> lane & 1 == 1) {
+                let pixel = [
+                    u32::from(quad.x) * 2 + (lane & 1),
+                    u32::from(quad.y) * 2 + (lane >> 1),
+                ];
+                lanes.push(Lane {
+                    key: key(run.primitive, pixel),
+                    group: quad.group,
+                    record,
                 });
-                let scale = f64::from(SUBTEXELS) * extent;
-                let fixed = |v: [i32; 2]| DVec2::new(f64::from(v[0]), f64::from(v[1])) / scale;
-                for lane in (0..4).filter(|lane| record.mask >> lane & 1 == 1) {
-                    let pixel = [
-                        column * 16 + u32::from(record.x) * 2 + (lane & 1),
-                        row * 16 + u32::from(record.y) * 2 + (lane >> 1),
-                    ];
-                    let content = Lane {
-                        uv: fixed(record.lane_uv(lane)),
-                        dx: fixed(record.dx),
-                        dy: fixed(record.dy),
-                        extent,
-                    };
-                    if found.insert((pixel, run.primitive), content).is_some() {
-                        return Err(format!(
-                            "pixel {pixel:?} of primitive {} is recorded twice",
-                            run.primitive
-                        ));
-                    }
-                }
             }
         }
     }
-    Ok(found)
+    lanes.sort_unstable();
+    lanes
 }
 
-/// Compares captured lanes with the reference's fragments.
-#[must_use]
-pub fn compare(reference: &[Fragment], lanes: &BTreeMap<FragmentKey, Lane>) -> Agreement {
-    let mut agreement = Agreement::default();
-    let mut total = 0.0;
-    for fragment in reference {
-        let Some(lane) = lanes.get(&(fragment.pixel, fragment.primitive)) else {
-            agreement.only_reference += 1;
-            continue;
+impl Comparison<'_> {
+    /// Compares one tile with the reference's fragments, which are returned as well.
+    #[must_use]
+    pub fn tile(
+        &self,
+        geometry: &Geometry<'_>,
+        number: usize,
+        tile: &Tile,
+    ) -> (Agreement, Vec<Fragment>) {
+        let mut result = Agreement::default();
+        let captured = lanes(tile);
+        let fragments = render_tile(geometry, number, self.alpha, self.recorded);
+        let mut expected: Vec<(u64, &Fragment)> = (fragments.iter())
+            .map(|f| (key(geometry.primitive(geometry.piece(f.piece)), f.pixel), f))
+            .collect();
+        expected.sort_unstable_by_key(|(key, _)| *key);
+        let mut expected = expected.into_iter().peekable();
+        let origin = origin(geometry, number);
+        let differs = |result: &mut Agreement, side: Side, key: u64| {
+            let primitive = (key >> 8) as u32;
+            let pixel = pixel_of(key, origin);
+            let class = classify(
+                geometry,
+                number,
+                self.alpha,
+                self.recorded,
+                primitive,
+                pixel,
+            );
+            result.differ(side, class);
         };
-        agreement.both += 1;
-        let error = ((fragment.uv - lane.uv) * lane.extent).length();
-        total += error;
-        agreement.max_uv_error_texels = agreement.max_uv_error_texels.max(error);
-        let levels = [(fragment.dx, fragment.dy), (lane.dx, lane.dy)]
-            .map(|(dx, dy)| level(dx * lane.extent, dy * lane.extent));
-        agreement.level_differs += u64::from(levels[0] != levels[1]);
+        for lanes in captured.chunk_by(|a, b| a.key == b.key) {
+            let key = lanes[0].key;
+            while let Some((missing, _)) = expected.next_if(|(k, _)| *k < key) {
+                differs(&mut result, Side::Reference, missing);
+            }
+            result.recorded_twice += lanes
+                .windows(2)
+                .filter(|w| w[0].group == w[1].group)
+                .count() as u64;
+            match expected.next_if(|(k, _)| *k == key) {
+                None => differs(&mut result, Side::Capture, key),
+                Some((_, fragment)) => {
+                    result.both += 1;
+                    self.fragment(geometry, fragment, lanes, tile, &mut result);
+                }
+            }
+        }
+        for (missing, _) in expected {
+            differs(&mut result, Side::Reference, missing);
+        }
+        (result, fragments)
     }
-    agreement.only_capture = lanes.len() as u64 - agreement.both;
-    agreement.mean_uv_error_texels = total / agreement.both.max(1) as f64;
-    agreement
+
+    /// Compares what a fragment samples.
+    fn fragment(
+        &self,
+        geometry: &Geometry<'_>,
+        fragment: &Fragment,
+        lanes: &[Lane],
+        tile: &Tile,
+        result: &mut Agreement,
+    ) {
+        let piece = geometry.piece(fragment.piece);
+        let textures = geometry.material(piece).textures();
+        let draw = &self.tables.draws[piece.draw as usize];
+        for lane in lanes {
+            let number = usize::from(lane.group);
+            // Look-ups of shadow maps have groups of their own behind the material's.
+            let Some(slots) = geometry.groups(piece).get(number) else {
+                result.shadow_lookups += u64::from(number < draw.groups.len());
+                continue;
+            };
+            let (Some(leader), Some(group)) = (
+                slots.first().and_then(|&s| textures[s]),
+                draw.groups.get(number),
+            ) else {
+                continue;
+            };
+            let record = &tile.records[lane.record as usize];
+            let index = (fragment.pixel[0] & 1) | (fragment.pixel[1] & 1) << 1;
+            let coordinates = geometry.coordinates(piece, &leader);
+            let (quad, exact) = (
+                coordinates.in_quad(fragment.pixel),
+                coordinates.exact(center(fragment.pixel)),
+            );
+            let captured = captured_uv(record, index, group);
+            let error = (period_free(captured - quad.uv) * extent(group)).length();
+            if !error.is_finite() {
+                result.not_finite += 1;
+                continue;
+            }
+            result.uv_errors_texels.0.push(error as f32);
+            self.samples(record, index, group, [quad, exact], result);
+        }
+    }
+
+    /// Compares levels and texels of the samples of a group.
+    fn samples(
+        &self,
+        record: &QuadRecord,
+        lane: u32,
+        group: &UvGroup,
+        [quad, exact]: [Sampled; 2],
+        result: &mut Agreement,
+    ) {
+        let only = QuadRecord {
+            mask: 1 << lane,
+            ..*record
+        };
+        let options = SamplingOptions {
+            lod: self.formula,
+            ..SamplingOptions::default()
+        };
+        for sample in &group.samples {
+            let texture = &self.tables.textures[sample.texture as usize];
+            let sampler = &self.tables.samplers[usize::from(sample.sampler)];
+            let lod = f64::from(quad_lod(record, group.extent, texture.size, self.formula));
+            let lod = clamped(lod, texture);
+            let mut read = Vec::with_capacity(2);
+            footprints(
+                &only,
+                group.extent,
+                sample,
+                texture,
+                sampler,
+                &options,
+                |f| {
+                    read.push((u32::from(f.level), [f.i, f.j]));
+                },
+            );
+            let references = [
+                (&mut result.capture, quad, self.formula),
+                (&mut result.specification, exact, LodFormula::Exact),
+            ];
+            for (errors, at, formula) in references {
+                let expected = level_of_detail(&at, texture, formula);
+                let found =
+                    taps(at.uv, expected, texture, sampler).map(|tap| (tap.level, tap.texels));
+                errors.add(
+                    lod,
+                    clamped(expected, texture),
+                    &read,
+                    &found.collect::<Vec<_>>(),
+                );
+            }
+        }
+    }
 }
 
-/// First mip level that trilinear filtering reads: `floor(log2(rho))`, at least 0. The level does
-/// not depend on whether the logarithm is llvmpipe's approximation.
-fn level(dx: DVec2, dy: DVec2) -> i32 {
-    let rho = dx.length().max(dy.length());
-    rho.log2().max(0.0).floor() as i32
+/// Coordinates of a lane as the trace has them.
+pub(super) fn captured_uv(record: &QuadRecord, lane: u32, group: &UvGroup) -> DVec2 {
+    let [u, v] = record.lane_uv(lane).map(f64::from);
+    DVec2::new(u, v) / (f64::from(SUBTEXELS) * extent(group))
+}
+
+fn extent(group: &UvGroup) -> DVec2 {
+    DVec2::new(group.extent[0].into(), group.extent[1].into())
+}
+
+/// A difference of coordinates without the pairs of repeats that a trace may leave out.
+fn period_free(difference: DVec2) -> DVec2 {
+    let axis = |d: f64| {
+        if d.abs() < 1.0 {
+            d
+        } else {
+            d - 2.0 * (d / 2.0).round()
+        }
+    };
+    DVec2::new(axis(difference.x), axis(difference.y))
 }

@@ -117,21 +117,28 @@ fn encode_record(record: &QuadRecord, state: &mut State, bits: &mut BitWriter) {
     let morton = u32::from(quad_morton(record.x, record.y));
     let step = morton - state.morton;
     let codes = residuals.map(|[u, v]| width_code(u | v));
-    for code in codes {
-        bits.put(code, 4);
-    }
-    bits.put(step.min(7), 3);
-    bits.put(u32::from(record.mask), 4);
-    bits.put(u32::from(record.group == expected), 1);
+    let [dx, dy, cross, coordinates] = codes;
+    let control = dx
+        | dy << 4
+        | cross << 8
+        | coordinates << 12
+        | step.min(7) << 16
+        | u32::from(record.mask) << 19
+        | u32::from(record.group == expected) << 23;
+    bits.put(control, CONTROL_BITS);
     if step >= 7 {
         bits.put(step, 6);
     }
     if record.group != expected {
         bits.put(u32::from(record.group), 4);
     }
-    for (pair, code) in residuals.into_iter().zip(codes) {
-        for value in pair {
-            bits.put(value, width(code));
+    for ([u, v], code) in residuals.into_iter().zip(codes) {
+        let width = width(code);
+        if width <= 16 {
+            bits.put(u | v << width, 2 * width);
+        } else {
+            bits.put(u, width);
+            bits.put(v, width);
         }
     }
     let same_run = state.seen >> group & 1 == 1;

@@ -10,11 +10,12 @@ mod readback;
 mod records;
 mod starts;
 mod targets;
+mod texels;
 mod upload;
 mod visible;
 mod whole;
 
-use super::backend::{CaptureBackend, Fragments, Marks, Recording, View, Work};
+use super::backend::{CaptureBackend, Fragments, Marks, Recording, Texels, View, Work};
 use super::batches::{Batch, batches};
 use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
@@ -554,6 +555,15 @@ impl CaptureBackend for Lavapipe {
         lens: &Lens,
     ) -> Result<Vec<Marks>, RasterError> {
         self.read_marks(draws, view, lens)
+    }
+
+    fn texels(
+        &mut self,
+        draws: &DrawList,
+        view: &View<'_>,
+        slot: u32,
+    ) -> Result<Texels, RasterError> {
+        self.read_texels(draws, view, slot)
     }
 
     fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError> {

@@ -15,6 +15,11 @@ pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrg
 /// Format of depth and shadow maps.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
+/// Format of texels as a shader gets them.
+pub const TEXEL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+/// Format of the primitives beside them.
+pub const PRIMITIVE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+
 /// The views that [`Pipelines::for_both_views`] draws at once.
 pub const VIEWS: NonZeroU32 = NonZeroU32::new(0b11).unwrap();
 /// How many they are.
@@ -174,13 +179,16 @@ impl Pipelines {
             Role::Mark => Some("fragment_mark"),
             Role::MarkMasked => Some("fragment_mark_masked"),
             Role::Count | Role::CountBlended => Some("fragment_count"),
+            Role::Texel => Some("fragment_texel"),
+            Role::TexelMasked => Some("fragment_texel_masked"),
         };
         let (format, blend) = match key.role {
             Role::Blended => (COLOR_FORMAT, Some(wgpu::BlendState::ALPHA_BLENDING)),
             Role::Count | Role::CountBlended => (wgpu::TextureFormat::R16Float, Some(ADDITIVE)),
+            Role::Texel | Role::TexelMasked => (TEXEL_FORMAT, None),
             _ => (COLOR_FORMAT, None),
         };
-        let color = [Some(wgpu::ColorTargetState {
+        let mut targets = vec![Some(wgpu::ColorTargetState {
             format,
             blend,
             write_mask: if key.role.only_records() {
@@ -189,6 +197,11 @@ impl Pipelines {
                 wgpu::ColorWrites::ALL
             },
         })];
+        if key.role.writes_texels() {
+            targets.push(Some(PRIMITIVE_FORMAT.into()));
+        } else if colorless {
+            targets.clear();
+        }
         gpu.device
             .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: None,
@@ -236,7 +249,7 @@ impl Pipelines {
                     module: &self.module,
                     entry_point: Some(entry_point),
                     compilation_options,
-                    targets: if colorless { &[] } else { &color },
+                    targets: &targets,
                 }),
                 multiview_mask: self.multiview_mask,
                 cache: None,

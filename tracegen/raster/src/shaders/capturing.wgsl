@@ -54,9 +54,10 @@ fn fragment_masked_record(
     @builtin(primitive_index) primitive: u32,
     @builtin(subgroup_invocation_id) invocation: u32,
 ) -> @location(0) vec4<f32> {
-    let lane = lane_of(in, primitive, invocation);
+    var lane = lane_of(in, primitive, invocation);
+    lane.passing = quad_mask(lane, base_color(in).a >= material.specular.w);
     let index = record_lit(lane, in, front);
-    record_depth(lane, index, base_color(in).a >= material.specular.w, in.position.z);
+    record_depth(lane, index, in.position.z);
     return vec4(0.0);
 }
 
@@ -68,9 +69,9 @@ fn fragment_count() -> @location(0) vec4<f32> {
 
 // Marks a draw as visible, and as visible through the lens. Whoever writes a word writes the same.
 fn mark(in: Fragment) {
-    records[2u * in.ids.x] = 1u;
+    marks[2u * in.ids.x] = 1u;
     let from_center = (in.position.xy - view.lens.xy) * view.lens.zw;
-    if dot(from_center, from_center) <= 1.0 { records[2u * in.ids.x + 1u] = 1u; }
+    if dot(from_center, from_center) <= 1.0 { marks[2u * in.ids.x + 1u] = 1u; }
 }
 
 @fragment @early_depth_test(force)

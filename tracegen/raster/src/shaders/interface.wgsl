@@ -39,7 +39,7 @@ struct View {
     // World to shadow uv and depth.
     cascades: array<mat4x4<f32>, MAX_CASCADES>,
     points: array<PointLight, MAX_POINT_LIGHTS>,
-    // x: point lights, y: records that the buffer holds.
+    // x: point lights, y: records that the buffer holds, z: slot of the texture that is checked.
     counts: vec4<u32>,
     // What the lens shows: xy: centre, zw: inverse radii, pixels.
     lens: vec4<f32>,
@@ -66,10 +66,12 @@ struct Material {
 @group(0) @binding(VIEW_BINDING) var<uniform> view: View;
 @group(0) @binding(INSTANCES_BINDING) var<storage, read> instances: array<Instance>;
 @group(0) @binding(COUNTER_BINDING) var<storage, read_write> counter: atomic<u32>;
-@group(0) @binding(RECORDS_BINDING) var<storage, read_write> records: array<u32>;
+@group(0) @binding(RECORDS_BINDING) var<storage, read_write> records: array<vec4<u32>>;
+// In place of the records where draws are marked.
+@group(0) @binding(RECORDS_BINDING) var<storage, read_write> marks: array<u32>;
 @group(0) @binding(SHADOW_MAP_BINDING) var shadow_map: texture_depth_2d_array;
 @group(0) @binding(SHADOW_SAMPLER_BINDING) var shadow_sampler: sampler_comparison;
-@group(0) @binding(DEPTHS_BINDING) var<storage, read_write> depths: array<u32>;
+@group(0) @binding(DEPTHS_BINDING) var<storage, read_write> depths: array<vec4<f32>>;
 
 @group(1) @binding(MATERIAL_BINDING) var<uniform> material: Material;
 @group(1) @binding(TEXTURES_BINDING + BASE_COLOR) var base_color_texture: texture_2d<f32>;

@@ -10,6 +10,8 @@ struct Lane {
     shift: u32,
     primitive: u32,
     draw: u32,
+    // Lanes of the quad whose alpha passes; told of alpha-masked draws alone.
+    passing: u32,
 }
 
 fn lane_of(in: Fragment, primitive: u32, invocation: u32) -> Lane {
@@ -28,22 +30,16 @@ fn quad_mask(lane: Lane, takes: bool) -> u32 {
     return (subgroupBallot(takes).x >> lane.shift) & 15u;
 }
 
-// Appends a record and tells its index.
+// Appends a record and tells its index. Software rasterisers store lane by lane: four words at once
+// cost them little more than one.
 fn append(lane: Lane, mask: u32, group: u32, a: vec4<f32>, b: vec4<f32>) -> u32 {
     let index = atomicAdd(&counter, 1u);
     if index < view.counts.y {
-        let word = index * RECORD_WORDS;
-        records[word] = lane.quad | (mask << 24u) | (group << 28u);
-        records[word + 1u] = lane.primitive;
-        records[word + 2u] = lane.draw;
-        records[word + 3u] = bitcast<u32>(a.x);
-        records[word + 4u] = bitcast<u32>(a.y);
-        records[word + 5u] = bitcast<u32>(a.z);
-        records[word + 6u] = bitcast<u32>(a.w);
-        records[word + 7u] = bitcast<u32>(b.x);
-        records[word + 8u] = bitcast<u32>(b.y);
-        records[word + 9u] = bitcast<u32>(b.z);
-        records[word + 10u] = bitcast<u32>(b.w);
+        let first = index * RECORD_VECTORS;
+        let header = lane.quad | (mask << 24u) | (group << 28u);
+        records[first] = vec4(header, lane.primitive, lane.draw, lane.passing);
+        records[first + 1u] = bitcast<vec4<u32>>(a);
+        records[first + 2u] = bitcast<vec4<u32>>(b);
     }
     return index;
 }
@@ -86,13 +82,11 @@ fn record_material(lane: Lane, in: Fragment) -> u32 {
     return first;
 }
 
-// Depth of the four lanes and which of them pass the alpha test, for the in-order replay;
-// `index` is that of the quad's record in group 0.
-fn record_depth(lane: Lane, index: u32, passes: bool, depth: f32) {
+// Depth of the four lanes, for the in-order replay; `index` is that of the quad's record in group 0.
+fn record_depth(lane: Lane, index: u32, depth: f32) {
     let dx = dpdx(depth);
     let dy = dpdy(depth);
     let cross = dpdx(dy);
-    let passing = quad_mask(lane, passes);
     if index < view.counts.y {
         let right = f32(lane.index & 1u);
         let down = f32(lane.index >> 1u);
@@ -101,12 +95,7 @@ fn record_depth(lane: Lane, index: u32, passes: bool, depth: f32) {
         let top_left = depth - right * dx_top - down * dy_left - right * down * cross;
         let top = vec2(top_left, top_left + dx_top);
         let bottom = top + vec2(dy_left, dy_left + cross);
-        let word = index * DEPTH_WORDS;
-        depths[word] = bitcast<u32>(top.x);
-        depths[word + 1u] = bitcast<u32>(top.y);
-        depths[word + 2u] = bitcast<u32>(bottom.x);
-        depths[word + 3u] = bitcast<u32>(bottom.y);
-        depths[word + 4u] = passing;
+        depths[index] = vec4(top, bottom);
     }
 }
 

@@ -20,16 +20,6 @@ fn thicket() -> Scene {
     scene(meshes, materials, vec![checker()])
 }
 
-/// Pixel and primitive of every recorded lane of a pass.
-fn recorded(captured: &Captured, pass: usize) -> BTreeSet<([u32; 2], u32)> {
-    let columns = captured.tables.passes[pass].tiles[0];
-    let tiles = (0..)
-        .zip(&captured.tiles[pass])
-        .map(|(i, tile)| ([i % columns, i / columns], tile));
-    let lanes = lanes(&captured.tables.draws, tiles).unwrap();
-    lanes.into_keys().collect()
-}
-
 #[test]
 fn every_covered_fragment_is_recorded_and_the_picture_stays() {
     let scene = thicket();

@@ -1,0 +1,330 @@
+//! `tracegen verify`.
+
+use super::cache_args::CacheArgs;
+use super::path_args::PathArgs;
+use super::raster::{cascades, prepare_environment, shadow_range_m, tables};
+use super::scene_args::{SceneArgs, SceneSetup};
+use crate::verify::frame::{Subject, TileChoice, Verified};
+use crate::verify::report::{Report, SLOTS};
+use anyhow::{Context, ensure};
+use clap::Args;
+use formats::footprint::LodFormula;
+use formats::textrace::{Textrace, TextraceWriter};
+use formats::view::Eye;
+use raster::backend::{CaptureBackend, Fragments, Texels};
+use raster::capture::CaptureJob;
+use raster::draws::DrawList;
+use raster::lavapipe::Lavapipe;
+use raster::lighting::Lighting;
+use scene::LoadOptions;
+use shell::{Output, Progress, Threads, note};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use techniques::{Planner, Settings, Skips};
+use textures::TextureSet;
+
+/// Memory for raw records.
+const RECORD_BUDGET_BYTES: u64 = 128 << 20;
+
+/// Arguments of `tracegen verify`.
+#[derive(Args, Debug)]
+pub struct VerifyArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Verify the first frame of this capture of the scene instead of a new one; camera and display are
+    /// then the trace's.
+    #[arg(long, value_name = "FILE.textrace",
+          conflicts_with_all = ["camera", "eye", "vfov", "hmd", "size", "hfov", "fov_tangents", "ipd", "cant", "shadows"])]
+    trace: Option<PathBuf>,
+    /// Light the scene through 4 shadow cascades of 2048x2048.
+    #[arg(long)]
+    shadows: bool,
+    /// Tiles to verify, drawn from both views: a number, or `all`.
+    #[arg(long, value_name = "N|all", default_value = "all", value_parser = parse_tiles)]
+    tiles: Tiles,
+    /// Seed of the sample of tiles.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Also filter every visible texel in software, by what its record says, and compare it with the driver's.
+    #[arg(long)]
+    colour: bool,
+    /// Level of detail as the driver makes it of the derivatives [default: softpipe for its traces, else llvmpipe].
+    #[arg(long, value_name = "FORMULA", value_parser = parse_formula)]
+    lod: Option<LodFormula>,
+    /// Write what the reference would have captured, for `replay`; needs all tiles.
+    #[arg(long, value_name = "FILE.textrace")]
+    write_reference: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    cache: CacheArgs,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// `--tiles`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Tiles {
+    All,
+    Some(usize),
+}
+
+fn parse_tiles(text: &str) -> Result<Tiles, String> {
+    match text {
+        "all" => Ok(Tiles::All),
+        _ => (text.parse().ok().filter(|count| *count > 0))
+            .map(Tiles::Some)
+            .ok_or_else(|| format!("expected 'all' or a number of at least 1, found '{text}'")),
+    }
+}
+
+fn parse_formula(text: &str) -> Result<LodFormula, String> {
+    match text {
+        "llvmpipe" => Ok(LodFormula::Llvmpipe),
+        "softpipe" => Ok(LodFormula::Softpipe),
+        "exact" => Ok(LodFormula::Exact),
+        _ => Err(format!(
+            "expected llvmpipe, softpipe or exact, found '{text}'"
+        )),
+    }
+}
+
+/// Runs `tracegen verify`.
+///
+/// # Errors
+/// Unreadable input, no driver where one is needed, or a file that cannot be written.
+pub fn run(args: &VerifyArgs) -> anyhow::Result<()> {
+    prepare_environment(args.threads.count);
+    filter_in_single_precision();
+    args.threads.start()?;
+    args.check_outputs()?;
+    let started = Instant::now();
+    let cache = args.cache.open()?;
+    let existing = args.trace.as_deref().map(Textrace::open).transpose()?;
+    let progress = Progress::new("loading the scene", 0, "");
+    let mut setup = (args.scene).setup(None, &PathArgs::still(), 0..1, &LoadOptions::ALL)?;
+    let mut shadow_cascades = cascades(&setup.scene, args.shadows);
+    if let (Some(trace), Some(file)) = (&existing, &args.trace) {
+        look_as(trace, file, &mut setup)?;
+        // The groups of the trace's draws show how many there were; none is verified.
+        shadow_cascades = 0;
+    }
+    let mut draws = DrawList::new(&setup.scene, shadow_cascades)?;
+    draws.pose(&setup.scene, setup.moments.time_s(0));
+    let planner = Planner::new(
+        &Settings::default(),
+        &setup.hmd,
+        setup.hmd.fov.map(|fov| formats::view::Lens::of(&fov)),
+        &[Eye::Left, Eye::Right],
+        scene::paths::DEFAULT_FPS,
+    )?;
+    let bounds = setup.scene.bounds().unwrap_or_default();
+    let job = CaptureJob {
+        scene: &setup.scene,
+        draws: &draws,
+        lighting: Lighting::new(&setup.scene),
+        bounds,
+        shadow_range_m: shadow_range_m(&setup, bounds),
+        planner: &planner,
+        skips: Skips::default(),
+        fragments: Fragments::DepthTested,
+    };
+    progress.stage("preparing textures", 0, "");
+    let finest = job.finest_levels(&setup.frames)?;
+    let textures = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
+    let mut backend = None;
+    if existing.is_none() || args.colour {
+        let budget = RECORD_BUDGET_BYTES;
+        backend = Some(Lavapipe::new(
+            &setup.scene,
+            &draws,
+            &textures,
+            setup.hmd.eye_size_px,
+            budget,
+        )?);
+    }
+    progress.stage("capturing", 0, "");
+    let trace = match (existing, &mut backend) {
+        (None, Some(backend)) => capture(&job, &setup, &args.scene.scene, &textures, backend)?,
+        (Some(trace), _) => trace,
+        (None, None) => unreachable!("a driver is opened where there is no trace"),
+    };
+    let subject = Subject {
+        trace: &trace,
+        scene: &setup.scene,
+        draws: &draws,
+        textures: &textures,
+    };
+    subject.check()?;
+    let texels = match (&mut backend, args.colour) {
+        (Some(backend), true) => texels(&job, &setup, &subject, backend)?,
+        _ => Vec::new(),
+    };
+    progress.stage("verifying", 0, "");
+    let captured = started.elapsed();
+    let (choice, seed) = match args.tiles {
+        Tiles::All => (TileChoice::All, None),
+        Tiles::Some(count) => (
+            TileChoice::Some {
+                count,
+                seed: args.seed,
+            },
+            Some(args.seed),
+        ),
+    };
+    let formula = args
+        .lod
+        .unwrap_or_else(|| formula_of(&trace.tables().meta.driver));
+    let verified = subject.verify(choice, formula, &texels, args.write_reference.is_some())?;
+    drop(progress);
+    if let Some(file) = &args.write_reference {
+        write_reference(file, &subject, &verified)?;
+    }
+    note(&format!(
+        "verified in {:.2} s, after {:.2} s for the scene and the capture",
+        (started.elapsed() - captured).as_secs_f64(),
+        captured.as_secs_f64()
+    ));
+    let report = Report::new(&args.scene.scene, &trace.tables().meta, &verified, seed);
+    if args.json {
+        shell::print(&(serde_json::to_string_pretty(&report)? + "\n"))
+    } else {
+        shell::print(&report.table())
+    }
+}
+
+impl VerifyArgs {
+    fn check_outputs(&self) -> anyhow::Result<()> {
+        let Some(file) = &self.write_reference else {
+            return Ok(());
+        };
+        ensure!(
+            self.tiles == Tiles::All,
+            "--write-reference: expected --tiles all, found a sample: a trace holds every tile"
+        );
+        let input = self.trace.as_deref().or_else(|| {
+            let scene = Path::new(&self.scene.scene);
+            scene.extension().map(|_| scene)
+        });
+        shell::check_outputs(&[Output::binary("--write-reference", file)], input)?;
+        Ok(())
+    }
+}
+
+/// llvmpipe filters some formats in 8 bits unless it is told not to, which is not what is checked.
+fn filter_in_single_precision() {
+    if std::env::var_os("GALLIVM_PERF").is_none() {
+        // SAFETY: as in `prepare_environment`: no thread reads the environment meanwhile.
+        unsafe { std::env::set_var("GALLIVM_PERF", "no_aos_sampling") }
+    }
+}
+
+/// How a driver makes levels of detail of derivatives.
+fn formula_of(driver: &str) -> LodFormula {
+    if driver.contains("softpipe") {
+        LodFormula::Softpipe
+    } else {
+        LodFormula::Llvmpipe
+    }
+}
+
+/// Takes display and views over from a trace.
+fn look_as(trace: &Textrace, file: &Path, setup: &mut SceneSetup) -> anyhow::Result<()> {
+    let meta = &trace.tables().meta;
+    let first = meta
+        .frames
+        .first()
+        .with_context(|| format!("{}: the trace has no frames", file.display()))?;
+    ensure!(
+        setup.scene.motions.is_empty() || first.frame == 0,
+        "{}: expected frame 0 of a scene that moves, found frame {}",
+        file.display(),
+        first.frame
+    );
+    setup.hmd = meta.hmd.clone();
+    setup.frames = vec![first.clone()];
+    Ok(())
+}
+
+fn capture(
+    job: &CaptureJob<'_>,
+    setup: &SceneSetup,
+    scene: &str,
+    textures: &TextureSet,
+    backend: &mut Lavapipe,
+) -> anyhow::Result<Textrace> {
+    let passes = job.passes(&setup.frames);
+    let tables = tables(
+        setup,
+        scene,
+        job.draws,
+        textures,
+        backend,
+        passes,
+        job.fragments,
+    );
+    let frame = job.frame(&setup.frames[0])?;
+    job.light(backend, &frame)?;
+    let mut writer = TextraceWriter::in_memory(&tables)?;
+    job.capture_frame(backend, &frame, 0, &mut job.recorder(&tables), &mut writer)?;
+    Ok(Textrace::from_bytes(writer.into_bytes()?)?)
+}
+
+/// The driver's texels by pass of the trace's first frame, then by slot.
+fn texels(
+    job: &CaptureJob<'_>,
+    setup: &SceneSetup,
+    subject: &Subject<'_>,
+    backend: &mut Lavapipe,
+) -> anyhow::Result<Vec<Vec<Texels>>> {
+    let frame = job.frame(&setup.frames[0])?;
+    let of_pass = |eye: Eye| {
+        let view = (frame.views())
+            .find(|view| view.layer.eye == Some(eye))
+            .context("a layer an eye")?;
+        (0..SLOTS.len() as u32)
+            .map(|slot| Ok(backend.texels(job.draws, &view, slot)?))
+            .collect::<anyhow::Result<Vec<_>>>()
+    };
+    (subject.passes().into_iter())
+        .map(|(_, _, eye)| eye)
+        .map(of_pass)
+        .collect()
+}
+
+fn write_reference(file: &Path, subject: &Subject<'_>, verified: &Verified) -> anyhow::Result<()> {
+    let mut tables = subject.trace.tables().clone();
+    let passes = subject.passes();
+    let frame = passes.first().map_or(0, |(_, pass, _)| pass.frame);
+    tables.passes.retain(|pass| pass.frame == frame);
+    tables.meta.frames.retain(|views| views.frame == frame);
+    tables.meta.tool = super::tool();
+    tables.meta.backend = "reference".into();
+    tables.meta.driver = "double precision".into();
+    let mut writer = TextraceWriter::create(file, &tables)?;
+    for (pass, tiles) in verified.reference.iter().enumerate() {
+        for (number, tile) in tiles.iter().enumerate() {
+            writer.append(pass, number, tile.clone())?;
+        }
+    }
+    writer.finish()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_are_a_number_or_all() {
+        assert_eq!(parse_tiles("all"), Ok(Tiles::All));
+        assert_eq!(parse_tiles("12"), Ok(Tiles::Some(12)));
+        for bad in ["0", "-1", "some", ""] {
+            assert!(
+                parse_tiles(bad).unwrap_err().contains("'all' or a number"),
+                "{bad}"
+            );
+        }
+    }
+}

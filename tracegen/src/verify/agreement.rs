@@ -1,0 +1,162 @@
+//! What a comparison counts, and its sums over tiles.
+
+use super::classes::Class;
+
+/// Who has a fragment that the other has not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The reference.
+    Reference,
+    /// The capture.
+    Capture,
+}
+
+/// Levels and texels of samples against one notion of the truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SampleErrors {
+    /// Samples compared: fragments times textures.
+    pub samples: u64,
+    /// Sum of the absolute errors of the level of detail, levels.
+    pub lod_sum: f64,
+    /// Largest of them.
+    pub lod_max: f64,
+    /// Samples whose finer level differs.
+    pub levels_differ: u64,
+    /// Samples that read other levels.
+    pub other_levels: u64,
+    /// Samples that read other texels of the same levels.
+    pub other_texels: u64,
+}
+
+/// A level and its columns and rows.
+type Read = (u32, [[u32; 2]; 2]);
+
+impl SampleErrors {
+    /// Adds a sample: clamped levels of detail, and what was read and should have been.
+    pub(super) fn add(&mut self, lod: f64, expected_lod: f64, read: &[Read], expected: &[Read]) {
+        let error = (lod - expected_lod).abs();
+        self.samples += 1;
+        self.lod_sum += error;
+        self.lod_max = self.lod_max.max(error);
+        self.levels_differ += u64::from(lod.floor() != expected_lod.floor());
+        let levels = |reads: &[Read]| (reads.len(), reads.first().map(|r| r.0));
+        if levels(read) != levels(expected) {
+            self.other_levels += 1;
+        } else if read != expected {
+            self.other_texels += 1;
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.samples += other.samples;
+        self.lod_sum += other.lod_sum;
+        self.lod_max = self.lod_max.max(other.lod_max);
+        self.levels_differ += other.levels_differ;
+        self.other_levels += other.other_levels;
+        self.other_texels += other.other_texels;
+    }
+}
+
+/// Distances, in no order.
+#[derive(Clone, Default, PartialEq)]
+pub struct Distances(pub Vec<f32>);
+
+impl Distances {
+    /// Mean, 99th percentile and maximum; zeros where there are none.
+    #[must_use]
+    pub fn summary(&self) -> [f64; 3] {
+        let mut values = self.0.clone();
+        let count = values.len();
+        if count == 0 {
+            return [0.0; 3];
+        }
+        let sum: f64 = values.iter().map(|&e| f64::from(e)).sum();
+        let (_, percentile, above) =
+            values.select_nth_unstable_by(count * 99 / 100, f32::total_cmp);
+        let maximum = above.iter().copied().fold(*percentile, f32::max);
+        [
+            sum / count as f64,
+            f64::from(*percentile),
+            f64::from(maximum),
+        ]
+    }
+}
+
+impl std::fmt::Debug for Distances {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [mean, percentile, max] = self.summary();
+        write!(
+            f,
+            "{} distances: mean {mean}, 99 % {percentile}, max {max}",
+            self.0.len()
+        )
+    }
+}
+
+/// Agreement of captured tiles with the reference.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Agreement {
+    /// Fragments (draw, primitive and pixel) in both.
+    pub both: u64,
+    /// Fragments only in the reference, then only in the capture, by [`Class::ALL`].
+    pub only: [[u64; Class::ALL.len()]; 2],
+    /// Lanes that the capture has twice.
+    pub recorded_twice: u64,
+    /// Distances of coordinates of common fragments and their groups, texels of the group's extent.
+    pub uv_errors_texels: Distances,
+    /// Common fragments whose coordinates are no numbers on either side.
+    pub not_finite: u64,
+    /// Shadow-map look-ups of common fragments: not compared.
+    pub shadow_lookups: u64,
+    /// Against the same formula of the level of detail, so that what remains is the capture's precision.
+    pub capture: SampleErrors,
+    /// Against the specification: the exact logarithm of each fragment's own derivatives.
+    pub specification: SampleErrors,
+}
+
+impl Agreement {
+    pub(super) fn differ(&mut self, side: Side, class: Class) {
+        self.only[side as usize][class as usize] += 1;
+    }
+
+    /// Fragments that one side alone has.
+    #[must_use]
+    pub fn only(&self, side: Side) -> u64 {
+        self.only[side as usize].iter().sum()
+    }
+
+    /// Differences of a class.
+    #[must_use]
+    pub fn of_class(&self, class: Class) -> u64 {
+        self.only.iter().map(|side| side[class as usize]).sum()
+    }
+
+    /// Common fragments over all fragments.
+    #[must_use]
+    pub fn coverage_iou(&self) -> f64 {
+        let all = self.both + self.only(Side::Reference) + self.only(Side::Capture);
+        if all == 0 {
+            1.0
+        } else {
+            self.both as f64 / all as f64
+        }
+    }
+
+    /// Adds another tile's or pass's.
+    pub fn merge(&mut self, other: &Self) {
+        self.both += other.both;
+        for (sum, side) in self.only.iter_mut().zip(&other.only) {
+            for (sum, count) in sum.iter_mut().zip(side) {
+                *sum += count;
+            }
+        }
+        self.recorded_twice += other.recorded_twice;
+        self.uv_errors_texels
+            .0
+            .extend_from_slice(&other.uv_errors_texels.0);
+        self.not_finite += other.not_finite;
+        self.shadow_lookups += other.shadow_lookups;
+        self.capture.merge(&other.capture);
+        self.specification.merge(&other.specification);
+    }
+}

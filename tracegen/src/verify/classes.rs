@@ -1,0 +1,131 @@
+//! Why a fragment is in the capture alone or in the reference alone.
+
+use super::geometry::{Geometry, SLIVER_PX};
+use super::piece::{Piece, center};
+use super::reference::AlphaTest;
+use raster::backend::Fragments;
+use raster::draws::DrawMode;
+use serde::Serialize;
+
+/// Distance to an edge within which the rounding of vertices to 1/256 pixel decides the coverage.
+const EDGE_PX: f64 = 2.0 / 256.0;
+/// The same for primitives whose corners are cut off, and with them replaced.
+const CLIPPED_PX: f64 = 16.0 / 256.0;
+/// Alpha so near to the cutoff that the filter's rounding and the level of detail decide.
+const ALPHA: f64 = 1.0 / 16.0;
+
+/// A class of differences.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Class {
+    /// The pixel's centre lies within 1/128 pixel of an edge of the primitive.
+    Edge,
+    /// The primitive is so thin that rounding decides which way round it winds, or whether it has an area.
+    Sliver,
+    /// The near or far plane cuts the primitive, and its cut edges are within 1/16 pixel.
+    Clipped,
+    /// Another fragment is as deep, but for what single precision makes of it.
+    DepthTie,
+    /// It is in front or behind of an alpha-masked fragment whose alpha is within 1/16 of the cutoff.
+    AlphaBorder,
+    /// A nearer fragment is in one of the two alone, for one of the reasons above.
+    Hidden,
+    /// None of these.
+    Unexplained,
+}
+
+impl Class {
+    /// Every class.
+    pub const ALL: [Self; 7] = [
+        Self::Edge,
+        Self::Sliver,
+        Self::Clipped,
+        Self::DepthTie,
+        Self::AlphaBorder,
+        Self::Hidden,
+        Self::Unexplained,
+    ];
+
+    /// Its cause in a few words.
+    #[must_use]
+    pub fn cause(self) -> &'static str {
+        match self {
+            Self::Edge => "edges within 1/128 px: vertices rounded to 1/256 px",
+            Self::Sliver => "slivers: rounding turns or empties the primitive",
+            Self::Clipped => "cut by the near or far plane",
+            Self::DepthTie => "as deep as another fragment in single precision",
+            Self::AlphaBorder => "alpha within 1/16 of the cutoff",
+            Self::Hidden => "behind a fragment that differs",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+/// The class of a primitive's fragment at a pixel of a tile that only one side has.
+#[must_use]
+pub fn classify(
+    geometry: &Geometry<'_>,
+    tile: usize,
+    alpha: &dyn AlphaTest,
+    recorded: Fragments,
+    primitive: u32,
+    pixel: [u32; 2],
+) -> Class {
+    let at = center(pixel);
+    let own = |piece: &Piece| geometry.primitive(piece) == primitive;
+    let of_primitive = || geometry.of_tile(tile).filter(|(_, piece)| own(piece));
+    if of_primitive().any(|(_, piece)| piece.dropped || piece.height_px() <= SLIVER_PX) {
+        return Class::Sliver;
+    }
+    let nearest = of_primitive()
+        .map(|(index, piece)| (piece.distance_px(pixel), index, piece))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((distance, index, piece)) = nearest else {
+        return Class::Unexplained;
+    };
+    if distance.abs() <= EDGE_PX {
+        return Class::Edge;
+    }
+    if piece.clipped && distance.abs() <= CLIPPED_PX {
+        return Class::Clipped;
+    }
+    if distance < 0.0 || recorded == Fragments::All {
+        return Class::Unexplained;
+    }
+    let (depth, error) = (piece.depth(at), piece.depth_error(at));
+    // What an earlier fragment there does if it is there at all: hide this one or not.
+    let mut class = Class::Unexplained;
+    for (_, earlier) in geometry.of_tile(tile).filter(|(other, _)| *other < index) {
+        let distance = earlier.distance_px(pixel);
+        let doubtful = distance.abs() <= if earlier.clipped { CLIPPED_PX } else { EDGE_PX }
+            || earlier.dropped
+            || earlier.height_px() <= SLIVER_PX;
+        if own(earlier) || (distance < 0.0 && !doubtful) {
+            continue;
+        }
+        let mode = geometry.call(earlier).mode;
+        if mode == DrawMode::Blended {
+            continue;
+        }
+        let (there, tolerance) = (earlier.depth(at), error + earlier.depth_error(at));
+        let margin = match mode {
+            DrawMode::Masked => alpha.margin(geometry, earlier, pixel),
+            _ => 1.0,
+        };
+        if margin < -ALPHA {
+            continue;
+        }
+        if (there - depth).abs() <= tolerance {
+            return Class::DepthTie;
+        }
+        if there > depth {
+            continue;
+        }
+        if margin.abs() <= ALPHA {
+            class = Class::AlphaBorder;
+        } else if doubtful && class == Class::Unexplained {
+            class = Class::Hidden;
+        }
+    }
+    class
+}

@@ -1,0 +1,186 @@
+//! The driver's filtered texels against those of the software sampler, at every visible pixel.
+
+use super::compare::{Lane, captured_uv, key, lanes};
+use super::geometry::Geometry;
+use super::reference::origin;
+use super::sampler::{SoftwareSampler, srgb_of_linear};
+use formats::footprint::{LodFormula, quad_lod};
+use formats::textrace::{Tables, Tile};
+use formats::texture::ColorSpace;
+use formats::view::TILE_SIZE_PX;
+use glam::{DVec2, DVec4};
+use raster::backend::Texels;
+use raster::draws::DrawList;
+use scene::{Material, Scene};
+
+/// A step of 8 bits.
+const STEP: f64 = 1.0 / 255.0;
+
+/// By how far single precision may move coordinates on the way to the filter, texels.
+const MOVED_TEXELS: f64 = 1.0 / 64.0;
+
+/// Where to, in steps of that.
+const AROUND: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
+
+/// How the software sampler's colours differ from the driver's, in the channel that differs most.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ColourErrors {
+    /// Visible fragments that sample a texture.
+    pub fragments: u64,
+    /// Those without a record of their primitive at their pixel.
+    pub unrecorded: u64,
+    /// Those that differ by no more than 1/255 as light.
+    pub within_as_light: u64,
+    /// Those that differ by no more than 1/255 as the texture encodes colour.
+    pub within_as_encoded: u64,
+    /// Beyond that only because the driver rounds what it decodes down to 8 bits.
+    pub by_decoding: u64,
+    /// Beyond that, but not for coordinates that lie 1/64 texel away: where texels differ much, the driver's single
+    /// precision shows.
+    pub by_coordinates: u64,
+    /// Sum of the differences as encoded.
+    pub sum: f64,
+    /// Largest of them.
+    pub max: f64,
+}
+
+impl ColourErrors {
+    fn add(&mut self, light: f64, encoded: f64) {
+        self.within_as_light += u64::from(light <= STEP);
+        self.within_as_encoded += u64::from(encoded <= STEP);
+        self.sum += encoded;
+        self.max = self.max.max(encoded);
+    }
+
+    /// Adds another tile's or pass's.
+    pub fn merge(&mut self, other: &Self) {
+        self.fragments += other.fragments;
+        self.unrecorded += other.unrecorded;
+        self.within_as_light += other.within_as_light;
+        self.within_as_encoded += other.within_as_encoded;
+        self.by_decoding += other.by_decoding;
+        self.by_coordinates += other.by_coordinates;
+        self.sum += other.sum;
+        self.max = self.max.max(other.max);
+    }
+}
+
+/// Filters what the records of a tile say was sampled, and compares it with what the driver got.
+pub struct ColourCheck<'a> {
+    /// The scene, for its materials.
+    pub scene: &'a Scene,
+    /// Its draws.
+    pub draws: &'a DrawList,
+    /// The trace's tables.
+    pub tables: &'a Tables,
+    /// The texture unit.
+    pub sampler: &'a SoftwareSampler<'a>,
+    /// How the driver makes a level of detail of the derivatives.
+    pub formula: LodFormula,
+}
+
+impl ColourCheck<'_> {
+    /// Compares the visible pixels of a tile, of which `texels` holds the textures in `slot`.
+    #[must_use]
+    pub fn tile(
+        &self,
+        geometry: &Geometry<'_>,
+        number: usize,
+        tile: &Tile,
+        texels: &Texels,
+        slot: usize,
+    ) -> ColourErrors {
+        let mut errors = ColourErrors::default();
+        let lanes = lanes(tile);
+        let [left, top] = origin(geometry, number);
+        let end = |start: u32, axis: usize| (start + TILE_SIZE_PX).min(geometry.size_px[axis]);
+        for y in top..end(top, 1) {
+            for x in left..end(left, 0) {
+                let pixel = y as usize * geometry.size_px[0] as usize + x as usize;
+                let primitive = texels.primitives[pixel];
+                if primitive == Texels::NO_PRIMITIVE {
+                    continue;
+                }
+                errors.fragments += 1;
+                let found = DVec4::from(texels.colors[pixel].map(f64::from));
+                let difference = |sampler, moved: DVec2| {
+                    let (expected, srgb) =
+                        self.filtered(sampler, &lanes, tile, (primitive, [x, y]), slot, moved)?;
+                    let light = (found - expected).abs().max_element();
+                    let encoded = (encode(found) - encode(expected)).abs().max_element();
+                    Some((light, if srgb { encoded } else { light }))
+                };
+                let Some((light, encoded)) = difference(self.sampler, DVec2::ZERO) else {
+                    errors.unrecorded += 1;
+                    continue;
+                };
+                errors.add(light, encoded);
+                if encoded > STEP {
+                    let rounded = self.sampler.rounding_down();
+                    let explains =
+                        |moved| difference(&rounded, moved).is_some_and(|(_, d)| d <= STEP);
+                    if explains(DVec2::ZERO) {
+                        errors.by_decoding += 1;
+                    } else if AROUND
+                        .into_iter()
+                        .any(|to| explains(DVec2::from(to) * MOVED_TEXELS))
+                    {
+                        errors.by_coordinates += 1;
+                    }
+                }
+            }
+        }
+        errors
+    }
+
+    /// What the software sampler makes of a fragment's record, and whether the texture is sRGB.
+    fn filtered(
+        &self,
+        sampler: &SoftwareSampler<'_>,
+        lanes: &[Lane],
+        tile: &Tile,
+        (primitive, pixel): (u32, [u32; 2]),
+        slot: usize,
+        moved_texels: DVec2,
+    ) -> Option<(DVec4, bool)> {
+        let calls = &self.draws.calls;
+        let call = calls.get(
+            calls
+                .partition_point(|c| c.first_primitive <= primitive)
+                .checked_sub(1)?,
+        )?;
+        let material: &Material = &self.scene.materials[call.material];
+        let reference = material.textures()[slot]?;
+        let groups = &self.draws.groups[call.material].groups;
+        let group = groups.iter().position(|slots| slots.contains(&slot))?;
+        let key = key(primitive, pixel);
+        let first = lanes.partition_point(|lane| lane.key < key);
+        let lane = lanes[first..]
+            .iter()
+            .take_while(|l| l.key == key)
+            .find(|l| usize::from(l.group) == group)?;
+        let record = &tile.records[lane.record as usize];
+        let draw = tile
+            .runs
+            .iter()
+            .find(|run| run.primitive == primitive)?
+            .draw;
+        let uv_group = self.tables.draws.get(draw as usize)?.groups.get(group)?;
+        let texture = sampler.texture(reference.image)?;
+        let lod = quad_lod(record, uv_group.extent, texture.texture.size, self.formula);
+        let index = (pixel[0] & 1) | (pixel[1] & 1) << 1;
+        let [width, height] = texture
+            .texture
+            .level_size((lod.max(0.0) as u32).min(texture.texture.levels - 1));
+        let level_size = DVec2::new(width.into(), height.into());
+        let uv = captured_uv(record, index, uv_group) + moved_texels / level_size;
+        let color = sampler.sample(texture, &reference.sampler, uv, lod.into());
+        Some((color, texture.texture.color_space == ColorSpace::Srgb))
+    }
+}
+
+/// Colour as sRGB textures encode it; alpha as it is.
+fn encode(color: DVec4) -> DVec4 {
+    let [r, g, b] = [color.x, color.y, color.z].map(srgb_of_linear);
+    DVec4::new(r, g, b, color.w)
+}

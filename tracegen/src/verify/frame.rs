@@ -1,0 +1,305 @@
+//! A captured frame against the reference: its passes, all of their tiles or a sample of them.
+
+use super::agreement::Agreement;
+use super::alpha::SampledAlpha;
+use super::colour::{ColourCheck, ColourErrors};
+use super::compare::Comparison;
+use super::geometry::Geometry;
+use super::sampler::SoftwareSampler;
+use super::write::reference_tile;
+use anyhow::{Context, ensure};
+use formats::footprint::LodFormula;
+use formats::textrace::{Draw, EncodedTile, Pass, PassKind, Surfaces, Textrace, Tile, encode_tile};
+use formats::view::{Eye, FrameViews};
+use raster::backend::{Fragments, Texels};
+use raster::draws::DrawList;
+use rayon::prelude::*;
+use scene::Scene;
+use textures::TextureSet;
+
+/// What is verified, and by what.
+pub struct Subject<'a> {
+    /// The capture.
+    pub trace: &'a Textrace,
+    /// Its scene, posed as it was captured.
+    pub scene: &'a Scene,
+    /// The scene's draws.
+    pub draws: &'a DrawList,
+    /// The textures that were sampled.
+    pub textures: &'a TextureSet,
+}
+
+/// Which tiles are verified.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TileChoice {
+    /// Every tile of every pass.
+    All,
+    /// So many tiles of all passes together, drawn with a seed.
+    Some {
+        /// How many.
+        count: usize,
+        /// Seed of the draw.
+        seed: u64,
+    },
+}
+
+/// What came out.
+#[derive(Clone, Debug, Default)]
+pub struct Verified {
+    /// Views verified.
+    pub passes: usize,
+    /// Tiles verified.
+    pub tiles: usize,
+    /// Tiles of all passes.
+    pub all_tiles: usize,
+    /// Records against the reference.
+    pub agreement: Agreement,
+    /// Colours by slot of the materials' textures, where texels were given.
+    pub colours: Vec<ColourErrors>,
+    /// The reference as the trace's tiles, by pass and tile, where they were asked for.
+    pub reference: Vec<Vec<EncodedTile>>,
+}
+
+impl<'a> Subject<'a> {
+    /// Checks that the trace is one of the scene's draws, pass by pass pictures of eyes.
+    ///
+    /// # Errors
+    /// The first contradiction.
+    pub fn check(&self) -> anyhow::Result<()> {
+        let tables = self.trace.tables();
+        let calls = &self.draws.calls;
+        ensure!(
+            tables.draws.len() == calls.len(),
+            "the trace is of another scene: expected {} draws, found {}",
+            calls.len(),
+            tables.draws.len()
+        );
+        for (number, (draw, call)) in tables.draws.iter().zip(calls).enumerate() {
+            let expected = (
+                call.first_primitive,
+                self.scene.meshes[call.mesh].triangles() as u32,
+            );
+            let found = (draw.first_primitive, draw.primitives);
+            ensure!(
+                expected == found,
+                "the trace is of another scene: draw {number}: expected {} primitives from {}, found {} from {}",
+                expected.1,
+                expected.0,
+                found.1,
+                found.0
+            );
+            self.check_groups(number, draw, call.material)?;
+        }
+        for (number, pass) in tables.passes.iter().enumerate() {
+            ensure!(
+                pass.kind == PassKind::Main && pass.eye.is_some(),
+                "pass {number}: expected the whole picture of an eye, found a layer of a technique: verify captures the baseline"
+            );
+        }
+        Ok(())
+    }
+
+    fn check_groups(&self, number: usize, draw: &Draw, material: usize) -> anyhow::Result<()> {
+        let groups = &self.draws.groups[material].groups;
+        let expected: Vec<usize> = groups.iter().map(Vec::len).collect();
+        let found: Vec<usize> = (draw.groups.iter().take(expected.len()))
+            .map(|g| g.samples.len())
+            .collect();
+        ensure!(
+            expected == found,
+            "the trace is of another scene: draw {number}: expected groups of {expected:?} textures, found {found:?}"
+        );
+        Ok(())
+    }
+
+    /// Passes of the trace's first frame.
+    #[must_use]
+    pub fn passes(&self) -> Vec<(usize, &'a Pass, Eye)> {
+        let tables = self.trace.tables();
+        let first = tables.passes.first().map(|pass| pass.frame);
+        (tables.passes.iter().enumerate())
+            .filter(|(_, pass)| Some(pass.frame) == first)
+            .filter_map(|(number, pass)| Some((number, pass, pass.eye?)))
+            .collect()
+    }
+
+    /// The eyes' matrices of the trace's first frame.
+    ///
+    /// # Errors
+    /// Tables without them.
+    pub fn views(&self) -> anyhow::Result<&'a FrameViews> {
+        let frame = self.passes().first().map(|(_, pass, _)| pass.frame);
+        let mut views = self.trace.tables().meta.frames.iter();
+        views
+            .find(|views| Some(views.frame) == frame)
+            .context("the trace has no frame with its eyes' matrices")
+    }
+
+    /// Compares the chosen tiles of the first frame; `texels` are the driver's by pass and slot, or
+    /// empty. `keep` encodes the reference's tiles.
+    ///
+    /// # Errors
+    /// A damaged tile.
+    pub fn verify(
+        &self,
+        choice: TileChoice,
+        formula: LodFormula,
+        texels: &[Vec<Texels>],
+        keep: bool,
+    ) -> anyhow::Result<Verified> {
+        let tables = self.trace.tables();
+        let sampler = SoftwareSampler::new(self.textures);
+        let alpha = SampledAlpha {
+            sampler: &sampler,
+            formula,
+        };
+        let comparison = Comparison {
+            tables,
+            alpha: &alpha,
+            recorded: recorded(tables.meta.surfaces.as_ref()),
+            formula,
+        };
+        let colour = ColourCheck {
+            scene: self.scene,
+            draws: self.draws,
+            tables,
+            sampler: &sampler,
+            formula,
+        };
+        let views = self.views()?;
+        let passes = self.passes();
+        let counts: Vec<usize> = passes
+            .iter()
+            .map(|(_, pass, _)| pass.tile_count() as usize)
+            .collect();
+        let wanted = choose(choice, &counts);
+        let mut result = Verified {
+            passes: passes.len(),
+            all_tiles: counts.iter().sum(),
+            ..Verified::default()
+        };
+        for (position, (number, pass, eye)) in passes.into_iter().enumerate() {
+            let wanted = &wanted[position];
+            let geometry = Geometry::new(
+                self.scene,
+                self.draws,
+                &views.eyes[eye as usize],
+                pass.size_px,
+                |tile| wanted[tile],
+            );
+            let texels = texels.get(position).map_or(&[][..], Vec::as_slice);
+            let tiles: Vec<usize> = (0..wanted.len()).filter(|&tile| wanted[tile]).collect();
+            let found = (tiles.into_par_iter())
+                .map(|tile| {
+                    let mut captured = Tile::default();
+                    self.trace.decode_tile(number, tile, &mut captured)?;
+                    let (agreement, fragments) = comparison.tile(&geometry, tile, &captured);
+                    let colours: Vec<ColourErrors> = (texels.iter().enumerate())
+                        .map(|(slot, texels)| colour.tile(&geometry, tile, &captured, texels, slot))
+                        .collect();
+                    let reference = if keep {
+                        let tile = reference_tile(&geometry, tables, &fragments, &captured);
+                        Some(encode_tile(tables, &tile)?)
+                    } else {
+                        None
+                    };
+                    Ok((agreement, colours, reference))
+                })
+                .collect::<anyhow::Result<Vec<_>>>()?;
+            result.tiles += found.len();
+            let mut reference = Vec::new();
+            // In the order of the tiles, so that sums are the same whatever the threads.
+            for (agreement, colours, tile) in found {
+                result.agreement.merge(&agreement);
+                result
+                    .colours
+                    .resize(colours.len(), ColourErrors::default());
+                for (sum, errors) in result.colours.iter_mut().zip(&colours) {
+                    sum.merge(errors);
+                }
+                reference.extend(tile);
+            }
+            result.reference.push(reference);
+        }
+        Ok(result)
+    }
+}
+
+/// The fragments that a trace holds.
+fn recorded(surfaces: Option<&Surfaces>) -> Fragments {
+    match surfaces {
+        Some(surfaces) if !surfaces.depth_tested => Fragments::All,
+        _ => Fragments::DepthTested,
+    }
+}
+
+/// Which tiles of passes with so many tiles are verified.
+fn choose(choice: TileChoice, counts: &[usize]) -> Vec<Vec<bool>> {
+    let all: usize = counts.iter().sum();
+    let mut chosen = match choice {
+        TileChoice::All => vec![true; all],
+        TileChoice::Some { count, seed } => {
+            // Selection sampling (Knuth, algorithm S).
+            let mut random = SplitMix(seed);
+            let mut needed = count.min(all);
+            (0..all)
+                .map(|tile| {
+                    let left = (all - tile) as u64;
+                    let take = random.below(left) < needed as u64;
+                    needed -= usize::from(take);
+                    take
+                })
+                .collect()
+        }
+    };
+    let mut chosen = chosen.drain(..);
+    counts
+        .iter()
+        .map(|&count| chosen.by_ref().take(count).collect())
+        .collect()
+}
+
+/// Steele, Lea and Flood 2014.
+struct SplitMix(u64);
+
+impl SplitMix {
+    /// A number below `end`.
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^= z >> 31;
+        ((u128::from(z) * u128::from(end)) >> 64) as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_has_the_size_that_is_asked_for_and_follows_from_its_seed() {
+        let counts = [300, 200];
+        let of = |seed| choose(TileChoice::Some { count: 40, seed }, &counts);
+        let chosen = of(7);
+        assert_eq!(chosen.iter().map(Vec::len).collect::<Vec<_>>(), counts);
+        let total = |chosen: &[Vec<bool>]| chosen.iter().flatten().filter(|c| **c).count();
+        assert_eq!(total(&chosen), 40);
+        assert_eq!(chosen, of(7));
+        assert_ne!(chosen, of(8));
+        // Both passes are drawn from.
+        assert!(chosen.iter().all(|pass| pass.iter().any(|c| *c)));
+        assert_eq!(total(&choose(TileChoice::All, &counts)), 500);
+        assert_eq!(
+            total(&choose(
+                TileChoice::Some {
+                    count: 900,
+                    seed: 1
+                },
+                &counts
+            )),
+            500
+        );
+    }
+}

@@ -1,0 +1,258 @@
+//! The triangles of a view, and which of its tiles they may touch.
+
+use super::piece::{Piece, pieces};
+use formats::view::{EyeView, TILE_SIZE_PX};
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
+use raster::draws::{DrawCall, DrawList};
+use scene::{Material, Mesh, Scene, TextureRef};
+
+/// Height up to which the rounding of vertices decides which way round a triangle winds.
+pub(super) const SLIVER_PX: f64 = 4.0 / 256.0;
+
+/// Whole pixels that a triangle is looked for around it: rounding may put it into the next tile.
+const MARGIN_PX: u32 = 1;
+
+/// A view's triangles in submission order, by tile.
+pub struct Geometry<'a> {
+    scene: &'a Scene,
+    draws: &'a DrawList,
+    /// Width and height.
+    pub size_px: [u32; 2],
+    /// Tile columns and rows.
+    pub tiles: [u32; 2],
+    pieces: Vec<Piece>,
+    /// By tile: the pieces that may touch it, ascending; empty for tiles that are not wanted.
+    bins: Vec<Vec<u32>>,
+}
+
+impl<'a> Geometry<'a> {
+    /// Projects the draws; tiles for which `wanted` is false stay empty.
+    #[must_use]
+    pub fn new(
+        scene: &'a Scene,
+        draws: &'a DrawList,
+        view: &EyeView,
+        size_px: [u32; 2],
+        wanted: impl Fn(usize) -> bool,
+    ) -> Self {
+        let tiles = size_px.map(|s| s.div_ceil(TILE_SIZE_PX));
+        let mut geometry = Self {
+            scene,
+            draws,
+            size_px,
+            tiles,
+            pieces: Vec::new(),
+            bins: vec![Vec::new(); tiles[0] as usize * tiles[1] as usize],
+        };
+        let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
+        let clip_from_world = wide(&view.eye_to_clip) * wide(&view.world_to_eye);
+        for (draw, call) in (0_u32..).zip(&draws.calls) {
+            let world_from_object = Mat4::from(call.transform).as_dmat4();
+            geometry.add_draw(draw, call, clip_from_world * world_from_object, &wanted);
+        }
+        geometry
+    }
+
+    fn add_draw(
+        &mut self,
+        draw: u32,
+        call: &DrawCall,
+        clip_from_object: DMat4,
+        wanted: &impl Fn(usize) -> bool,
+    ) {
+        let mesh = &self.scene.meshes[call.mesh];
+        let double_sided = self.scene.materials[call.material].double_sided;
+        let clip: Vec<DVec4> = (mesh.positions.iter())
+            .map(|p| clip_from_object * p.as_dvec3().extend(1.0))
+            .collect();
+        for (number, triangle) in (0_u32..).zip(mesh.indices.chunks_exact(3)) {
+            let vertices = [0, 1, 2].map(|i| clip[triangle[i] as usize]);
+            // All corners beyond one side of the picture.
+            let beyond = |side: &dyn Fn(&DVec4) -> bool| vertices.iter().all(side);
+            if beyond(&|v| v.x > v.w)
+                || beyond(&|v| v.x < -v.w)
+                || beyond(&|v| v.y > v.w)
+                || beyond(&|v| v.y < -v.w)
+                || beyond(&|v| v.z < 0.0)
+                || beyond(&|v| v.z > v.w)
+            {
+                continue;
+            }
+            let shows =
+                |counter_clockwise: bool| double_sided || counter_clockwise != call.mirrored;
+            for piece in pieces(vertices, self.size_px, draw, number, shows) {
+                // Of what is not drawn, only what another rounding might draw is of interest.
+                if !piece.dropped || piece.height_px() <= SLIVER_PX {
+                    self.add(piece, wanted);
+                }
+            }
+        }
+    }
+
+    fn add(&mut self, piece: Piece, wanted: &impl Fn(usize) -> bool) {
+        let Some([[left, right], [top, bottom]]) = piece.span_px(self.size_px) else {
+            return;
+        };
+        let index = self.pieces.len() as u32;
+        let first = |px: u32| px.saturating_sub(MARGIN_PX) / TILE_SIZE_PX;
+        let last =
+            |px: u32, axis: usize| ((px + MARGIN_PX) / TILE_SIZE_PX).min(self.tiles[axis] - 1);
+        let mut touches = false;
+        for row in first(top)..=last(bottom, 1) {
+            for column in first(left)..=last(right, 0) {
+                let tile = row as usize * self.tiles[0] as usize + column as usize;
+                if wanted(tile) {
+                    self.bins[tile].push(index);
+                    touches = true;
+                }
+            }
+        }
+        if touches {
+            self.pieces.push(piece);
+        }
+    }
+
+    /// Pieces that may touch a tile, in submission order; those that are not drawn as well.
+    pub fn of_tile(&self, tile: usize) -> impl Iterator<Item = (u32, &Piece)> {
+        self.bins[tile]
+            .iter()
+            .map(|&index| (index, self.piece(index)))
+    }
+
+    /// A piece by its index.
+    #[must_use]
+    pub fn piece(&self, index: u32) -> &Piece {
+        &self.pieces[index as usize]
+    }
+
+    /// The draw of a piece.
+    #[must_use]
+    pub fn call(&self, piece: &Piece) -> &'a DrawCall {
+        &self.draws.calls[piece.draw as usize]
+    }
+
+    /// The material of a piece.
+    #[must_use]
+    pub fn material(&self, piece: &Piece) -> &'a Material {
+        &self.scene.materials[self.call(piece).material]
+    }
+
+    /// Slots of the material's uv groups.
+    #[must_use]
+    pub fn groups(&self, piece: &Piece) -> &'a [Vec<usize>] {
+        &self.draws.groups[self.call(piece).material].groups
+    }
+
+    /// Number of the piece's primitive in the trace.
+    #[must_use]
+    pub fn primitive(&self, piece: &Piece) -> u32 {
+        self.call(piece).first_primitive + piece.number
+    }
+
+    /// The texture coordinates of a piece that `texture` is sampled at.
+    #[must_use]
+    pub fn coordinates(&self, piece: &'a Piece, texture: &TextureRef) -> Coordinates<'a> {
+        let mesh = &self.scene.meshes[self.call(piece).mesh];
+        let set = if texture.uv_set == 1 {
+            &mesh.uv1
+        } else {
+            &mesh.uv0
+        };
+        let row = |r: [f32; 3]| DVec3::from(r.map(f64::from));
+        let rows = texture.uv_transform.map(row);
+        let vertex = |i: usize| {
+            let uv = set.get(corner(mesh, piece, i)).copied().unwrap_or_default();
+            let uv = uv.as_dvec2().extend(1.0);
+            DVec2::new(rows[0].dot(uv), rows[1].dot(uv))
+        };
+        Coordinates {
+            piece,
+            uv: [vertex(0), vertex(1), vertex(2)],
+        }
+    }
+
+    /// Alpha of the vertex colours at a point; 1 without colours.
+    #[must_use]
+    pub fn vertex_alpha(&self, piece: &Piece, p: DVec2) -> f64 {
+        let mesh = &self.scene.meshes[self.call(piece).mesh];
+        if mesh.colors.is_empty() {
+            return 1.0;
+        }
+        let over_w = piece.weights_over_w(p);
+        let alpha = |i| {
+            mesh.colors
+                .get(corner(mesh, piece, i))
+                .map_or(1.0, |c| f64::from(c.w))
+        };
+        over_w.dot(DVec3::new(alpha(0), alpha(1), alpha(2))) / over_w.element_sum()
+    }
+}
+
+fn corner(mesh: &Mesh, piece: &Piece, vertex: usize) -> usize {
+    mesh.indices[3 * piece.number as usize + vertex] as usize
+}
+
+/// Texture coordinates over a piece.
+pub struct Coordinates<'a> {
+    piece: &'a Piece,
+    uv: [DVec2; 3],
+}
+
+/// Coordinates and their derivatives by x and y, in units of the texture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sampled {
+    /// Coordinates.
+    pub uv: DVec2,
+    /// Horizontal derivative.
+    pub dx: DVec2,
+    /// Vertical derivative.
+    pub dy: DVec2,
+}
+
+impl Coordinates<'_> {
+    /// Numerator and denominator of the coordinates, both linear in the point.
+    fn fraction(&self, p: DVec2) -> (DVec2, f64) {
+        let over_w = self.piece.weights_over_w(p);
+        let [a, b, c] = self.uv;
+        (
+            a * over_w.x + b * over_w.y + c * over_w.z,
+            over_w.element_sum(),
+        )
+    }
+
+    /// Coordinates at a point of the screen.
+    #[must_use]
+    pub fn at(&self, p: DVec2) -> DVec2 {
+        let (uv, one) = self.fraction(p);
+        uv / one
+    }
+
+    /// Coordinates with their exact derivatives at a point.
+    #[must_use]
+    pub fn exact(&self, p: DVec2) -> Sampled {
+        let (above, below) = self.fraction(p);
+        let uv = above / below;
+        let by = |step: DVec2| {
+            let (a, b) = self.fraction(p + step);
+            ((a - above) - uv * (b - below)) / below
+        };
+        Sampled {
+            uv,
+            dx: by(DVec2::X),
+            dy: by(DVec2::Y),
+        }
+    }
+
+    /// Coordinates at a pixel with the differences in its quad that drivers take for derivatives: those
+    /// of the top row and of the left column.
+    #[must_use]
+    pub fn in_quad(&self, pixel: [u32; 2]) -> Sampled {
+        let quad = super::piece::quad_center(pixel);
+        let top_left = self.at(quad);
+        Sampled {
+            uv: self.at(super::piece::center(pixel)),
+            dx: self.at(quad + DVec2::X) - top_left,
+            dy: self.at(quad + DVec2::Y) - top_left,
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! A triangle on the screen: what it covers, how deep it lies, and where on its primitive a pixel is.
+
+use glam::{DVec2, DVec3, DVec4};
+
+/// Steps per pixel to which vertices are snapped; every driver here has 8 bits.
+const SNAP: f64 = 256.0;
+
+/// A vertex in clip space, or a point between vertices where a primitive was clipped.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ClipVertex {
+    pub clip: DVec4,
+    /// Its weights of the primitive's three vertices.
+    pub weights: DVec3,
+}
+
+/// A vertex on the screen.
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    /// Pixels, y down.
+    at: DVec2,
+    /// 1/256 pixels.
+    snapped: [i64; 2],
+    depth: f64,
+    inverse_w: f64,
+    weights: DVec3,
+}
+
+/// A primitive, or what clipping left of it, as a triangle that winds clockwise on the screen.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece {
+    corners: [Corner; 3],
+    /// Index into the draw list.
+    pub draw: u32,
+    /// Number of the primitive in its draw.
+    pub number: u32,
+    /// It crosses the near or the far plane.
+    pub clipped: bool,
+    /// Its primitive faces away and is not drawn, or rounding left nothing of it.
+    pub dropped: bool,
+}
+
+/// What becomes of a primitive: up to three triangles where planes cut corners off.
+pub(super) fn pieces(
+    vertices: [DVec4; 3],
+    size_px: [u32; 2],
+    draw: u32,
+    number: u32,
+    shows: impl Fn(bool) -> bool,
+) -> Vec<Piece> {
+    let weights = [DVec3::X, DVec3::Y, DVec3::Z];
+    let vertex = |i: usize| ClipVertex {
+        clip: vertices[i],
+        weights: weights[i],
+    };
+    let corners = clip_to_depth_range(&[vertex(0), vertex(1), vertex(2)]);
+    let clipped = corners.len() != 3 || (0..3).any(|i| corners[i].clip != vertices[i]);
+    let projected: Vec<Corner> = corners.iter().map(|v| project(v, size_px)).collect();
+    let triangle = |fan: usize| {
+        let mut corners = [projected[0], projected[fan - 1], projected[fan]];
+        let area = area(&corners);
+        // Counter-clockwise with y up is clockwise with y down: a negative area here.
+        let dropped = area == 0 || !shows(area < 0);
+        if area < 0 {
+            corners.swap(1, 2);
+        }
+        Piece {
+            corners,
+            draw,
+            number,
+            clipped,
+            dropped,
+        }
+    };
+    (2..projected.len()).map(triangle).collect()
+}
+
+/// Clips a triangle to `0 <= z <= w` (Sutherland and Hodgman 1974).
+fn clip_to_depth_range(triangle: &[ClipVertex; 3]) -> Vec<ClipVertex> {
+    let near = |v: &ClipVertex| v.clip.z;
+    let far = |v: &ClipVertex| v.clip.w - v.clip.z;
+    let mut polygon = triangle.to_vec();
+    for distance in [&near as &dyn Fn(&ClipVertex) -> f64, &far] {
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for (i, current) in polygon.iter().enumerate() {
+            let previous = &polygon[(i + polygon.len() - 1) % polygon.len()];
+            let (dp, dc) = (distance(previous), distance(current));
+            if (dp < 0.0) != (dc < 0.0) {
+                let t = dp / (dp - dc);
+                kept.push(ClipVertex {
+                    clip: previous.clip.lerp(current.clip, t),
+                    weights: previous.weights.lerp(current.weights, t),
+                });
+            }
+            if dc >= 0.0 {
+                kept.push(*current);
+            }
+        }
+        polygon = kept;
+    }
+    // Vertices that are no numbers are on neither side.
+    polygon.retain(|v| v.clip.is_finite() && v.clip.w > 0.0);
+    polygon
+}
+
+fn project(vertex: &ClipVertex, size_px: [u32; 2]) -> Corner {
+    let inverse_w = 1.0 / vertex.clip.w;
+    let ndc = vertex.clip * inverse_w;
+    let at = DVec2::new(
+        (ndc.x * 0.5 + 0.5) * f64::from(size_px[0]),
+        (0.5 - ndc.y * 0.5) * f64::from(size_px[1]),
+    );
+    Corner {
+        at,
+        snapped: at.to_array().map(|v| (v * SNAP).round_ties_even() as i64),
+        depth: ndc.z,
+        inverse_w,
+        weights: vertex.weights,
+    }
+}
+
+/// Twice the area of the snapped triangle, positive for clockwise on a screen with y down.
+fn area(t: &[Corner; 3]) -> i128 {
+    edge(t[0].snapped, t[1].snapped, t[2].snapped)
+}
+
+fn edge(a: [i64; 2], b: [i64; 2], p: [i64; 2]) -> i128 {
+    let wide = |v: i64| i128::from(v);
+    wide(b[0] - a[0]) * wide(p[1] - a[1]) - wide(b[1] - a[1]) * wide(p[0] - a[0])
+}
+
+/// The centre of a pixel.
+#[must_use]
+pub fn center(pixel: [u32; 2]) -> DVec2 {
+    DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5
+}
+
+/// The centre of the top left pixel of a pixel's quad.
+#[must_use]
+pub fn quad_center(pixel: [u32; 2]) -> DVec2 {
+    center(pixel.map(|v| v & !1))
+}
+
+impl Piece {
+    /// First and last column, then row, of the pixels that it may touch; `None` off the screen.
+    pub(super) fn span_px(&self, size_px: [u32; 2]) -> Option<[[u32; 2]; 2]> {
+        let axis = |axis: usize| {
+            let values = self.corners.map(|v| v.snapped[axis].div_euclid(256));
+            let low = values.iter().min().copied()?.max(0);
+            let high = values
+                .iter()
+                .max()
+                .copied()?
+                .min(i64::from(size_px[axis]) - 1);
+            (low <= high).then_some([low as u32, high as u32])
+        };
+        Some([axis(0)?, axis(1)?])
+    }
+
+    /// The edges' values at a pixel's centre: all positive inside.
+    fn edges(&self, pixel: [u32; 2]) -> [(i128, [i64; 2]); 3] {
+        let center = pixel.map(|v| i64::from(v) * 256 + 128);
+        [0, 1, 2].map(|i| {
+            let (a, b) = (self.corners[i].snapped, self.corners[(i + 1) % 3].snapped);
+            (edge(a, b, center), [b[0] - a[0], b[1] - a[1]])
+        })
+    }
+
+    /// A pixel's centre is covered, by the top-left rule.
+    #[must_use]
+    pub fn covers(&self, pixel: [u32; 2]) -> bool {
+        self.edges(pixel).into_iter().all(|(value, [x, y])| {
+            let (top, left) = (y == 0 && x > 0, y < 0);
+            value > 0 || (value == 0 && (top || left))
+        })
+    }
+
+    /// Distance of a pixel's centre to the nearest edge's line, pixels, negative outside.
+    #[must_use]
+    pub fn distance_px(&self, pixel: [u32; 2]) -> f64 {
+        let distance = |(value, [x, y]): (i128, [i64; 2])| {
+            let length = (x as f64).hypot(y as f64).max(1.0);
+            value as f64 / length / SNAP
+        };
+        self.edges(pixel)
+            .map(distance)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Shortest height, pixels: below 1/256 the vertices' rounding decides what is left of it.
+    #[must_use]
+    pub fn height_px(&self) -> f64 {
+        let [a, b, c] = self.corners.map(|c| c.at);
+        let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+        ((b - a).perp_dot(c - a) / longest.max(f64::MIN_POSITIVE)).abs()
+    }
+
+    /// Weights of the corners at a point of the screen, linear in it.
+    fn screen_weights(&self, p: DVec2) -> [f64; 3] {
+        let cross = |a: DVec2, b: DVec2| (b - a).perp_dot(p - a);
+        let [a, b, c] = self.corners.map(|c| c.at);
+        let total = (b - a).perp_dot(c - a);
+        [cross(b, c), cross(c, a), cross(a, b)].map(|w| w / total)
+    }
+
+    /// Depth at a point of the screen, 0 to 1.
+    #[must_use]
+    pub fn depth(&self, p: DVec2) -> f64 {
+        let weights = self.screen_weights(p);
+        weights
+            .iter()
+            .zip(&self.corners)
+            .map(|(w, c)| w * c.depth)
+            .sum()
+    }
+
+    /// What single precision may make of the depth there: a few units in the last place of the largest
+    /// term of the plane's equation.
+    #[must_use]
+    pub fn depth_error(&self, p: DVec2) -> f64 {
+        let here = self.depth(p);
+        let slope = |step: DVec2| (self.depth(p + step) - here).abs();
+        let away = |axis: usize| {
+            self.corners
+                .map(|c| (c.at[axis] - p[axis]).abs())
+                .into_iter()
+                .fold(0.0, f64::max)
+        };
+        let largest = here.abs() + slope(DVec2::X) * away(0) + slope(DVec2::Y) * away(1);
+        16.0 * f64::from(f32::EPSILON) * largest
+    }
+
+    /// Weights of the primitive's vertices over w at a point of the screen: linear in the point, and
+    /// perspective-correct weights when divided by their sum.
+    #[must_use]
+    pub fn weights_over_w(&self, p: DVec2) -> DVec3 {
+        let weights = self.screen_weights(p);
+        (weights.iter().zip(&self.corners))
+            .map(|(weight, corner)| corner.weights * (weight * corner.inverse_w))
+            .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle from pixels, all at depth 0.5 and w 1 or as given.
+    fn piece(corners: [[f64; 2]; 3], w: [f64; 3], size: u32) -> Piece {
+        let vertex = |i: usize| {
+            let [x, y] = corners[i].map(|v| v / f64::from(size) * 2.0 - 1.0);
+            DVec4::new(x, -y, 0.5, 1.0) * w[i]
+        };
+        let found = pieces([vertex(0), vertex(1), vertex(2)], [size; 2], 0, 0, |_| true);
+        assert_eq!(found.len(), 1);
+        found[0]
+    }
+
+    #[test]
+    fn two_triangles_of_a_square_cover_each_of_its_pixels_once() {
+        // The diagonal and the right and lower edges go through pixel centres.
+        let a = piece([[0.5, 0.5], [4.5, 0.5], [4.5, 4.5]], [1.0; 3], 8);
+        let b = piece([[0.5, 0.5], [4.5, 4.5], [0.5, 4.5]], [1.0; 3], 8);
+        for y in 0..8 {
+            for x in 0..8 {
+                let covered = [a, b].iter().filter(|p| p.covers([x, y])).count();
+                assert_eq!(covered, usize::from(x < 4 && y < 4), "{x} {y}");
+            }
+        }
+        assert_eq!(a.distance_px([2, 2]), 0.0);
+        assert_eq!(a.distance_px([6, 2]), -2.0);
+    }
+
+    #[test]
+    fn weights_are_perspective_correct() {
+        // Half way between depths of 1 and 3 lies the point of weight 3/4 of the nearer one.
+        let t = piece([[0.0, 0.0], [8.0, 0.0], [0.0, 8.0]], [1.0, 3.0, 1.0], 8);
+        let over_w = t.weights_over_w(DVec2::new(4.0, 0.0));
+        let weights = over_w / over_w.element_sum();
+        assert!(
+            (weights - DVec3::new(0.75, 0.25, 0.0)).length() < 1e-12,
+            "{weights}"
+        );
+    }
+
+    #[test]
+    fn a_primitive_behind_the_eye_is_cut_at_the_near_plane() {
+        let vertices = [
+            [-1.0, -1.0, 0.2, 1.0],
+            [1.0, -1.0, 0.2, 1.0],
+            [0.0, 1.0, -0.2, 0.6],
+        ];
+        let found = pieces(vertices.map(DVec4::from), [64; 2], 0, 0, |_| true);
+        assert_eq!(found.len(), 2);
+        assert!(found.iter().all(|p| p.clipped && !p.dropped));
+    }
+}

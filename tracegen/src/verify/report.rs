@@ -1,0 +1,298 @@
+//! What `tracegen verify` prints.
+
+use super::agreement::{Agreement, SampleErrors, Side};
+use super::classes::Class;
+use super::colour::ColourErrors;
+use super::frame::Verified;
+use serde::Serialize;
+
+/// Names of the textures of a material, in the order of their slots.
+pub const SLOTS: [&str; 6] = [
+    "base-color",
+    "normal",
+    "metallic-roughness",
+    "specular",
+    "occlusion",
+    "emissive",
+];
+
+/// JSON of a verified frame.
+#[derive(Serialize)]
+pub struct Report {
+    schema: &'static str,
+    scene: String,
+    backend: String,
+    driver: String,
+    size_px: [u32; 2],
+    passes: usize,
+    tiles: Tiles,
+    coverage: Coverage,
+    uv_error_texels: UvError,
+    /// Against the same formula of the level of detail.
+    capture_precision: Samples,
+    /// Against the exact logarithm of each fragment's own derivatives.
+    specification: Samples,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    colour: Vec<Colour>,
+}
+
+#[derive(Serialize)]
+struct Tiles {
+    verified: usize,
+    of: usize,
+    seed: Option<u64>,
+}
+
+#[derive(Serialize)]
+struct Coverage {
+    both: u64,
+    only_reference: u64,
+    only_capture: u64,
+    iou: f64,
+    recorded_twice: u64,
+    differences: Vec<Difference>,
+}
+
+#[derive(Serialize)]
+struct Difference {
+    class: Class,
+    only_reference: u64,
+    only_capture: u64,
+}
+
+#[derive(Serialize)]
+struct UvError {
+    coordinates: u64,
+    mean: f64,
+    p99: f64,
+    max: f64,
+    not_finite: u64,
+    shadow_lookups_not_compared: u64,
+}
+
+#[derive(Serialize)]
+struct Samples {
+    samples: u64,
+    lod_error_mean: f64,
+    lod_error_max: f64,
+    levels_differ_share: f64,
+    footprints_differ_share: f64,
+    other_levels: u64,
+    other_texels: u64,
+}
+
+#[derive(Serialize)]
+struct Colour {
+    texture: &'static str,
+    fragments: u64,
+    unrecorded: u64,
+    within_1_255_share: f64,
+    within_1_255_as_light_share: f64,
+    beyond_by_decoding: u64,
+    beyond_by_coordinates: u64,
+    beyond_unexplained: u64,
+    mean: f64,
+    max: f64,
+}
+
+fn share(part: u64, whole: u64) -> f64 {
+    if whole == 0 {
+        0.0
+    } else {
+        part as f64 / whole as f64
+    }
+}
+
+impl Report {
+    /// The report of a verified frame of a scene; `seed` is that of a sample of tiles.
+    #[must_use]
+    pub fn new(
+        scene: &str,
+        meta: &formats::textrace::TraceMeta,
+        verified: &Verified,
+        seed: Option<u64>,
+    ) -> Self {
+        let Agreement {
+            both,
+            recorded_twice,
+            not_finite,
+            shadow_lookups,
+            ..
+        } = verified.agreement;
+        let agreement = &verified.agreement;
+        let [mean, p99, max] = agreement.uv_errors_texels.summary();
+        let difference = |class: Class| Difference {
+            class,
+            only_reference: agreement.only[Side::Reference as usize][class as usize],
+            only_capture: agreement.only[Side::Capture as usize][class as usize],
+        };
+        Self {
+            schema: "tracegen.verify/1",
+            scene: scene.to_owned(),
+            backend: meta.backend.clone(),
+            driver: meta.driver.clone(),
+            size_px: meta.hmd.eye_size_px,
+            passes: verified.passes,
+            tiles: Tiles {
+                verified: verified.tiles,
+                of: verified.all_tiles,
+                seed,
+            },
+            coverage: Coverage {
+                both,
+                only_reference: agreement.only(Side::Reference),
+                only_capture: agreement.only(Side::Capture),
+                iou: agreement.coverage_iou(),
+                recorded_twice,
+                differences: Class::ALL.map(difference).into(),
+            },
+            uv_error_texels: UvError {
+                coordinates: agreement.uv_errors_texels.0.len() as u64,
+                mean,
+                p99,
+                max,
+                not_finite,
+                shadow_lookups_not_compared: shadow_lookups,
+            },
+            capture_precision: Samples::new(&agreement.capture),
+            specification: Samples::new(&agreement.specification),
+            colour: (verified.colours.iter().zip(SLOTS))
+                .filter(|(errors, _)| errors.fragments > 0)
+                .map(|(errors, texture)| Colour::new(texture, errors))
+                .collect(),
+        }
+    }
+
+    /// Lines for a terminal.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let Coverage {
+            both,
+            only_reference,
+            only_capture,
+            iou,
+            recorded_twice,
+            ..
+        } = self.coverage;
+        let mut text = format!(
+            "{}: {} through {}\n{} of {} tiles of {} views of {}x{}\n\n",
+            self.scene,
+            self.backend,
+            self.driver,
+            self.tiles.verified,
+            self.tiles.of,
+            self.passes,
+            self.size_px[0],
+            self.size_px[1],
+        );
+        let mut line = |name: &str, value: String| text += &format!("{name:<44} {value}\n");
+        line("fragments in both", both.to_string());
+        line(
+            "fragments only in the reference",
+            only_reference.to_string(),
+        );
+        line("fragments only in the capture", only_capture.to_string());
+        line("IoU of fragments", format!("{:.5} %", 100.0 * iou));
+        for difference in &self.coverage.differences {
+            let Difference {
+                class,
+                only_reference,
+                only_capture,
+            } = *difference;
+            if only_reference + only_capture > 0 {
+                line(
+                    &format!("  {}", class.cause()),
+                    format!("{} + {}", only_reference, only_capture),
+                );
+            }
+        }
+        if recorded_twice > 0 {
+            line("lanes recorded twice", recorded_twice.to_string());
+        }
+        let UvError { mean, p99, max, .. } = self.uv_error_texels;
+        line(
+            "error of coordinates, texels: mean, 99 %, max",
+            format!("{mean:.5}, {p99:.5}, {max:.4}"),
+        );
+        for (name, samples) in [
+            ("same LOD formula", &self.capture_precision),
+            ("specification", &self.specification),
+        ] {
+            line(
+                &format!("{name}: LOD error, mean and max"),
+                format!(
+                    "{:.6}, {:.4}",
+                    samples.lod_error_mean, samples.lod_error_max
+                ),
+            );
+            line(
+                &format!("{name}: levels that differ"),
+                percent(samples.levels_differ_share),
+            );
+            line(
+                &format!("{name}: footprints that differ"),
+                percent(samples.footprints_differ_share),
+            );
+        }
+        for colour in &self.colour {
+            line(
+                &format!("{}: texels within 1/255", colour.texture),
+                format!(
+                    "{} of {} ({} as light; mean {:.5}, max {:.4}; beyond: {} by the decoder's rounding, {} by 1/64 texel, {} unexplained, {} without a record)",
+                    percent(colour.within_1_255_share),
+                    colour.fragments,
+                    percent(colour.within_1_255_as_light_share),
+                    colour.mean,
+                    colour.max,
+                    colour.beyond_by_decoding,
+                    colour.beyond_by_coordinates,
+                    colour.beyond_unexplained,
+                    colour.unrecorded
+                ),
+            );
+        }
+        text
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.4} %", 100.0 * share)
+}
+
+impl Samples {
+    fn new(errors: &SampleErrors) -> Self {
+        Self {
+            samples: errors.samples,
+            lod_error_mean: errors.lod_sum / errors.samples.max(1) as f64,
+            lod_error_max: errors.lod_max,
+            levels_differ_share: share(errors.levels_differ, errors.samples),
+            footprints_differ_share: share(
+                errors.other_levels + errors.other_texels,
+                errors.samples,
+            ),
+            other_levels: errors.other_levels,
+            other_texels: errors.other_texels,
+        }
+    }
+}
+
+impl Colour {
+    fn new(texture: &'static str, errors: &ColourErrors) -> Self {
+        let compared = errors.fragments - errors.unrecorded;
+        Self {
+            texture,
+            fragments: errors.fragments,
+            unrecorded: errors.unrecorded,
+            within_1_255_share: share(errors.within_as_encoded, errors.fragments),
+            within_1_255_as_light_share: share(errors.within_as_light, errors.fragments),
+            beyond_by_decoding: errors.by_decoding,
+            beyond_by_coordinates: errors.by_coordinates,
+            beyond_unexplained: compared
+                - errors.within_as_encoded
+                - errors.by_decoding
+                - errors.by_coordinates,
+            mean: errors.sum / compared.max(1) as f64,
+            max: errors.max,
+        }
+    }
+}
