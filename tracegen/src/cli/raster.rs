@@ -209,6 +209,12 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         shell::warn(note);
     }
     let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
+    if let Some(lacks) = backend.records_fragments_because() {
+        note(&format!(
+            "{} lacks {lacks}: fragments are recorded one by one and merged into quads",
+            backend.driver()
+        ));
+    }
     let passes = job.passes(&setup.frames);
     let tables = tables(
         &setup,
@@ -538,6 +544,14 @@ pub(super) fn prepare_environment(threads: Option<u16>) {
     unsafe {
         // Mesa's device selection asks a display server, in vain and aloud where there is none.
         std::env::set_var("NODEVICE_SELECT", "1");
+        // At narrow vectors the gathers of AVX2 corrupt memory (Mesa 22.3); a processor that has none of
+        // it needs nothing.
+        let set = |name: &str| std::env::var_os(name);
+        if set("LP_NATIVE_VECTOR_WIDTH").is_some_and(|bits| bits == "128")
+            && set("GALLIUM_OVERRIDE_CPU_CAPS").is_none()
+        {
+            std::env::set_var("GALLIUM_OVERRIDE_CPU_CAPS", "avx");
+        }
         if let Some(threads) = threads {
             std::env::set_var("LP_NUM_THREADS", threads.to_string());
         }

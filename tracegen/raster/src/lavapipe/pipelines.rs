@@ -58,7 +58,7 @@ impl Pipelines {
     /// # Errors
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
-        Self::compile(gpu, &shader::source(gpu.no_capture.is_none()), None)
+        Self::compile(gpu, &shader::source(gpu.granularity()), None)
     }
 
     /// Compiles the shader for pictures of two views at once.
