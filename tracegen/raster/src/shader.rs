@@ -33,6 +33,8 @@ pub(crate) enum Granularity {
     Quads,
     /// One by one, to be merged into quads: see [`record::Merged`].
     Fragments,
+    /// The same, with primitives numbered by vertices that they do not share.
+    NumberedFragments,
 }
 
 impl Granularity {
@@ -41,12 +43,16 @@ impl Granularity {
         const BY_BALLOT: &str = include_str!("shaders/by_ballot.wgsl");
         const BY_FRAGMENT: &str = include_str!("shaders/by_fragment.wgsl");
         const BY_INDEX: &str = include_str!("shaders/place_by_index.wgsl");
+        const BY_VERTEX: &str = include_str!("shaders/place_by_vertex.wgsl");
         const RECORDING: &str = include_str!("shaders/recording.wgsl");
         const CAPTURING: &str = include_str!("shaders/capturing.wgsl");
+        const PRODUCT: &str = include_str!("shaders/product.wgsl");
+        const BY_COLUMNS: &str = include_str!("shaders/product_by_columns.wgsl");
         match self {
-            Self::None => &[include_str!("shaders/plain.wgsl")],
-            Self::Quads => &[BY_BALLOT, RECORDING, CAPTURING],
-            Self::Fragments => &[BY_INDEX, BY_FRAGMENT, RECORDING, CAPTURING],
+            Self::None => &[PRODUCT, include_str!("shaders/plain.wgsl")],
+            Self::Quads => &[PRODUCT, BY_BALLOT, RECORDING, CAPTURING],
+            Self::Fragments => &[PRODUCT, BY_INDEX, BY_FRAGMENT, RECORDING, CAPTURING],
+            Self::NumberedFragments => &[BY_COLUMNS, BY_VERTEX, BY_FRAGMENT, RECORDING, CAPTURING],
         }
     }
 
