@@ -1,6 +1,7 @@
 #!/bin/sh
 # Installs what Cargo cannot, where it is missing and apt can be used; otherwise says what to
-# install. Always lavapipe (a Vulkan driver that needs no GPU); with `test` also a C++ compiler,
+# install. Always lavapipe (a Vulkan driver that needs no GPU); with `test` also OSMesa, where there is a
+# package of it (the tests that need it are skipped without), a C++ compiler,
 # which the reference implementation of FLIP in the tests needs, and Python for the independent
 # trace readers and Slurm for sweeps on a cluster, whose tests are skipped where they cannot be had.
 set -eu
@@ -24,6 +25,11 @@ fi
 wanted="$packages"
 if [ "${1:-}" = test ] && ! command -v python3 >/dev/null 2>&1; then
     packages="$packages python3"
+fi
+# Mesa 25.1 dropped it.
+if [ "${1:-}" = test ] && ! ldconfig -p 2>/dev/null | grep -q 'libOSMesa\.so\.8' &&
+    apt-cache show libosmesa6 >/dev/null 2>&1; then
+    packages="$packages libosmesa6"
 fi
 slurm=""
 if [ "${1:-}" = test ] && ! command -v slurmctld >/dev/null 2>&1; then

@@ -1,5 +1,6 @@
 //! The same input gives the same bytes, whatever the thread count and the run.
 
+use parallax_tests::traces::Parts;
 use parallax_tests::{program, root, run_ok};
 use std::fs;
 use std::path::Path;
@@ -37,6 +38,32 @@ fn a_capture_has_the_same_bytes_over_runs_and_driver_threads() {
             first == capture(&path, Some(threads)),
             "LP_NUM_THREADS={threads} differs"
         );
+    }
+}
+
+#[test]
+fn fragments_recorded_one_by_one_give_the_golden_traces() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    // Shadow cascades and alpha-masked draws.
+    for name in ["atrium-shadows", "jungle"] {
+        let recipe = root().join(format!("traces/{name}.recipe"));
+        let recipe = fs::read_to_string(recipe).expect("a golden trace has a recipe");
+        let path = folder.path().join(name).with_extension("textrace");
+        let mut command = program("tracegen");
+        command.args(recipe.split_whitespace()).arg("-o").arg(&path);
+        // Vectors of 128 bits hold one quad, and ballots are unsound.
+        let output = run_ok(command.env("LP_NATIVE_VECTOR_WIDTH", "128"));
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(told.contains("recorded one by one"), "{told}");
+        let chunks = |path: &Path| {
+            let bytes = fs::read(path).expect("a trace");
+            let mut chunks = Parts::of(&bytes).chunks;
+            // It names the driver.
+            chunks.retain(|(tag, _)| tag != b"META");
+            chunks
+        };
+        let golden = root().join(format!("traces/{name}.textrace"));
+        assert!(chunks(&path) == chunks(&golden), "{name} differs");
     }
 }
 

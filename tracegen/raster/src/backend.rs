@@ -143,6 +143,10 @@ pub trait CaptureBackend {
     /// Records that one region may produce.
     fn record_capacity(&self) -> u64;
 
+    /// What the driver lacks to record quads as wholes, where it does: fragments are then recorded one
+    /// by one and merged, for the same records.
+    fn records_fragments_because(&self) -> Option<&str>;
+
     /// What was done so far.
     fn work(&self) -> Work;
 

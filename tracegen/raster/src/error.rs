@@ -11,6 +11,14 @@ pub enum RasterError {
         "no lavapipe (Mesa's CPU Vulkan driver) found{0}; install it with: apt-get install mesa-vulkan-drivers libvulkan1"
     )]
     NoDriver(String),
+    /// No OSMesa: the file that was looked for, and what the loader says.
+    #[error(
+        "{0} (OSMesa, Mesa without a window) cannot be loaded: {1}; install it with: apt-get install libosmesa6 (Mesa 25.1 and later have none)"
+    )]
+    NoLibrary(&'static str, String),
+    /// Neither of the drivers that capture.
+    #[error("{0}; nor OSMesa: {1}")]
+    NoBackend(Box<RasterError>, Box<RasterError>),
     /// No adapter of that name.
     #[error("no adapter '{wanted}': expected a part of one of these names: {known}")]
     NoAdapter {

@@ -40,6 +40,23 @@ pub(crate) enum Role {
 }
 
 impl Role {
+    /// What the shader does with fragments, unless depth alone is written.
+    pub fn fragment_entry_point(self) -> Option<&'static str> {
+        match self {
+            Self::Opaque | Self::Blended => Some("fragment_early"),
+            Self::Masked => Some("fragment_masked"),
+            Self::MaskedRecord => Some("fragment_masked_record"),
+            Self::Record => Some("fragment_record"),
+            Self::Shadow | Self::Depth => None,
+            Self::ShadowMasked | Self::DepthMasked => Some("fragment_shadow"),
+            Self::Mark => Some("fragment_mark"),
+            Self::MarkMasked => Some("fragment_mark_masked"),
+            Self::Count | Self::CountBlended => Some("fragment_count"),
+            Self::Texel => Some("fragment_texel"),
+            Self::TexelMasked => Some("fragment_texel_masked"),
+        }
+    }
+
     /// It renders into a shadow map.
     pub fn casts(self) -> bool {
         matches!(self, Self::Shadow | Self::ShadowMasked)
@@ -171,6 +188,20 @@ pub(crate) struct PipelineKey {
 }
 
 impl PipelineKey {
+    /// Values of the shader's overrides.
+    pub fn constants(&self) -> [(&'static str, f64); 7] {
+        let flag = |set: bool| f64::from(u8::from(set));
+        [
+            ("CAPTURE", flag(self.capture)),
+            ("TEXTURES", f64::from(self.textures)),
+            ("LEADERS", f64::from(self.leaders)),
+            ("CASCADES", f64::from(self.cascades)),
+            ("COLORED", flag(self.colored)),
+            ("BLENDED", flag(self.role == Role::Blended)),
+            ("MASKED", flag(self.role == Role::Masked)),
+        ]
+    }
+
     /// The pipeline that gives `call` its `role` in a frame with `cascades`.
     pub fn new(
         call: &DrawCall,

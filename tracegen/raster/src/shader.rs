@@ -24,10 +24,49 @@ pub(crate) const TEXTURES_BINDING: u32 = 1;
 /// First of the sampler bindings in group 1, in the order of the textures.
 pub(crate) const SAMPLERS_BINDING: u32 = TEXTURES_BINDING + MATERIAL_TEXTURES as u32;
 
-/// The whole WGSL module, with what records where the device can capture.
-pub(crate) fn source(captures: bool) -> String {
+/// How fragments are recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Granularity {
+    /// Not at all, on devices that cannot capture.
+    None,
+    /// Quad by quad.
+    Quads,
+    /// One by one, to be merged into quads: see [`record::Merged`].
+    Fragments,
+    /// The same, with primitives numbered by vertices that they do not share.
+    NumberedFragments,
+}
+
+impl Granularity {
+    /// The part of the text that records.
+    fn parts(self) -> &'static [&'static str] {
+        const BY_BALLOT: &str = include_str!("shaders/by_ballot.wgsl");
+        const BY_FRAGMENT: &str = include_str!("shaders/by_fragment.wgsl");
+        const BY_INDEX: &str = include_str!("shaders/place_by_index.wgsl");
+        const BY_VERTEX: &str = include_str!("shaders/place_by_vertex.wgsl");
+        const RECORDING: &str = include_str!("shaders/recording.wgsl");
+        const CAPTURING: &str = include_str!("shaders/capturing.wgsl");
+        const TEXELS: &str = include_str!("shaders/texels.wgsl");
+        const PRODUCT: &str = include_str!("shaders/product.wgsl");
+        const BY_COLUMNS: &str = include_str!("shaders/product_by_columns.wgsl");
+        match self {
+            Self::None => &[PRODUCT, include_str!("shaders/plain.wgsl")],
+            Self::Quads => &[PRODUCT, BY_BALLOT, RECORDING, CAPTURING, TEXELS],
+            Self::Fragments => &[PRODUCT, BY_INDEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS],
+            Self::NumberedFragments => &[BY_COLUMNS, BY_VERTEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS],
+        }
+    }
+
+    /// The driver numbers the primitives.
+    fn by_index(self) -> bool {
+        matches!(self, Self::Quads | Self::Fragments)
+    }
+}
+
+/// The whole WGSL module, with what records.
+pub(crate) fn source(granularity: Granularity) -> String {
     let mut text = String::new();
-    if captures {
+    if granularity.by_index() {
         text += "enable primitive_index;\n\n";
     }
     let mut constant = |name: &str, value: u64| {
@@ -51,23 +90,12 @@ pub(crate) fn source(captures: bool) -> String {
     for (number, [x, y]) in SHADOW_TAPS.iter().enumerate() {
         text += &format!("const SHADOW_TAP_{number}: vec2<i32> = vec2<i32>({x}, {y});\n");
     }
-    let recording = if captures {
-        concat!(
-            include_str!("shaders/recording.wgsl"),
-            "\n",
-            include_str!("shaders/capturing.wgsl"),
-            "\n",
-            include_str!("shaders/texels.wgsl")
-        )
-    } else {
-        include_str!("shaders/plain.wgsl")
-    };
-    for part in [
-        include_str!("shaders/interface.wgsl"),
-        recording,
+    let before = [include_str!("shaders/interface.wgsl")];
+    let after = [
         include_str!("shaders/shading.wgsl"),
         include_str!("shaders/passes.wgsl"),
-    ] {
+    ];
+    for part in before.iter().chain(granularity.parts()).chain(&after) {
         text.push('\n');
         text += part;
     }
@@ -77,7 +105,7 @@ pub(crate) fn source(captures: bool) -> String {
 /// The module for pictures of two views at once: the view is one of two, by the number that each entry
 /// point is told.
 pub(crate) fn of_two_views() -> String {
-    let one = source(false);
+    let one = source(Granularity::None);
     let declaration = "var<uniform> view: View;";
     let two = "var<uniform> views: array<View, 2>;\nvar<private> view_number: u32;";
     assert!(one.contains(declaration), "the shader declares its view");
@@ -114,7 +142,7 @@ mod tests {
 
     #[test]
     fn every_entry_point_for_two_views_is_told_its_view() {
-        let (one, two) = (source(false), of_two_views());
+        let (one, two) = (source(Granularity::None), of_two_views());
         let entries = one.matches("@vertex").count() + one.matches("@fragment").count();
         assert!(entries >= 6, "{entries}");
         assert_eq!(two.matches("@builtin(view_index)").count(), entries);

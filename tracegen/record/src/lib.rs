@@ -12,6 +12,7 @@ mod bins;
 mod capturer;
 mod error;
 mod masked;
+mod merge;
 mod quantise;
 mod raw;
 mod recorder;
@@ -20,6 +21,7 @@ mod tiles;
 
 pub use capturer::{Captured, Capturer, Region, Sink};
 pub use error::RecordError;
+pub use merge::Merged;
 pub use raw::{DEPTH_BYTES, RECORD_BYTES, RawDepth, RawRecord, RawRecords};
 pub use recorder::{Recorded, Recorder};
 pub use tiles::CaptureCounts;

@@ -7,16 +7,16 @@ use super::technique_args::TechniqueArgs;
 use crate::picture;
 use crate::study::auto::Budget;
 use crate::study::{memory, processor};
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
 use formats::view::{Eye, FrameViews};
 use raster::backend::{CaptureBackend, Fragments, Work};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
+use raster::drivers::Driver;
 use raster::error::RasterError;
 use raster::frame::Frame;
-use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
 use raster::skips::Skipped;
 use record::CaptureCounts;
@@ -56,6 +56,9 @@ pub struct RasterArgs {
     /// Views of each frame.
     #[arg(long, value_enum, default_value_t = Views::Stereo, help_heading = "Camera")]
     views: Views,
+    /// Driver that captures; osmesa captures plain frames alone, without techniques.
+    #[arg(long, value_enum, default_value_t = Backend::Lavapipe, value_name = "NAME")]
+    backend: Backend,
     /// Skip the render without capture that times and pictures are compared with.
     #[arg(long)]
     no_plain: bool,
@@ -99,6 +102,27 @@ impl RasterArgs {
             .map(u64::from);
         let views = self.views.eyes().len() as u64;
         Ok(width * height * views * u64::from(self.frames))
+    }
+}
+
+/// Drivers that capture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Backend {
+    /// Mesa's Vulkan driver on the processor.
+    Lavapipe,
+    /// OpenGL without a window, through llvmpipe or (GALLIUM_DRIVER=softpipe) softpipe.
+    Osmesa,
+    /// lavapipe where it is found, else OSMesa.
+    Auto,
+}
+
+impl Backend {
+    fn driver(self) -> Driver {
+        match self {
+            Self::Lavapipe => Driver::Lavapipe,
+            Self::Osmesa => Driver::Osmesa,
+            Self::Auto => Driver::Auto,
+        }
     }
 }
 
@@ -149,6 +173,17 @@ pub(super) fn warn_of_multiview(defect: &str) {
 }
 
 impl RasterArgs {
+    /// Refuses what the OSMesa backend does not do.
+    fn check_plain_frames(&self) -> anyhow::Result<()> {
+        let auto = self.auto.map(|_| "--auto");
+        if let Some(flag) = auto.or_else(|| self.techniques.beyond_plain_frames()) {
+            bail!(
+                "{flag}: expected with --backend lavapipe, found with osmesa, which captures plain frames alone"
+            );
+        }
+        Ok(())
+    }
+
     /// Refuses what leaves fragments out by depth, or is measured with the depth test.
     fn check_without_depth_test(&self) -> anyhow::Result<()> {
         ensure!(
@@ -174,6 +209,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         .check_outputs(&args.output, args.image.as_deref())?;
     if args.hsr == Hsr::None {
         args.check_without_depth_test()?;
+    }
+    if args.backend == Backend::Osmesa {
+        args.check_plain_frames()?;
     }
     if let Some(budget) = args.auto {
         return super::raster_auto::run(args, budget);
@@ -208,14 +246,25 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     for note in &uploads.notes {
         shell::warn(note);
     }
-    let mut backend = Lavapipe::new(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
+    let driver = args.backend.driver();
+    let mut backend = driver.open(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
+    let backend = backend.as_mut();
+    if backend.name() == "osmesa" {
+        args.check_plain_frames()?;
+    }
+    if let Some(lacks) = backend.records_fragments_because() {
+        note(&format!(
+            "{} lacks {lacks}: fragments are recorded one by one and merged into quads",
+            backend.driver()
+        ));
+    }
     let passes = job.passes(&setup.frames);
     let tables = tables(
         &setup,
         &args.scene.scene,
         &draws,
         &uploads,
-        &backend,
+        backend,
         passes,
         job.fragments,
     );
@@ -229,10 +278,10 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     );
     drop(uploads);
     let mut summary = Summary::default();
-    let first = summary.look(&job, &mut backend, &setup.frames[0])?;
-    summary.shadows += job.light(&mut backend, &first)?;
+    let first = summary.look(&job, backend, &setup.frames[0])?;
+    summary.shadows += job.light(backend, &first)?;
     if !args.no_plain {
-        job.warm_up(&mut backend, &first)?;
+        job.warm_up(backend, &first)?;
     }
     if planner.settings().multiview
         && let Some(defect) = backend.multiview_defect()?
@@ -264,8 +313,8 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let frame = match first.take() {
             Some(first) => first,
             None => {
-                let frame = summary.look(&job, &mut backend, views)?;
-                summary.shadows += job.light(&mut backend, &frame)?;
+                let frame = summary.look(&job, backend, views)?;
+                summary.shadows += job.light(backend, &frame)?;
                 frame
             }
         };
@@ -273,14 +322,14 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
             None
         } else {
             let worked = processor::time();
-            let (pictures, time) = job.plain_frame(&mut backend, &frame)?;
+            let (pictures, time) = job.plain_frame(backend, &frame)?;
             summary.plain += time;
             summary.plain_work += worked_since(worked);
             Some(pictures)
         };
         let (start, worked) = (Instant::now(), processor::time());
         let (pictures, counts, sorting) =
-            job.capture_frame(&mut backend, &frame, first_pass, &mut recorder, &mut writer)?;
+            job.capture_frame(backend, &frame, first_pass, &mut recorder, &mut writer)?;
         first_pass += frame.plan.layers.len();
         summary.sorting += sorting;
         summary.captured += start.elapsed();
@@ -562,6 +611,19 @@ pub(super) fn prepare_environment(threads: Option<u16>) {
     unsafe {
         // Mesa's device selection asks a display server, in vain and aloud where there is none.
         std::env::set_var("NODEVICE_SELECT", "1");
+        // At narrow vectors the gathers of AVX2 corrupt memory (Mesa 22.3); a processor that has none of
+        // it needs nothing.
+        let set = |name: &str| std::env::var_os(name);
+        if set("LP_NATIVE_VECTOR_WIDTH").is_some_and(|bits| bits == "128")
+            && set("GALLIUM_OVERRIDE_CPU_CAPS").is_none()
+        {
+            std::env::set_var("GALLIUM_OVERRIDE_CPU_CAPS", "avx");
+        }
+        // softpipe has all that the capture needs of OpenGL 4.5, as extensions of 3.3.
+        if set("GALLIUM_DRIVER").is_some_and(|driver| driver == "softpipe") {
+            std::env::set_var("MESA_GL_VERSION_OVERRIDE", "4.5");
+            std::env::set_var("MESA_GLSL_VERSION_OVERRIDE", "450");
+        }
         if let Some(threads) = threads {
             std::env::set_var("LP_NUM_THREADS", threads.to_string());
         }

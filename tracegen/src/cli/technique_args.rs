@@ -130,6 +130,18 @@ impl TechniqueArgs {
         self.far_field.is_some()
     }
 
+    /// The first flag that needs more than each eye's own picture, drawn once from its list of draws.
+    pub fn beyond_plain_frames(&self) -> Option<&'static str> {
+        let flags = [
+            (self.occlusion, "--occlusion"),
+            (self.hidden_area_mask, "--hidden-area-mask"),
+            (self.multiview, "--multiview"),
+            (self.far_field.is_some(), "--far-field"),
+            (self.foveate.is_some(), "--foveate"),
+        ];
+        flags.iter().find(|flag| flag.0).map(|flag| flag.1)
+    }
+
     /// What is left out or done more coarsely.
     ///
     /// # Errors

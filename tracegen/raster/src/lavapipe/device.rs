@@ -1,6 +1,7 @@
 //! Finds a Vulkan device and opens it: Mesa's CPU driver, which captures, or one by name.
 
 use crate::error::RasterError;
+use crate::shader::Granularity;
 
 /// An opened lavapipe.
 pub struct Gpu {
@@ -18,16 +19,17 @@ pub struct Gpu {
     pub has_multiview: bool,
     /// What it lacks for captures; without it only pictures can be rendered.
     pub no_capture: Option<String>,
+    /// Why fragments are recorded one by one and not quad by quad, where they are.
+    pub by_fragment: Option<String>,
 }
 
 /// Lanes of a subgroup at llvmpipe's native 256-bit vectors: two quads. At 128 bits its ballot
-/// corrupts memory (Mesa 22.3), so any other size is refused.
+/// corrupts memory (Mesa 22.3), so with any other size fragments are recorded one by one.
 const SUBGROUP_LANES: u32 = 8;
 
-/// What the capture asks of a device, beyond [`SUBGROUP_LANES`].
+/// What the capture asks of a device.
 const CAPTURE_FEATURES: wgpu::Features = wgpu::Features::PRIMITIVE_INDEX
     .union(wgpu::Features::SHADER_EARLY_DEPTH_TEST)
-    .union(wgpu::Features::SUBGROUP)
     .union(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
 /// What every picture asks of it.
 const PICTURE_FEATURES: wgpu::Features = wgpu::Features::TEXTURE_COMPRESSION_BC;
@@ -52,29 +54,23 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
             wanted: wanted.to_owned(),
             known: names.join(", "),
         })?,
-        None => (infos.iter())
-            .position(|i| i.device_type == wgpu::DeviceType::Cpu && i.name.contains("llvmpipe"))
-            .ok_or_else(|| {
-                RasterError::NoDriver(if names.is_empty() {
-                    String::new()
-                } else {
-                    format!(" (only: {})", names.join(", "))
-                })
-            })?,
+        None => (infos.iter()).position(is_llvmpipe).ok_or_else(|| {
+            RasterError::NoDriver(if names.is_empty() {
+                String::new()
+            } else {
+                format!(" (only: {})", names.join(", "))
+            })
+        })?,
     };
     let (adapter, info) = (&adapters[chosen], &infos[chosen]);
     let driver = format!("{} {} ({})", info.driver, info.driver_info, info.name);
     let missing = (PICTURE_FEATURES | CAPTURE_FEATURES) - adapter.features();
-    let lanes = (info.subgroup_min_size, info.subgroup_max_size);
-    let no_capture = if !missing.is_empty() {
-        Some(format!("{missing:?}"))
-    } else if lanes != (SUBGROUP_LANES, SUBGROUP_LANES) {
-        Some(format!(
-            "subgroups of {SUBGROUP_LANES} lanes (it has {} to {}): the capture needs 256-bit vectors, that is llvmpipe on a CPU with AVX and LP_NATIVE_VECTOR_WIDTH unset",
-            lanes.0, lanes.1
-        ))
+    let by_fragment = no_ballots(adapter, info);
+    // Nothing but llvmpipe is known to find derivatives lane by lane, as fragments alone need them.
+    let no_capture = if missing.is_empty() {
+        by_fragment.clone().filter(|_| !is_llvmpipe(info))
     } else {
-        None
+        Some(format!("{missing:?}"))
     };
     let no_picture = missing.intersects(PICTURE_FEATURES);
     if let Some(what) = no_capture
@@ -86,10 +82,11 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
             what: what.clone(),
         });
     }
-    let multiview = adapter.features() & wgpu::Features::MULTIVIEW;
+    let wanted_too = wgpu::Features::MULTIVIEW | wgpu::Features::SUBGROUP;
+    let extra = adapter.features() & wanted_too;
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         label: None,
-        required_features: ((PICTURE_FEATURES | CAPTURE_FEATURES) - missing) | multiview,
+        required_features: ((PICTURE_FEATURES | CAPTURE_FEATURES) - missing) | extra,
         required_limits: adapter.limits(),
         experimental_features: wgpu::ExperimentalFeatures::disabled(),
         memory_hints: wgpu::MemoryHints::MemoryUsage,
@@ -105,9 +102,29 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
         adapter: info.name.clone(),
         driver,
         is_software: info.device_type == wgpu::DeviceType::Cpu,
-        has_multiview: !multiview.is_empty(),
+        has_multiview: extra.contains(wgpu::Features::MULTIVIEW),
         no_capture,
+        by_fragment,
     })
+}
+
+fn is_llvmpipe(info: &wgpu::AdapterInfo) -> bool {
+    info.device_type == wgpu::DeviceType::Cpu && info.name.contains("llvmpipe")
+}
+
+/// Why the lanes of a quad cannot tell each other what they cover, where they cannot.
+fn no_ballots(adapter: &wgpu::Adapter, info: &wgpu::AdapterInfo) -> Option<String> {
+    let lanes = [info.subgroup_min_size, info.subgroup_max_size];
+    if !adapter.features().contains(wgpu::Features::SUBGROUP) {
+        Some("subgroup operations".to_owned())
+    } else if lanes != [SUBGROUP_LANES; 2] {
+        Some(format!(
+            "subgroups of {SUBGROUP_LANES} lanes (it has {} to {})",
+            lanes[0], lanes[1]
+        ))
+    } else {
+        None
+    }
 }
 
 /// Position of the first name that contains `wanted`, whatever the case.
@@ -117,6 +134,15 @@ fn named(names: &[&str], wanted: &str) -> Option<usize> {
 }
 
 impl Gpu {
+    /// How fragments are recorded.
+    pub(crate) fn granularity(&self) -> Granularity {
+        match (&self.no_capture, &self.by_fragment) {
+            (Some(_), _) => Granularity::None,
+            (None, None) => Granularity::Quads,
+            (None, Some(_)) => Granularity::Fragments,
+        }
+    }
+
     /// Runs `work` and turns what the driver or the validation objects to into an error.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
 use super::frame::Frame;
 use super::roles::{MaterialState, PipelineKey, Purpose, roles};
-use super::shader::VIEW_BINDINGS;
+use super::shader::{Granularity, VIEW_BINDINGS};
 use super::uniforms::ViewData;
 use compose::Composer;
 use device::Gpu;
@@ -29,7 +29,7 @@ use formats::view::Lens;
 use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
 use readback::Readback;
-use record::{Captured, DEPTH_BYTES, RECORD_BYTES, RawRecords, Region};
+use record::{Captured, DEPTH_BYTES, Merged, RECORD_BYTES, RawRecords, Region};
 use records::RecordBuffers;
 use scene::Scene;
 use starts::{Drawn, Starts};
@@ -522,18 +522,28 @@ impl CaptureBackend for Lavapipe {
             } else {
                 0
             };
+            let mut hand_over = |records: RawRecords<'_>| {
+                if gpu.granularity() == Granularity::Quads {
+                    return Ok(sink(records)?);
+                }
+                Ok(sink(Merged::new(records).records())?)
+            };
             gpu.read(&buffers.records, 0..needed * RECORD_BYTES, |quads| {
                 let quads = records_of(quads)?;
                 if depths == 0 {
-                    return Ok(sink(RawRecords { quads, depths: &[] })?);
+                    return hand_over(RawRecords { quads, depths: &[] });
                 }
                 gpu.read(&buffers.depths, 0..depths, |depths| {
                     let depths = records_of(depths)?;
-                    Ok(sink(RawRecords { quads, depths })?)
+                    hand_over(RawRecords { quads, depths })
                 })
             })?;
         }
         Ok(Captured::Complete)
+    }
+
+    fn records_fragments_because(&self) -> Option<&str> {
+        self.gpu.by_fragment.as_deref()
     }
 
     fn multiview_defect(&mut self) -> Result<Option<String>, RasterError> {

@@ -63,7 +63,7 @@ impl Pipelines {
     /// # Errors
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
-        Self::compile(gpu, &shader::source(gpu.no_capture.is_none()), None)
+        Self::compile(gpu, &shader::source(gpu.granularity()), None)
     }
 
     /// Compiles the shader for pictures of two views at once.
@@ -133,15 +133,7 @@ impl Pipelines {
     }
 
     fn make(&self, gpu: &Gpu, key: &PipelineKey) -> wgpu::RenderPipeline {
-        let constants = [
-            ("CAPTURE", f64::from(u8::from(key.capture))),
-            ("TEXTURES", f64::from(key.textures)),
-            ("LEADERS", f64::from(key.leaders)),
-            ("CASCADES", f64::from(key.cascades)),
-            ("COLORED", f64::from(u8::from(key.colored))),
-            ("BLENDED", f64::from(u8::from(key.role == Role::Blended))),
-            ("MASKED", f64::from(u8::from(key.role == Role::Masked))),
-        ];
+        let constants = key.constants();
         let compilation_options = wgpu::PipelineCompilationOptions {
             constants: &constants,
             ..Default::default()
@@ -169,19 +161,7 @@ impl Pipelines {
             }));
         }
         let (shadow, colorless) = (key.role.casts(), key.role.colorless());
-        let entry_point = match key.role {
-            Role::Opaque | Role::Blended => Some("fragment_early"),
-            Role::Masked => Some("fragment_masked"),
-            Role::MaskedRecord => Some("fragment_masked_record"),
-            Role::Record => Some("fragment_record"),
-            Role::Shadow | Role::Depth => None,
-            Role::ShadowMasked | Role::DepthMasked => Some("fragment_shadow"),
-            Role::Mark => Some("fragment_mark"),
-            Role::MarkMasked => Some("fragment_mark_masked"),
-            Role::Count | Role::CountBlended => Some("fragment_count"),
-            Role::Texel => Some("fragment_texel"),
-            Role::TexelMasked => Some("fragment_texel_masked"),
-        };
+        let entry_point = key.role.fragment_entry_point();
         let (format, blend) = match key.role {
             Role::Blended => (COLOR_FORMAT, Some(wgpu::BlendState::ALPHA_BLENDING)),
             Role::Count | Role::CountBlended => (wgpu::TextureFormat::R16Float, Some(ADDITIVE)),

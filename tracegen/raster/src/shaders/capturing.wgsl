@@ -1,11 +1,12 @@
 // Fragment entry points that record what they sample.
 
 // Everything that a fragment of an opaque or blended draw does.
-fn capture_and_shade(in: Fragment, front: bool, primitive: u32, invocation: u32) -> vec4<f32> {
+fn capture_and_shade(in: Fragment, place: Place) -> vec4<f32> {
+    let front = place.front;
     let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
     let found = find_cascade(in.world, geometric);
     if CAPTURE {
-        let lane = lane_of(in, primitive, invocation);
+        let lane = lane_of(in, place);
         _ = record_material(lane, in);
         if CASCADES > 0u { record_shadow(lane, found, in.world, geometric); }
     }
@@ -23,40 +24,25 @@ fn record_lit(lane: Lane, in: Fragment, front: bool) -> u32 {
 }
 
 @fragment @early_depth_test(force)
-fn fragment_early(
-    in: Fragment,
-    @builtin(front_facing) front: bool,
-    @builtin(primitive_index) primitive: u32,
-    @builtin(subgroup_invocation_id) invocation: u32,
-) -> @location(0) vec4<f32> {
-    return capture_and_shade(in, front, primitive, invocation);
+fn fragment_early(in: Fragment, place: Place) -> @location(0) vec4<f32> {
+    return capture_and_shade(in, place);
 }
 
 // Records of all of a draw that the pass's depth leaves, in a draw of its own.
 @fragment @early_depth_test(force)
-fn fragment_record(
-    in: Fragment,
-    @builtin(front_facing) front: bool,
-    @builtin(primitive_index) primitive: u32,
-    @builtin(subgroup_invocation_id) invocation: u32,
-) -> @location(0) vec4<f32> {
-    let lane = lane_of(in, primitive, invocation);
-    _ = record_lit(lane, in, front);
+fn fragment_record(in: Fragment, place: Place) -> @location(0) vec4<f32> {
+    let lane = lane_of(in, place);
+    _ = record_lit(lane, in, place.front);
     return vec4(0.0);
 }
 
 // Records of an alpha-masked draw. Forced early depth with a discard would write the depth of
 // discarded fragments, so a draw of its own records them and writes neither colour nor depth.
 @fragment @early_depth_test(force)
-fn fragment_masked_record(
-    in: Fragment,
-    @builtin(front_facing) front: bool,
-    @builtin(primitive_index) primitive: u32,
-    @builtin(subgroup_invocation_id) invocation: u32,
-) -> @location(0) vec4<f32> {
-    var lane = lane_of(in, primitive, invocation);
-    lane.passing = quad_mask(lane, base_color(in).a >= material.specular.w);
-    let index = record_lit(lane, in, front);
+fn fragment_masked_record(in: Fragment, place: Place) -> @location(0) vec4<f32> {
+    var lane = lane_of(in, place);
+    lane.passing |= quad_mask(lane, base_color(in).a >= material.specular.w);
+    let index = record_lit(lane, in, place.front);
     record_depth(lane, index, in.position.z);
     return vec4(0.0);
 }

@@ -111,10 +111,10 @@ struct Fragment {
 
 fn transform(in: Vertex, color: vec4<f32>) -> Fragment {
     let instance = instances[in.draw];
-    let world = instance.world_from_object * vec4(in.position, 1.0);
+    let world = product(instance.world_from_object, vec4(in.position, 1.0));
     let n = instance.normal_from_object;
     var out: Fragment;
-    out.position = view.clip_from_world * world;
+    out.position = product(view.clip_from_world, world);
     out.world = world.xyz;
     out.normal = mat3x3(n[0].xyz, n[1].xyz, n[2].xyz) * in.normal;
     let w = instance.world_from_object;

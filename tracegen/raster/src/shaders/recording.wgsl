@@ -10,11 +10,12 @@ struct Lane {
     shift: u32,
     primitive: u32,
     draw: u32,
-    // Lanes of the quad whose alpha passes; told of alpha-masked draws alone.
+    // Lanes of the quad whose alpha passes, told of alpha-masked draws alone; above them what tells the
+    // quads of a clipped primitive apart where fragments are recorded alone.
     passing: u32,
 }
 
-fn lane_of(in: Fragment, primitive: u32, invocation: u32) -> Lane {
+fn lane_at(in: Fragment, primitive: u32, invocation: u32) -> Lane {
     let pixel = vec2<u32>(in.position.xy);
     var lane: Lane;
     lane.quad = (pixel.x >> 1u) | ((pixel.y >> 1u) << 12u);
@@ -23,11 +24,6 @@ fn lane_of(in: Fragment, primitive: u32, invocation: u32) -> Lane {
     lane.primitive = in.ids.y + primitive;
     lane.draw = in.ids.x;
     return lane;
-}
-
-// Lanes of the quad for which `takes` holds; helper lanes never vote.
-fn quad_mask(lane: Lane, takes: bool) -> u32 {
-    return (subgroupBallot(takes).x >> lane.shift) & 15u;
 }
 
 // Appends a record and tells its index. Software rasterisers store lane by lane: four words at once
@@ -101,11 +97,8 @@ fn record_depth(lane: Lane, index: u32, depth: f32) {
 
 fn record_shadow(lane: Lane, found: ShadowLookup, world: vec3<f32>, normal: vec3<f32>) {
     let first = countOneBits(LEADERS);
-    // Almost every subgroup lies in one cascade: visit those between its nearest and farthest.
-    // The bounds are the same for all its lanes, so that control flow stays uniform.
-    let nearest = subgroupMin(select(found.cascade, 99, found.cascade < 0));
-    let farthest = subgroupMax(found.cascade);
-    for (var k = nearest; k <= farthest; k++) {
+    let cascades = cascades_near(found.cascade);
+    for (var k = cascades.x; k <= cascades.y; k++) {
         let p = shadow_coordinates(u32(k), world, normal);
         _ = record_uv(lane, first + u32(k), found.cascade == k, p.xy);
     }

@@ -41,7 +41,7 @@ fn shadow_coordinates(cascade: u32, world: vec3<f32>, normal: vec3<f32>) -> vec3
     // Pushing the receiver off its surface by a little more than a texel hides the stairs that
     // the map's resolution leaves on slanted surfaces.
     let offset = normal * (1.6 * view.shadow_texel_m[cascade]);
-    return (view.cascades[cascade] * vec4(world + offset, 1.0)).xyz;
+    return product(view.cascades[cascade], vec4(world + offset, 1.0)).xyz;
 }
 
 // A margin of two texels keeps every tap inside the map.

@@ -35,13 +35,13 @@ fn texel(in: Fragment, primitive: u32) -> Texel {
 }
 
 @fragment
-fn fragment_texel(in: Fragment, @builtin(primitive_index) primitive: u32) -> Texel {
-    return texel(in, primitive);
+fn fragment_texel(in: Fragment, place: Place) -> Texel {
+    return texel(in, primitive_of(place));
 }
 
 @fragment
-fn fragment_texel_masked(in: Fragment, @builtin(primitive_index) primitive: u32) -> Texel {
-    let out = texel(in, primitive);
+fn fragment_texel_masked(in: Fragment, place: Place) -> Texel {
+    let out = texel(in, primitive_of(place));
     if base_color(in).a < material.specular.w { discard; }
     return out;
 }

@@ -1,0 +1,383 @@
+//! Capture through OSMesa, Mesa's OpenGL without a window: llvmpipe again, or softpipe, a rasteriser that
+//! shares little with it.
+//!
+//! Plain frames alone: no layers but the eyes' own pictures. Fragments are recorded one by one, since the
+//! language has no ballots here, and primitives are numbered by their vertices, since softpipe loses draws
+//! that ask for the number.
+
+mod gl;
+mod glsl;
+mod programs;
+mod targets;
+mod upload;
+
+use crate::backend::{CaptureBackend, Fragments, Marks, Recording, View, Work};
+use crate::batches::{Batch, batches};
+use crate::draws::{DrawList, DrawMode};
+use crate::error::RasterError;
+use crate::frame::Frame;
+use crate::roles::{MaterialState, PipelineKey, Purpose, roles};
+use crate::shader::VIEW_BINDINGS;
+use crate::uniforms::ViewData;
+use formats::view::Lens;
+use gl::{Buffer, Gl, Vertices};
+use programs::{Pipeline, Programs};
+use record::{
+    Captured, DEPTH_BYTES, Merged, RECORD_BYTES, RawDepth, RawRecord, RawRecords, Region,
+};
+use scene::Scene;
+use std::time::Instant;
+use targets::{ShadowMaps, Target};
+use techniques::Start;
+use techniques::plan::Picture;
+use textures::TextureSet;
+use upload::SceneObjects;
+
+/// The scene uploaded to OSMesa.
+pub struct Osmesa {
+    gl: Gl,
+    driver: String,
+    programs: Programs,
+    scene: SceneObjects,
+    /// Without attributes, for what needs none.
+    nothing: Vertices,
+    buffers: RecordBuffers,
+    /// What each layer is rendered into, by its position in the frame's plan.
+    layers: Vec<Option<Target>>,
+    shadow_maps: ShadowMaps,
+    /// How each material is drawn.
+    materials: Vec<MaterialState>,
+    work: Work,
+}
+
+/// Buffers that every layer's render shares.
+struct RecordBuffers {
+    /// The layer's `View`.
+    view: Buffer,
+    /// Records appended, those beyond the capacity counted too.
+    counter: Buffer,
+    records: Buffer,
+    /// As long as `records` where draws are masked.
+    depths: Buffer,
+    capacity: u32,
+}
+
+/// Draws of a pass: what they are drawn with, their material, their mesh.
+type Plan = Vec<(Batch, Pipeline)>;
+
+impl Osmesa {
+    /// Loads the library and uploads the scene. Regions may produce `record_budget_bytes` of raw records
+    /// before they are split, capped by the driver's limit of a storage block.
+    ///
+    /// # Errors
+    /// No library, driver errors, sizes beyond the driver's limits.
+    pub fn new(
+        scene: &Scene,
+        draws: &DrawList,
+        textures: &TextureSet,
+        record_budget_bytes: u64,
+    ) -> Result<Self, RasterError> {
+        let gl = Gl::open()?;
+        let limit = gl.limit(glow::MAX_SHADER_STORAGE_BLOCK_SIZE);
+        let capacity = (record_budget_bytes.min(limit) / RECORD_BYTES).max(1);
+        let is_masked = draws.calls.iter().any(|c| c.mode == DrawMode::Masked);
+        let depths = if is_masked { capacity } else { 1 };
+        let buffers = RecordBuffers {
+            view: gl.empty_buffer(size_of::<ViewData>() as u64)?,
+            counter: gl.empty_buffer(4)?,
+            records: gl.empty_buffer(capacity * RECORD_BYTES)?,
+            depths: gl.empty_buffer(depths * DEPTH_BYTES)?,
+            capacity: capacity as u32,
+        };
+        let uploaded = SceneObjects::new(&gl, scene, draws, textures)?;
+        Ok(Self {
+            driver: gl.driver(),
+            programs: Programs::new(&gl)?,
+            nothing: gl.vertices(&[])?,
+            buffers,
+            layers: Vec::new(),
+            shadow_maps: ShadowMaps::new(&gl, draws.cascades)?,
+            materials: (scene.materials.iter().zip(&draws.groups))
+                .map(|(material, groups)| MaterialState::new(material, groups))
+                .collect(),
+            work: Work {
+                samplers: uploaded.samplers as u64,
+                ..Work::default()
+            },
+            scene: uploaded,
+            gl,
+        })
+    }
+
+    /// What this backend does not do.
+    fn lacks<T>(&self, what: &str) -> Result<T, RasterError> {
+        Err(RasterError::Unsupported {
+            driver: format!("the OSMesa backend ({})", self.driver),
+            what: what.to_owned(),
+        })
+    }
+
+    /// The target of a layer, made unless the last frame's fits.
+    fn target(&mut self, number: usize, size_px: [u32; 2]) -> Result<Target, RasterError> {
+        if self.layers.len() <= number {
+            self.layers.resize(number + 1, None);
+        }
+        let target = &mut self.layers[number];
+        target.take_if(|target| target.size_px != size_px);
+        match target {
+            Some(target) => Ok(*target),
+            None => Ok(*target.insert(Target::new(&self.gl, size_px)?)),
+        }
+    }
+
+    /// Batches a list of draws and makes the programs that they need. The list stays in the instance
+    /// buffer until the next plan.
+    fn plan(
+        &mut self,
+        draws: &DrawList,
+        visible: &[u32],
+        purpose: Purpose,
+    ) -> Result<Plan, RasterError> {
+        let mut plan = Vec::new();
+        for batch in batches(draws, visible, purpose) {
+            let call = &draws.calls[batch.draw as usize];
+            let material = &self.materials[call.material];
+            let instances = u64::from(batch.range.end - batch.range.start);
+            for &role in roles(call.mode, purpose) {
+                let key = PipelineKey::new(call, material, role, purpose, draws.cascades);
+                let pipeline = self.programs.get(&self.gl, &key)?;
+                if let Some(mesh) = &self.scene.meshes[call.mesh] {
+                    self.work.vertices += instances * u64::from(mesh.count);
+                    self.work.triangles += instances * u64::from(mesh.count / 3);
+                }
+                self.work.draws += instances;
+                self.work.calls += 1;
+                plan.push((batch.clone(), pipeline));
+            }
+        }
+        self.gl
+            .write(self.scene.instance_draws, 0, bytemuck::cast_slice(visible));
+        self.work.bytes_uploaded += size_of_val(visible) as u64;
+        Ok(plan)
+    }
+
+    /// Tells the shader what it reads and writes, the material left out.
+    fn bind(&self, view: &ViewData) {
+        let gl = &self.gl;
+        gl.write(self.buffers.view, 0, bytemuck::bytes_of(view));
+        gl.write(self.buffers.counter, 0, &[0; 4]);
+        gl.bind_uniform(glsl::VIEW_BLOCK, self.buffers.view);
+        for (binding, name) in (0..).zip(VIEW_BINDINGS) {
+            let buffer = match name {
+                "INSTANCES" => self.scene.instances,
+                "COUNTER" => self.buffers.counter,
+                "RECORDS" => self.buffers.records,
+                "DEPTHS" => self.buffers.depths,
+                _ => continue,
+            };
+            gl.bind_storage(binding, buffer);
+        }
+        let maps = &self.shadow_maps;
+        gl.bind_texture(glsl::SHADOW_UNIT, true, maps.texture, maps.sampler);
+    }
+
+    /// Issues a plan.
+    fn issue(&mut self, draws: &DrawList, plan: &Plan) {
+        let mut material = None;
+        for (batch, pipeline) in plan {
+            let call = &draws.calls[batch.draw as usize];
+            let Some(mesh) = &self.scene.meshes[call.mesh] else {
+                // Every draw's mesh is uploaded.
+                continue;
+            };
+            pipeline.set(&self.gl);
+            self.work.state_changes += 2;
+            if material.replace(call.material) != Some(call.material) {
+                let objects = &self.scene.materials[call.material];
+                self.gl.bind_uniform(glsl::MATERIAL_BLOCK, objects.uniform);
+                for (unit, &(texture, sampler)) in (glsl::MATERIAL_UNITS..).zip(&objects.units) {
+                    self.gl.bind_texture(unit, false, texture, sampler);
+                }
+                self.work.state_changes += 1;
+            }
+            self.gl.draw(mesh, batch.range.clone());
+        }
+    }
+
+    /// Hands over what has been recorded.
+    fn hand_over(&self, recording: Recording<'_, '_>) -> Result<Captured, RasterError> {
+        let mut counted = [0_u32];
+        self.gl
+            .read(self.buffers.counter, bytemuck::cast_slice_mut(&mut counted));
+        self.gl.check("reading the counter")?;
+        let needed = counted[0];
+        if needed > self.buffers.capacity {
+            let needed = needed.into();
+            return Ok(Captured::Overflow { needed });
+        }
+        if needed == 0 {
+            return Ok(Captured::Complete);
+        }
+        let mut quads = vec![RawRecord::default(); needed as usize];
+        self.gl
+            .read(self.buffers.records, bytemuck::cast_slice_mut(&mut quads));
+        // Without the depth test, that of masked draws is not replayed either.
+        let is_replayed = recording.fragments == Fragments::DepthTested
+            && self.buffers.depths.bytes >= u64::from(needed) * DEPTH_BYTES;
+        let depths = if is_replayed { needed as usize } else { 0 };
+        let mut depths = vec![RawDepth::default(); depths];
+        if is_replayed {
+            self.gl
+                .read(self.buffers.depths, bytemuck::cast_slice_mut(&mut depths));
+        }
+        self.gl.check("reading the records")?;
+        let merged = Merged::new(RawRecords {
+            quads: &quads,
+            depths: &depths,
+        });
+        (recording.sink)(merged.records())?;
+        Ok(Captured::Complete)
+    }
+}
+
+impl CaptureBackend for Osmesa {
+    fn name(&self) -> &'static str {
+        "osmesa"
+    }
+
+    fn driver(&self) -> &str {
+        &self.driver
+    }
+
+    fn record_capacity(&self) -> u64 {
+        self.buffers.capacity.into()
+    }
+
+    fn records_fragments_because(&self) -> Option<&str> {
+        Some("ballots")
+    }
+
+    fn work(&self) -> Work {
+        Work {
+            pipelines: self.programs.count(),
+            ..self.work
+        }
+    }
+
+    fn pose(&mut self, draws: &DrawList) {
+        self.work.bytes_uploaded += self.scene.pose(&self.gl, draws);
+    }
+
+    fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError> {
+        use crate::draws::SHADOW_SIZE;
+        let lighting = &frame.lighting;
+        for (number, cascade) in lighting.cascades.iter().enumerate() {
+            if !frame.cascades_seen[number] {
+                continue;
+            }
+            let plan = self.plan(draws, &frame.casters[number], Purpose::Shadow)?;
+            self.work.shadow_maps += 1;
+            self.bind(&ViewData::of_cascade(cascade, lighting));
+            let size = [SHADOW_SIZE; 2];
+            self.gl
+                .target(self.shadow_maps.layers[number], size, [[0; 2], size]);
+            self.gl.clear_depth();
+            self.issue(draws, &plan);
+            self.gl.check("rendering a shadow cascade")?;
+        }
+        self.gl.finish();
+        Ok(())
+    }
+
+    fn render(
+        &mut self,
+        draws: &DrawList,
+        view: &View<'_>,
+        region: Region,
+        recording: Option<Recording<'_, '_>>,
+    ) -> Result<Captured, RasterError> {
+        if view.layer.mask.is_some() || view.layer.start != Start::Sky {
+            return self.lacks("layers with masks, or that start with other layers");
+        }
+        let start = Instant::now();
+        let target = self.target(view.target, view.layer.size_px)?;
+        self.bind(&ViewData::of_eye(view, self.buffers.capacity));
+        self.work.regions += 1;
+        self.work.bytes_uploaded += size_of::<ViewData>() as u64 + 4;
+        let scissor = [region.origin_px, region.size_px];
+        self.gl.target(target.framebuffer, target.size_px, scissor);
+        self.programs.background.set(&self.gl);
+        self.gl.draw_whole(&self.nothing);
+        // All fragments are recorded before any draw writes depth.
+        let fragments = recording.as_ref().map(|recording| recording.fragments);
+        let purposes: &[Purpose] = match fragments {
+            None => &[Purpose::Plain],
+            Some(Fragments::DepthTested) => &[Purpose::Capture],
+            Some(Fragments::All) => &[Purpose::Record, Purpose::Plain],
+        };
+        for &purpose in purposes {
+            let plan = self.plan(draws, view.visible, purpose)?;
+            self.issue(draws, &plan);
+        }
+        self.gl.check("rendering a layer")?;
+        if let Some(recording) = recording {
+            return self.hand_over(recording);
+        }
+        let submitted = Instant::now();
+        self.gl.finish();
+        self.work.submitting += submitted - start;
+        self.work.waiting += submitted.elapsed();
+        Ok(Captured::Complete)
+    }
+
+    fn depth(&mut self, _: &DrawList, _: &View<'_>) -> Result<Vec<f32>, RasterError> {
+        self.lacks("depth for occlusion culling")
+    }
+
+    fn marks(&mut self, _: &DrawList, _: &View<'_>, _: &Lens) -> Result<Vec<Marks>, RasterError> {
+        self.lacks("marks of visible draws")
+    }
+
+    fn multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
+        Ok(Some("OSMesa has no multiview".to_owned()))
+    }
+
+    fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError> {
+        for view in views {
+            let whole = Region {
+                origin_px: [0, 0],
+                size_px: view.layer.size_px,
+            };
+            self.render(draws, view, whole, None)?;
+        }
+        Ok(())
+    }
+
+    fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError> {
+        for view in frame.views() {
+            self.target(view.target, view.layer.size_px)?;
+        }
+        Ok(())
+    }
+
+    fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
+        let is_layer = |picture: &Picture| matches!(picture, Picture::Layer(_));
+        if frame.plan.pictures.iter().all(is_layer) {
+            return Ok(());
+        }
+        self.lacks("pictures that are composed of layers")
+    }
+
+    fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {
+        let Picture::Layer(layer) = frame.plan.pictures[number] else {
+            return self.lacks("pictures that are composed of layers");
+        };
+        let Some(target) = self.layers.get(layer).copied().flatten() else {
+            let what = format!("layer {layer} has not been rendered");
+            return Err(RasterError::Scene(what));
+        };
+        let pixels = self.gl.pixels(target.framebuffer, target.size_px);
+        self.gl.check("reading a picture")?;
+        Ok(pixels)
+    }
+}

@@ -1,0 +1,109 @@
+//! The programs that a scene's draws need, all from one shader source.
+
+use super::gl::{Gl, Program, State};
+use super::glsl::Module;
+use crate::error::RasterError;
+use crate::roles::{PipelineKey, Role};
+use naga::ShaderStage::{Fragment, Vertex};
+use std::collections::BTreeMap;
+
+/// A program and how its fragments meet what is there.
+#[derive(Clone, Copy)]
+pub struct Pipeline {
+    program: Program,
+    state: State,
+}
+
+impl Pipeline {
+    /// Draws with it from now on.
+    pub fn set(&self, gl: &Gl) {
+        gl.use_program(self.program);
+        gl.set(&self.state);
+    }
+}
+
+/// The shader and the programs made from it so far.
+pub struct Programs {
+    /// Draws the background and clears the region's depth.
+    pub background: Pipeline,
+    module: Module,
+    made: BTreeMap<PipelineKey, Pipeline>,
+}
+
+impl Programs {
+    /// Reads the shader.
+    ///
+    /// # Errors
+    /// Driver and validation errors.
+    pub fn new(gl: &Gl) -> Result<Self, RasterError> {
+        let module = Module::new()?;
+        let vertex = module.translate(Vertex, "vertex_background", &[])?;
+        let fragment = module.translate(Fragment, "fragment_background", &[])?;
+        let background = Pipeline {
+            program: gl.program(&vertex, Some(&fragment))?,
+            state: State {
+                depth: glow::ALWAYS,
+                writes_depth: true,
+                writes_color: true,
+                blends: false,
+                culls: false,
+                clockwise: false,
+                offset: [0.0; 2],
+            },
+        };
+        Ok(Self {
+            background,
+            module,
+            made: BTreeMap::new(),
+        })
+    }
+
+    /// The pipeline of `key`, made when it is first asked for.
+    ///
+    /// # Errors
+    /// Driver and validation errors.
+    pub fn get(&mut self, gl: &Gl, key: &PipelineKey) -> Result<Pipeline, RasterError> {
+        if let Some(pipeline) = self.made.get(key) {
+            return Ok(*pipeline);
+        }
+        let constants = key.constants();
+        let vertex = if key.colored {
+            "vertex_numbered_colored"
+        } else {
+            "vertex_numbered"
+        };
+        let vertex = self.module.translate(Vertex, vertex, &constants)?;
+        let fragment = (key.role.fragment_entry_point())
+            .map(|name| self.module.translate(Fragment, name, &constants))
+            .transpose()?;
+        let pipeline = Pipeline {
+            program: gl.program(&vertex, fragment.as_deref())?,
+            state: state(key),
+        };
+        self.made.insert(*key, pipeline);
+        Ok(pipeline)
+    }
+
+    /// Programs made.
+    pub fn count(&self) -> u64 {
+        self.made.len() as u64
+    }
+}
+
+/// What a pipeline does with depth and colour, as lavapipe's have it.
+fn state(key: &PipelineKey) -> State {
+    let role = key.role;
+    State {
+        depth: if role.marks() {
+            glow::LEQUAL
+        } else {
+            glow::LESS
+        },
+        writes_depth: !role.keeps_depth(),
+        writes_color: !role.only_records(),
+        blends: role == Role::Blended,
+        culls: !key.double_sided,
+        clockwise: key.mirrored,
+        offset: if role.casts() { [2.0; 2] } else { [0.0; 2] },
+    }
+}
