@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques test bench lint build deps golden clean
+.PHONY: demo techniques stress test bench lint build deps golden clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -14,6 +14,10 @@ demo: deps build
 # Every stereo rendering technique on three scenes, measured against its image error.
 techniques: deps build
 	@OUT="$(OUT)" scripts/techniques.sh
+
+# Numbers that try to break a capture: errors and bounds in $(OUT)/stress/stress.md.
+stress: deps build
+	@target/release/tracegen stress -o "$(OUT)/stress"
 
 test:
 	@scripts/install-deps.sh test

@@ -12,8 +12,8 @@ pub const MAX_EYE_SIZE_PX: u32 = 16384;
 pub const MAX_TANGENT: f32 = 100.0;
 /// Least sum of the tangents of two opposite half-angles.
 pub const MIN_TANGENT_SUM: f32 = 1e-4;
-/// Largest distance between the eyes in metres.
-pub const MAX_IPD_M: f32 = 1.0;
+/// Largest distance between the eyes in metres: a scene may be in millimetres or in kilometres.
+pub const MAX_IPD_M: f32 = 1e6;
 /// Largest yaw of an eye in degrees, to either side.
 pub const MAX_CANT_DEG: f32 = 45.0;
 
@@ -196,7 +196,7 @@ pub struct EyeView {
     pub world_to_eye: [[f32; 4]; 4],
     /// Eye space to clip space; depth 0 to 1, y up.
     pub eye_to_clip: [[f32; 4]; 4],
-    /// Eye position in world space, metres.
+    /// Eye position in world space, metres; in a trace relative to its `origin_m`.
     pub position: [f32; 3],
 }
 

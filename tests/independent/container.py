@@ -203,7 +203,7 @@ def check_meta(meta):
     require(all(1 <= size <= 16384 for size in hmd["eye_size_px"]), "size of an eye")
     for fov in hmd["fov"]:
         check_fov(fov)
-    require(0 <= hmd["ipd_m"] <= 1, "distance between the eyes")
+    require(0 <= hmd["ipd_m"] <= 1e6, "distance between the eyes")
     require(abs(hmd["cant_deg"]) <= 45, "cant")
     numbers = [frame["frame"] for frame in meta["frames"]]
     require(numbers and all(a < b for a, b in zip(numbers, numbers[1:])), "frames")

@@ -71,6 +71,7 @@ fn meta(frames: u32) -> TraceMeta {
             })
             .collect(),
         surfaces: None,
+        origin_m: [0.0; 3],
     }
 }
 

@@ -4,5 +4,6 @@
 pub mod captures;
 pub mod cli;
 mod picture;
+pub mod stress;
 pub mod study;
 pub mod verify;

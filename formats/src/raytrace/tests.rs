@@ -51,6 +51,7 @@ fn tables(has_visits: bool) -> RaytraceTables {
                 eyes: [view; 2],
             }],
             surfaces: None,
+            origin_m: [0.0; 3],
         },
         origin: [0.1, 1e6 + 1.0 / 3.0, -7.0],
         eyes: [eye(-0.032), eye(0.032)],

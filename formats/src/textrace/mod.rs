@@ -94,11 +94,19 @@ pub struct TraceMeta {
     pub seed: u64,
     /// The display.
     pub hmd: Hmd,
-    /// Eye matrices by frame.
+    /// Eye matrices by frame, relative to `origin_m`.
     pub frames: Vec<FrameViews>,
     /// What the recorded fragments say of what is seen; older traces do not tell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surfaces: Option<Surfaces>,
+    /// World position that the eyes' places are relative to, metres: zero but for a scene far out,
+    /// whose coordinates would lose their digits in single precision.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub origin_m: [f64; 3],
+}
+
+fn is_zero(origin_m: &[f64; 3]) -> bool {
+    *origin_m == [0.0; 3]
 }
 
 /// Which fragments were recorded, and which of them hide what lies behind.
@@ -158,7 +166,14 @@ impl TraceMeta {
                     format_args!("{numbers:?}"),
                 )
             },
-        )
+        )?;
+        ensure(self.origin_m.iter().all(|at| at.is_finite()), || {
+            Broken::new(
+                "origin",
+                "finite numbers",
+                format_args!("{:?}", self.origin_m),
+            )
+        })
     }
 }
 

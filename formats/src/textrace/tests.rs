@@ -70,6 +70,7 @@ pub(crate) fn tables() -> Tables {
                 frame: 0,
                 eyes: [eye; 2],
             }],
+            origin_m: [0.0; 3],
             surfaces: Some(Surfaces {
                 depth_tested: true,
                 not_opaque: vec![[2, 1]],

@@ -46,6 +46,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
             },
             frames: vec![formats::view::FrameViews::default()],
             surfaces: None,
+            origin_m: [0.0; 3],
         },
         textures: sizes
             .iter()

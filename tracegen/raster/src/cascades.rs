@@ -52,12 +52,13 @@ pub fn fit(
     (0..count)
         .map(|k| {
             let slice = [k, k + 1].map(|edge| split(edge, count, near_m, far_m));
-            let (center, radius) = slice_sphere(eyes, slice);
+            let (center, radius) = slice_sphere(eyes, slice, radius_step_m(far_m));
             let half = radius * MARGIN;
             let texel = 2.0 * half / SHADOW_SIZE as f32;
             let c = light.transform_point3(center);
             let [x, y] = [c.x, c.y].map(|v| (v / texel).floor() * texel);
-            let range = (depth_hi - depth_lo).max(1e-3);
+            // A flat scene that faces the sun has no depth at all.
+            let range = (depth_hi - depth_lo).max(1e-5 * far_m);
             let projection = orthographic(
                 x - half,
                 x + half,
@@ -82,9 +83,17 @@ fn split(edge: u32, count: u32, near_m: f32, far_m: f32) -> f32 {
     LOG_WEIGHT * log + (1.0 - LOG_WEIGHT) * uniform
 }
 
-/// Sphere around the parts of all frusta at eye distances `slice`. The radius is rounded up to
-/// 1/16 m so that rounding under head rotation does not change the texel size.
-fn slice_sphere(eyes: &[EyeView], slice: [f32; 2]) -> (Vec3, f32) {
+/// What radii of cascades are multiples of, metres: 1/16, or what is that to a scene much smaller or
+/// much larger than a building, whose cascades end at `far_m`.
+fn radius_step_m(far_m: f32) -> f32 {
+    let least = (far_m / 16384.0).log2().ceil().exp2();
+    let most = (far_m / 32.0).log2().floor().exp2();
+    (1.0_f32 / 16.0).max(least).min(most)
+}
+
+/// Sphere around the parts of all frusta at eye distances `slice`. The radius is rounded up to a
+/// multiple of `step_m` so that rounding under head rotation does not change the texel size.
+fn slice_sphere(eyes: &[EyeView], slice: [f32; 2], step_m: f32) -> (Vec3, f32) {
     let mut points = Vec::with_capacity(8 * eyes.len());
     for eye in eyes {
         let world_from_eye = Mat4::from_cols_array_2d(&eye.world_to_eye).inverse();
@@ -103,7 +112,7 @@ fn slice_sphere(eyes: &[EyeView], slice: [f32; 2]) -> (Vec3, f32) {
         .iter()
         .map(|p| p.distance(center))
         .fold(0.0, f32::max);
-    (center, (radius * 16.0).ceil() / 16.0)
+    (center, (radius / step_m).ceil() * step_m)
 }
 
 /// Left, right, bottom and top tangents of a perspective projection.

@@ -154,6 +154,7 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
                 hmd: display,
                 frames,
                 surfaces: None,
+                origin_m: [0.0; 3],
             },
             origin,
             eyes,

@@ -76,6 +76,7 @@ fn tables() -> Tables {
                 eyes: [eye; 2],
             }],
             surfaces: None,
+            origin_m: [0.0; 3],
         },
         textures: vec![Texture {
             name: "grid".into(),

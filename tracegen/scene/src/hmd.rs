@@ -1,6 +1,6 @@
 //! Head-mounted displays: presets, and the frusta that flags ask for.
 
-use formats::view::{FovTangents, Hmd};
+use formats::view::{FovTangents, Hmd, MAX_IPD_M};
 
 /// Default distance between the eyes, metres.
 pub const DEFAULT_IPD_M: f32 = 0.064;
@@ -159,9 +159,9 @@ pub fn validate(hmd: &Hmd) -> Result<(), HmdError> {
         )?;
     }
     check(
-        (0.0..=1.0).contains(&hmd.ipd_m),
+        (0.0..=MAX_IPD_M).contains(&hmd.ipd_m),
         "distance between the eyes",
-        "0 to 1000 mm",
+        "0 to 1000 mm, or more in a scene of another scale, up to 1000000 m",
         format!("{} mm", hmd.ipd_m * 1000.0),
     )?;
     check(

@@ -1,6 +1,7 @@
 //! The scene that every loader fills and every renderer reads: model, loaders, cameras, paths, displays.
 
 pub mod cameras;
+mod coarse;
 mod error;
 mod files;
 pub mod geometry;
@@ -14,6 +15,7 @@ mod model;
 mod motion;
 mod obj;
 mod options;
+mod origin;
 pub mod paths;
 #[cfg(test)]
 mod real_scenes;

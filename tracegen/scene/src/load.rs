@@ -1,6 +1,6 @@
 //! From a file to a complete [`Scene`].
 
-use super::{Camera, LoadOptions, Loaded, Scene, SceneError, cameras, gltf, obj};
+use super::{Camera, LoadOptions, Loaded, Scene, SceneError, cameras, coarse, gltf, obj};
 use crate::files::{check_regular, shown};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -40,6 +40,7 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
         });
     }
     make_names_printable(&mut loaded.scene);
+    loaded.warnings.extend(coarse::warning(&loaded.scene));
     complete(&mut loaded.scene);
     Ok(loaded)
 }

@@ -1,17 +1,20 @@
 //! The scene model that every loader fills and every renderer reads.
 //!
-//! World space is right-handed, y up, metres. Front faces wind counter-clockwise.
+//! World space is right-handed, y up, metres. Front faces wind counter-clockwise. Coordinates are
+//! relative to [`Scene::origin`], in single precision.
 
 use crate::geometry::{bounding_box, transformed_box};
 use crate::{Image, Motion};
 use formats::texture::Sampler;
-use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
+use glam::{Affine3A, DVec3, Mat3, Vec2, Vec3, Vec4};
 
 /// A whole scene.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Name for reports: the built-in's name or the file's stem.
     pub name: String,
+    /// World position that all coordinates are relative to: zero but for a scene far from zero.
+    pub origin: DVec3,
     /// Triangle meshes, each with one material.
     pub meshes: Vec<Mesh>,
     /// Meshes placed in the world, in submission order.

@@ -9,6 +9,7 @@ mod raster_auto;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;
+pub mod stress;
 pub mod sweep;
 mod technique_args;
 pub mod techniques;
@@ -53,6 +54,8 @@ enum Command {
     Verify(Box<verify::VerifyArgs>),
     /// Trace a stereo frame and capture its rays into a .raytrace file.
     Rays(Box<rays::RaysArgs>),
+    /// Drive captures to where arithmetic ends and hold them against a reference: numbers of every kind, their errors and bounds.
+    Stress(stress::StressArgs),
     #[command(flatten)]
     Documents(Documents),
 }
@@ -70,6 +73,7 @@ pub fn main() -> ExitCode {
                 Command::Sweep(args) => sweep::run(&args)?,
                 Command::Verify(args) => verify::run(&args)?,
                 Command::Rays(args) => rays::run(&args)?,
+                Command::Stress(args) => return stress::run(&args),
                 Command::Documents(documents) => return documents.run::<Cli>(),
             }
             Ok(ExitCode::SUCCESS)

@@ -363,7 +363,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         prepared.persist().with_context(|| cannot_write(path))?;
     }
     if summary.counts.fragments == 0 {
-        super::scene_args::warn_of_nothing_seen(&setup.camera, bounds);
+        super::scene_args::warn_of_nothing_seen(&setup.camera, bounds, setup.scene.origin);
     }
     let views = [setup.frames.len(), planner.eyes().len()];
     note(&texels);
@@ -406,7 +406,8 @@ pub(super) fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Ve
         .abs()
         .max((setup.camera.eye - hi).abs())
         .length();
-    let near = setup.camera.near.max(0.05);
+    // What is nearer than 5 cm needs no shadows of its own, nor a twentieth of a smaller scene.
+    let near = setup.camera.near.max(farthest.min(1.0) * 0.05);
     [near, farthest.min(setup.camera.far).max(2.0 * near)]
 }
 
@@ -435,6 +436,7 @@ pub(super) fn tables(
             hmd: setup.hmd.clone(),
             frames: setup.frames.clone(),
             surfaces: Some(draws.surfaces(fragments)),
+            origin_m: setup.scene.origin.to_array(),
         },
         textures,
         samplers,

@@ -98,9 +98,10 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     };
     let loaded = start.elapsed();
     progress.stage("building the hierarchy", 0, "");
-    let (camera, bounds) = (
+    let (camera, bounds, world) = (
         setup.camera.clone(),
         setup.scene.bounds().unwrap_or_default(),
+        setup.scene.origin,
     );
     let (scene, mut tables) = prepare(args, setup)?;
     let prepared = start.elapsed();
@@ -116,7 +117,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
         file.persist().with_context(|| cannot_write(path))?;
     }
     if frame.stats.hits == 0 {
-        super::scene_args::warn_of_nothing_seen(&camera, bounds);
+        super::scene_args::warn_of_nothing_seen(&camera, bounds, world);
     }
     report(&tables, &frame, file_bytes, [loaded, prepared, traced]);
     Ok(())
@@ -132,7 +133,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
         moments,
     } = setup;
     scene.pose(moments.time_s(moments.frames.start));
-    let scene_triangles = scene.triangle_count();
+    let (scene_triangles, scene_origin) = (scene.triangle_count(), scene.origin);
     let scene = TraceScene::new(scene)?;
     let traversal = match args.bvh {
         Tree::Bvh2 => TraversalKind::Bvh2,
@@ -159,8 +160,9 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
             hmd,
             frames,
             surfaces: None,
+            origin_m: scene_origin.to_array(),
         },
-        origin,
+        origin: (scene_origin + scene.soup.origin).to_array(),
         eyes,
         max_depth: args.depth,
         samples_per_px: args.spp,

@@ -3,7 +3,7 @@
 use super::path_args::PathArgs;
 use clap::Args;
 use formats::view::{FovTangents, FrameViews, Hmd};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use scene::paths::Moments;
 use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd};
 use scenes::load_with;
@@ -73,6 +73,7 @@ impl SceneArgs {
         self.camera.validate_alone()?;
         let (path, moments) = path.open(frames)?;
         let scene = load_scene(&self.scene, options)?;
+        let path = path.relative_to(scene.origin);
         let camera = self.camera.resolve(&scene)?;
         let vfov_deg = match self.camera.vfov {
             Some(VerticalFov::File) => Some(camera.vfov_deg),
@@ -83,6 +84,7 @@ impl SceneArgs {
         let heads = path.poses(&camera, &moments)?;
         let camera = path.start(&camera)?;
         let frames = cameras::frame_views(&camera, &hmd, moments.frames.start, &heads);
+        warn_of_coarse_places(&camera, &frames, scene.origin);
         Ok(SceneSetup {
             scene,
             camera,
@@ -90,6 +92,20 @@ impl SceneArgs {
             frames,
             moments,
         })
+    }
+}
+
+/// Warns of eyes so far from the scene's origin that what is near them has coarse coordinates.
+fn warn_of_coarse_places(camera: &Camera, frames: &[FrameViews], origin: DVec3) {
+    let eyes = frames.iter().flat_map(|views| &views.eyes);
+    let farthest = (eyes.flat_map(|eye| eye.position)).fold(0.0_f32, |far, at| far.max(at.abs()));
+    let step_m = farthest * f32::EPSILON;
+    // A sixty-fourth of the near plane's distance is about a pixel there.
+    if step_m > camera.near / 64.0 {
+        shell::warn(&format!(
+            "the eyes are {farthest:.0} m from where the scene's coordinates are counted from ({origin:.0}): \
+             places near them are off by up to {step_m} m"
+        ));
     }
 }
 
@@ -105,9 +121,10 @@ pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-/// Warns of a picture without any part of the scene.
-pub fn warn_of_nothing_seen(camera: &Camera, (low, high): (Vec3, Vec3)) {
-    let Camera { eye, target, .. } = camera;
+/// Warns of a picture without any part of the scene; coordinates are relative to `origin`.
+pub fn warn_of_nothing_seen(camera: &Camera, (low, high): (Vec3, Vec3), origin: DVec3) {
+    let [eye, target, low, high] =
+        [camera.eye, camera.target, low, high].map(|point| origin + point.as_dvec3());
     shell::warn(&format!(
         "nothing of the scene is seen from {eye:.2} towards {target:.2} (camera {}); it reaches \
          from {low:.2} to {high:.2} m: choose another --camera, or --eye and --target",
@@ -123,13 +140,13 @@ pub struct CameraArgs {
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     /// Position between the eyes in metres (with --target, instead of --camera).
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vec3, allow_hyphen_values = true,
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true,
           requires = "target", conflicts_with = "camera")]
-    pub eye: Option<Vec3>,
+    pub eye: Option<DVec3>,
     /// Point looked at.
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vec3, allow_hyphen_values = true,
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true,
           requires = "eye")]
-    pub target: Option<Vec3>,
+    pub target: Option<DVec3>,
     /// Up direction.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vec3, allow_hyphen_values = true,
           default_value = "0,1,0", requires = "eye")]
@@ -157,7 +174,9 @@ impl CameraArgs {
     pub fn resolve(&self, scene: &Scene) -> Result<Camera, cameras::CameraError> {
         let from_scene = cameras::find(scene, self.camera.as_deref())?;
         let camera = match (self.eye, self.target) {
-            (Some(eye), Some(target)) => self.posed(eye, target, from_scene),
+            (Some(eye), Some(target)) => {
+                cameras::posed(eye, target, self.up, scene.origin, from_scene)?
+            }
             _ => from_scene.clone(),
         };
         cameras::validate(&camera)?;
@@ -170,18 +189,7 @@ impl CameraArgs {
             return Ok(());
         };
         let planes = cameras::default_camera(&Scene::default());
-        cameras::validate(&self.posed(eye, target, &planes))
-    }
-
-    /// Near and far planes come from the scene's own camera: they fit its scale.
-    fn posed(&self, eye: Vec3, target: Vec3, planes: &Camera) -> Camera {
-        Camera {
-            name: "custom".into(),
-            eye,
-            target,
-            up: self.up,
-            ..planes.clone()
-        }
+        cameras::posed(eye, target, self.up, eye, &planes).map(|_| ())
     }
 }
 
@@ -281,14 +289,19 @@ fn check_angle(what: &'static str, degrees: f32) -> Result<(), hmd::HmdError> {
 
 /// Exactly `N` finite numbers separated by commas.
 fn parse_numbers<const N: usize>(text: &str) -> Result<[f32; N], String> {
+    Ok(parse_doubles::<N>(text)?.map(|number| number as f32))
+}
+
+/// Exactly `N` numbers separated by commas that are finite in single precision, too.
+fn parse_doubles<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers = text
         .split(',')
-        .map(|part| match part.trim().parse::<f32>() {
-            Ok(number) if number.is_finite() => Ok(number),
+        .map(|part| match part.trim().parse::<f64>() {
+            Ok(number) if (number as f32).is_finite() => Ok(number),
             _ => Err(format!("expected a finite number, found '{}'", part.trim())),
         })
         .collect::<Result<Vec<_>, _>>()?;
-    <[f32; N]>::try_from(numbers).map_err(|found| {
+    <[f64; N]>::try_from(numbers).map_err(|found| {
         format!(
             "expected {N} numbers separated by commas, found {}",
             found.len()
@@ -298,6 +311,11 @@ fn parse_numbers<const N: usize>(text: &str) -> Result<[f32; N], String> {
 
 fn parse_vec3(text: &str) -> Result<Vec3, String> {
     parse_numbers::<3>(text).map(Vec3::from)
+}
+
+/// A point of the world, which may lie far out.
+fn parse_point(text: &str) -> Result<DVec3, String> {
+    parse_doubles::<3>(text).map(DVec3::from)
 }
 
 fn parse_vfov(text: &str) -> Result<VerticalFov, String> {

@@ -4,6 +4,7 @@ use super::cache_args::CacheArgs;
 use super::scene_args::load_scene;
 use ::scenes::BUILTINS;
 use clap::Args;
+use glam::Vec3;
 use scene::{LoadOptions, Scene};
 use serde::Serialize;
 use std::time::Instant;
@@ -53,7 +54,7 @@ struct Description {
     images: Vec<ImageEntry>,
     texture_bytes: Option<usize>,
     lights: usize,
-    bounds_m: Option<[[f32; 3]; 2]>,
+    bounds_m: Option<[[f64; 3]; 2]>,
     cameras: Vec<CameraEntry>,
 }
 
@@ -67,8 +68,8 @@ struct ImageEntry {
 #[derive(Serialize)]
 struct CameraEntry {
     name: String,
-    eye: [f32; 3],
-    target: [f32; 3],
+    eye: [f64; 3],
+    target: [f64; 3],
     up: [f32; 3],
     vfov_deg: f32,
     near_m: f32,
@@ -178,14 +179,14 @@ fn describe(scene: &Scene) -> Description {
         lights: scene.lights.len(),
         bounds_m: scene
             .bounds()
-            .map(|(low, high)| [low.to_array(), high.to_array()]),
+            .map(|(low, high)| [low, high].map(|corner| in_world(scene, corner))),
         cameras: scene
             .cameras
             .iter()
             .map(|c| CameraEntry {
                 name: c.name.clone(),
-                eye: c.eye.to_array(),
-                target: c.target.to_array(),
+                eye: in_world(scene, c.eye),
+                target: in_world(scene, c.target),
                 up: c.up.to_array(),
                 vfov_deg: c.vfov_deg,
                 near_m: c.near,
@@ -195,11 +196,19 @@ fn describe(scene: &Scene) -> Description {
     }
 }
 
+/// World coordinates of a point; digits that single precision does not have are left out.
+fn in_world(scene: &Scene, point: Vec3) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        let written: f64 = point[axis].to_string().parse().unwrap_or(f64::NAN);
+        scene.origin[axis] + written
+    })
+}
+
 fn table(d: &Description) -> String {
     let texels: u64 = (d.images.iter())
         .map(|i| u64::from(i.size[0]) * u64::from(i.size[1]))
         .sum();
-    let point = |p: [f32; 3]| format!("({:.2}, {:.2}, {:.2})", p[0], p[1], p[2]);
+    let point = |p: [f64; 3]| format!("({:.2}, {:.2}, {:.2})", p[0], p[1], p[2]);
     let mut text = format!(
         "scene      {}\ntriangles  {} ({} unique) in {} meshes, {} instances\n\
          materials  {}\nimages     {} ({:.1} Mtexel)\nlights     {}\n",

@@ -152,6 +152,7 @@ fn capture_skipping(
             hmd: display(size_px),
             frames: vec![views.clone()],
             surfaces: Some(draws.surfaces(fragments)),
+            origin_m: [0.0; 3],
         },
         textures,
         samplers,

@@ -71,7 +71,8 @@ impl Eye {
             far_m: if scale < -1.0 - 1e-9 {
                 offset / (scale + 1.0)
             } else {
-                1e6
+                // Where depth in single precision has no steps left.
+                1e7 * offset / scale
             },
         }
     }

@@ -71,12 +71,15 @@ impl Layer {
     pub fn may_draw(&self, [low, high]: [Vec3; 2]) -> bool {
         let Some(mask) = &self.mask else { return true };
         let clip_from_world = self.clip_from_world();
+        // Half of the near plane's distance, at most a millimetre.
+        let [_, _, depth, shift] = self.view.eye_to_clip.map(|column| column[2]);
+        let least_w = (0.5 * shift / depth).clamp(0.0, 1e-3);
         let (mut first, mut last) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
         for corner in 0..8 {
             let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
             let at = clip_from_world * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
             // Beside the eye or behind it, or not a number: it may be anywhere.
-            if at.w.is_nan() || at.w < 1e-3 {
+            if at.w.is_nan() || at.w < least_w || at.w <= 0.0 {
                 return true;
             }
             let ndc = Vec2::new(at.x, -at.y) / at.w;

@@ -116,7 +116,7 @@ impl Eye {
             f64::INFINITY
         };
         let last_m = forward.abs().dot(extent);
-        let step = 1e-6 * (1.0 + near_m.abs());
+        let step = 1e-6 * near_m.abs();
         let far = HalfSpace {
             normal: -forward,
             offset: far_m.min(last_m).max(near_m + step),

@@ -4,15 +4,18 @@
 //! 0 at the near plane to 1 at the far plane (not reversed: compare with `Less`).
 
 use super::{Camera, Scene};
+use crate::origin::relative;
 use formats::view::{EyeView, FovTangents, FrameViews, Hmd};
-use glam::{Affine3A, Mat3, Mat4, Vec3, Vec4};
+use glam::{Affine3A, DVec3, Mat3, Mat4, Vec3, Vec4};
 
 /// A view of the whole scene from outside, for files without a camera.
 #[must_use]
 pub fn default_camera(scene: &Scene) -> Camera {
     let (low, high) = scene.bounds().unwrap_or((-Vec3::ONE, Vec3::ONE));
     let target = (low + high) / 2.0;
-    let radius = ((high - low).length() / 2.0).max(1e-3);
+    let half = (high - low).length() / 2.0;
+    // All may be in one point.
+    let radius = if half > 0.0 { half } else { 1e-3 };
     Camera {
         name: "default".into(),
         eye: target + Vec3::new(0.55, 0.4, 1.0).normalize() * radius * 1.9,
@@ -81,30 +84,74 @@ pub fn validate(camera: &Camera) -> Result<(), CameraError> {
     let Camera {
         eye, target, up, ..
     } = *camera;
-    if !(eye.is_finite() && target.is_finite() && up.is_finite()) {
-        return Err(invalid(
-            "finite coordinates",
-            format!("eye {eye}, target {target}, up {up}"),
-        ));
-    }
-    let forward = target - eye;
-    if forward.length() < 1e-6 * eye.length().max(1.0) {
-        return Err(invalid(
-            "a target away from the eye",
-            format!("eye {eye}, target {target}"),
-        ));
-    }
-    if forward.normalize().cross(up.normalize_or_zero()).length() < 1e-4 {
-        return Err(invalid(
-            "an up vector that is not along the viewing direction",
-            format!("up {up}, direction {forward}"),
-        ));
-    }
+    let steps = 16.0 * f64::from(f32::EPSILON);
+    check_direction(eye.as_dvec3(), target.as_dvec3(), up, steps)
+        .map_err(|(expected, found)| invalid(expected, found))?;
     let (near, far) = (camera.near, camera.far);
     if !(near.is_finite() && far.is_finite() && near > 0.0 && far > near) {
         return Err(invalid("0 < near < far", format!("near {near}, far {far}")));
     }
     Ok(())
+}
+
+/// Checks that an eye looks somewhere: that its target is more than `steps` of its distance from
+/// zero away, which is what rounding may do to it. Tells what is expected and found otherwise.
+fn check_direction(
+    eye: DVec3,
+    target: DVec3,
+    up: Vec3,
+    steps: f64,
+) -> Result<(), (&'static str, String)> {
+    if !(eye.is_finite() && target.is_finite() && up.is_finite()) {
+        let found = format!("eye {eye}, target {target}, up {up}");
+        return Err(("finite coordinates", found));
+    }
+    let forward = target - eye;
+    // In single precision, so that its square is a number.
+    let least = f64::from(f32::MIN_POSITIVE).sqrt();
+    if forward.length() < (steps * eye.length()).max(least) {
+        let found = format!("eye {eye}, target {target}");
+        return Err(("a target away from the eye", found));
+    }
+    let forward = forward.as_vec3();
+    if forward.normalize().cross(up.normalize_or_zero()).length() < 1e-4 {
+        let found = format!("up {up}, direction {forward}");
+        return Err((
+            "an up vector that is not along the viewing direction",
+            found,
+        ));
+    }
+    Ok(())
+}
+
+/// A camera of this pose in the world, for a scene whose coordinates are relative to `origin`. Near
+/// and far planes are those of `like`, a camera of the scene: they fit its scale.
+///
+/// # Errors
+/// [`CameraError::Invalid`] for a pose that looks nowhere.
+pub fn posed(
+    eye: DVec3,
+    target: DVec3,
+    up: Vec3,
+    origin: DVec3,
+    like: &Camera,
+) -> Result<Camera, CameraError> {
+    let camera = Camera {
+        name: "custom".into(),
+        eye: relative(eye, origin),
+        target: relative(target, origin),
+        up,
+        ..like.clone()
+    };
+    // As the user wrote it, before rounding may make one of two points.
+    check_direction(eye, target, up, 16.0 * f64::EPSILON).map_err(|(expected, found)| {
+        CameraError::Invalid {
+            camera: camera.name.clone(),
+            expected,
+            found,
+        }
+    })?;
+    Ok(camera)
 }
 
 /// The head's frame: columns right, up, backwards, and the point between the eyes.

@@ -4,12 +4,12 @@
 //! that two of them move is refused, because a file does not say which one plays.
 
 use super::accessors::{Buffers, at};
-use super::{nodes, parse, read_buffers};
+use super::{Parsed, nodes, parse, read_buffers};
 use crate::SceneError;
 use crate::files::{Origin, read_file, shown};
 use crate::paths::{CameraTrack, Channel, Curve, Interpolation, Joint};
 use crate::warnings::Warnings;
-use glam::Vec4;
+use glam::{DVec3, DVec4};
 use gltf::json::Root;
 use gltf::json::animation::{Interpolation as JsonInterpolation, Property, Sampler};
 use gltf::json::validation::Checked;
@@ -29,7 +29,11 @@ pub(crate) fn camera_track(
     let bytes = read_file(path, "path", u64::MAX)?;
     let mut warnings = Warnings::default();
     // What the loader of scenes warns of concerns the scene, not the path.
-    let (document, blob) = parse(&origin, &bytes, &mut Warnings::default())?;
+    let Parsed {
+        document,
+        transforms,
+        blob,
+    } = parse(&origin, &bytes, &mut Warnings::default())?;
     let root = document.as_json();
     let buffers = read_buffers(&origin, root, blob, &mut warnings)?;
     let buffers = Buffers::new(root, buffers, &origin, bytes.len());
@@ -87,8 +91,8 @@ pub(crate) fn camera_track(
                 ));
             }
             Ok(Joint {
-                rest: nodes::local_transform(node),
-                parts: nodes::parts(node),
+                rest: transforms[index].transform(),
+                parts: transforms[index].parts(),
                 curves,
             })
         })
@@ -96,6 +100,7 @@ pub(crate) fn camera_track(
     let track = CameraTrack {
         file: path.to_owned(),
         camera: shown(name),
+        origin: DVec3::ZERO,
         joints,
         span_s: [first, last],
     };
@@ -226,12 +231,15 @@ fn curve(
             format!("{} times that are not", times_s.len()),
         );
     }
-    let values: Vec<Vec4> = if channel == Channel::Rotation {
+    let values: Vec<DVec4> = if channel == Channel::Rotation {
         let values = buffers.floats::<4>(at(&sampler.output), "rotations: vectors of 4 floats")?;
-        values.into_iter().map(Vec4::from).collect()
+        values
+            .into_iter()
+            .map(|q| DVec4::from_array(q.map(f64::from)))
+            .collect()
     } else {
         let values = buffers.floats::<3>(at(&sampler.output), "vectors of 3 floats")?;
-        let wide = |[x, y, z]: [f32; 3]| Vec4::new(x, y, z, 0.0);
+        let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from)).extend(0.0);
         values.into_iter().map(wide).collect()
     };
     let a_key = if interpolation == Interpolation::Cubic {
@@ -257,7 +265,7 @@ fn curve(
     }
     // The values of a cubic curve stand between their tangents.
     let keys = || values.iter().skip(a_key / 2).step_by(a_key);
-    let unit = |q: &&Vec4| (q.length() - 1.0).abs() <= 1e-2;
+    let unit = |q: &&DVec4| (q.length() - 1.0).abs() <= 1e-2;
     if channel == Channel::Rotation && keys().count() != keys().filter(unit).count() {
         return invalid(
             "unit quaternions (a length of 1, to 0.01)".to_owned(),

@@ -67,10 +67,7 @@ fn read(file: &Value, camera: Option<&str>) -> Result<CameraTrack, String> {
 
 fn check(track: &CameraTrack, time_s: f64, eye: Vec3, forward: Vec3) {
     let pose = track.pose(time_s).unwrap();
-    let (at, ahead) = (
-        Vec3::from(pose.translation),
-        Vec3::from(-pose.matrix3.z_axis),
-    );
+    let (at, ahead) = (pose.translation.as_vec3(), -pose.matrix3.z_axis.as_vec3());
     assert!((at - eye).length() < 1e-5, "{time_s}: {at} {eye}");
     assert!(
         (ahead - forward).length() < 1e-5,

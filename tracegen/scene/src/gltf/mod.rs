@@ -17,19 +17,23 @@ mod meshes;
 mod nodes;
 #[cfg(test)]
 mod tests;
+mod transforms;
 
 use super::files::{Origin, read_file, read_start};
+use super::origin;
 use super::uri::{self, Uri};
 use super::warnings::Warnings;
 use super::{Instance, LoadOptions, Loaded, Scene, SceneError};
 use accessors::Buffers;
 pub(crate) use animation::camera_track;
+use glam::DAffine3;
 use gltf::binary::Glb;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{Path as JsonPath, Root};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
+use transforms::Local;
 
 /// Loads a `.gltf` or `.glb` file.
 ///
@@ -39,19 +43,21 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let origin = Origin::new(path);
     let bytes = read_file(path, "scene", u64::MAX)?;
     let mut warnings = Warnings::default();
-    let (document, blob) = parse(&origin, &bytes, &mut warnings)?;
+    let Parsed {
+        document,
+        transforms,
+        blob,
+    } = parse(&origin, &bytes, &mut warnings)?;
     let json_bytes = bytes.len();
     drop(bytes);
     let root = document.as_json();
     let buffers = read_buffers(&origin, root, blob, &mut warnings)?;
     let buffers = Buffers::new(root, buffers, &origin, json_bytes);
 
-    let placed = nodes::walk(root, &origin, &mut warnings)?;
-    let mut scene = Scene {
-        cameras: placed.cameras,
-        lights: placed.lights,
-        ..Scene::default()
-    };
+    let placed = nodes::walk(root, &transforms, &origin, &mut warnings)?;
+    let mut scene = Scene::default();
+    // Meshes with their places in the world.
+    let mut in_world: Vec<(usize, DAffine3)> = Vec::new();
 
     let mut materials = materials::Table::new(&document, &buffers, &origin, options);
     // The scene's meshes of each glTF mesh (one a primitive), filled on first use.
@@ -71,10 +77,17 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
         buffers.spend::<Instance>(primitives.len() as u64, || {
             format!("instances of meshes[{mesh}]")
         })?;
-        scene
-            .instances
-            .extend(primitives.map(|mesh| Instance { mesh, transform }));
+        in_world.extend(primitives.map(|mesh| (mesh, transform)));
     }
+    (scene.origin, scene.instances) = origin::place(&mut scene.meshes, &in_world);
+    let transform = |(node, transform)| (node, origin::relative_transform(transform, scene.origin));
+    let (cameras, lights) = (placed.cameras.into_iter(), placed.lights.into_iter());
+    scene.cameras = (cameras.map(transform))
+        .filter_map(|(node, transform)| nodes::camera(root, node, transform, &mut warnings))
+        .collect();
+    scene.lights = (lights.map(transform))
+        .filter_map(|(node, transform)| nodes::light(root, node, transform, &mut warnings))
+        .collect();
     warnings.append(materials.warnings);
     scene.images = materials.requests.images(&origin)?;
     scene.materials = materials.materials;
@@ -84,12 +97,17 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     })
 }
 
+/// A file without its buffers.
+struct Parsed {
+    document: gltf::Document,
+    /// Where its nodes stand.
+    transforms: Vec<Local>,
+    /// The GLB's BIN chunk.
+    blob: Option<Vec<u8>>,
+}
+
 /// Parses the container and the JSON and checks every index.
-fn parse(
-    origin: &Origin,
-    bytes: &[u8],
-    warnings: &mut Warnings,
-) -> Result<(gltf::Document, Option<Vec<u8>>), SceneError> {
+fn parse(origin: &Origin, bytes: &[u8], warnings: &mut Warnings) -> Result<Parsed, SceneError> {
     let (json, blob) = if bytes.starts_with(b"glTF") {
         let length = bytes.get(8..12).and_then(|b| b.try_into().ok());
         let length = length.map_or(0, u32::from_le_bytes) as usize;
@@ -111,10 +129,11 @@ fn parse(
     features::check(json, origin, warnings)?;
     let root = Root::from_slice(json).map_err(|e| features::not_gltf(origin, &e))?;
     validate(origin, &root)?;
-    Ok((
-        gltf::Document::from_json_without_validation(root),
-        blob.map(Cow::into_owned),
-    ))
+    Ok(Parsed {
+        transforms: transforms::read(json, origin)?,
+        document: gltf::Document::from_json_without_validation(root),
+        blob: blob.map(Cow::into_owned),
+    })
 }
 
 fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {

@@ -1,9 +1,10 @@
 //! The node graph: where meshes, cameras and lights are in the world.
 
+use super::transforms::Local;
 use crate::files::Origin;
 use crate::warnings::Warnings;
 use crate::{Camera, Light, SceneError};
-use glam::{Affine3A, Mat4, Quat, Vec3};
+use glam::{Affine3A, DAffine3, Vec3};
 use gltf::json::Root;
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Type as LightType};
 use gltf::json::scene::Node;
@@ -12,18 +13,25 @@ use gltf::json::validation::Checked;
 /// Far plane of a camera whose projection is infinite, metres.
 const DEFAULT_FAR_M: f32 = 1000.0;
 
-/// What the nodes place, in depth-first order.
+/// From here on a step of single precision is a fair part of a millimetre: of a camera's direction
+/// if its target is a metre ahead.
+const FAR_OUT: f32 = 1024.0;
+
+/// What the nodes place, in depth-first order, with transforms to the world.
 #[derive(Default)]
 pub(super) struct Placed {
-    /// glTF mesh and object-to-world transform.
-    pub meshes: Vec<(usize, Affine3A)>,
-    pub cameras: Vec<Camera>,
-    pub lights: Vec<Light>,
+    /// glTF meshes.
+    pub meshes: Vec<(usize, DAffine3)>,
+    /// Nodes with a camera.
+    pub cameras: Vec<(usize, DAffine3)>,
+    /// Nodes with a light.
+    pub lights: Vec<(usize, DAffine3)>,
 }
 
 /// Visits the default scene (the first one, or every root node, where the file names none).
 pub(super) fn walk(
     root: &Root,
+    transforms: &[Local],
     origin: &Origin,
     warnings: &mut Warnings,
 ) -> Result<Placed, SceneError> {
@@ -35,10 +43,10 @@ pub(super) fn walk(
     let mut placed = Placed::default();
     let mut seen = vec![false; root.nodes.len()];
     // An explicit stack: a long chain of nodes must not overflow ours.
-    let mut stack: Vec<(usize, Affine3A)> = roots
+    let mut stack: Vec<(usize, DAffine3)> = roots
         .into_iter()
         .rev()
-        .map(|node| (node, Affine3A::IDENTITY))
+        .map(|node| (node, DAffine3::IDENTITY))
         .collect();
     while let Some((index, parent)) = stack.pop() {
         let node = &root.nodes[index];
@@ -49,8 +57,9 @@ pub(super) fn walk(
                 "a cycle or a node with two parents",
             ));
         }
-        let transform = parent * local_transform(node);
-        if !transform.is_finite() {
+        let transform = parent * transforms[index].transform();
+        let rounded = transform.as_affine3a();
+        if !rounded.is_finite() {
             return Err(origin.invalid(
                 format!("nodes[{index}]"),
                 "a finite transform",
@@ -59,7 +68,7 @@ pub(super) fn walk(
         }
         if let Some(mesh) = &node.mesh {
             // Neither 0 nor so small or large that normals could not be transformed.
-            if !transform.matrix3.determinant().is_normal() {
+            if !rounded.matrix3.determinant().is_normal() {
                 warnings.count("no scale", || {
                     format!("nodes[{index}] is scaled to nothing or beyond measure; skipped")
                 });
@@ -67,11 +76,15 @@ pub(super) fn walk(
                 placed.meshes.push((mesh.value(), transform));
             }
         }
-        if let Some(camera) = camera(root, node, index, transform, warnings) {
-            placed.cameras.push(camera);
+        if node.camera.is_some() {
+            placed.cameras.push((index, transform));
         }
-        if let Some(light) = light(root, node, index, transform, warnings) {
-            placed.lights.push(light);
+        if node
+            .extensions
+            .as_ref()
+            .is_some_and(|e| e.khr_lights_punctual.is_some())
+        {
+            placed.lights.push((index, transform));
         }
         let children = node.children.iter().flatten().rev();
         stack.extend(children.map(|child| (child.value(), transform)));
@@ -87,31 +100,6 @@ fn parentless(root: &Root) -> Vec<usize> {
     (0..root.nodes.len()).filter(|&n| !is_child[n]).collect()
 }
 
-pub(super) fn local_transform(node: &Node) -> Affine3A {
-    if let Some(matrix) = &node.matrix {
-        return Affine3A::from_mat4(Mat4::from_cols_array(matrix));
-    }
-    let (translation, rotation, scale) = parts(node);
-    Affine3A::from_scale_rotation_translation(scale, rotation, translation)
-}
-
-/// Translation, rotation and scale of a node without a matrix.
-pub(super) fn parts(node: &Node) -> (Vec3, Quat, Vec3) {
-    let rotation = node.rotation.map_or(Quat::IDENTITY, |q| {
-        let q = Quat::from_array(q.0);
-        if q.length_squared() > 0.0 {
-            q.normalize()
-        } else {
-            Quat::IDENTITY
-        }
-    });
-    (
-        node.translation.map_or(Vec3::ZERO, Vec3::from),
-        rotation,
-        node.scale.map_or(Vec3::ONE, Vec3::from),
-    )
-}
-
 /// The name of a camera's node, or else the camera's own.
 pub(super) fn camera_name(node: &Node, camera: &gltf::json::Camera, index: usize) -> String {
     [&node.name, &camera.name]
@@ -122,14 +110,15 @@ pub(super) fn camera_name(node: &Node, camera: &gltf::json::Camera, index: usize
         .unwrap_or_else(|| format!("camera-{index}"))
 }
 
-/// A camera node looks along its -z; the target is one metre ahead.
-fn camera(
+/// A camera node looks along its -z; the target is one metre ahead, or further for an eye so far
+/// out that a metre has few steps there.
+pub(super) fn camera(
     root: &Root,
-    node: &Node,
     index: usize,
     transform: Affine3A,
     warnings: &mut Warnings,
 ) -> Option<Camera> {
+    let node = &root.nodes[index];
     let camera = root.cameras.get(node.camera?.value())?;
     let name = camera_name(node, camera, index);
     let Some(perspective) = &camera.perspective else {
@@ -147,6 +136,8 @@ fn camera(
         });
         return None;
     }
+    let out = eye.abs().max_element();
+    let ahead = if out > FAR_OUT { out } else { 1.0 };
     let (mut near, mut far) = (perspective.znear, perspective.zfar.unwrap_or(DEFAULT_FAR_M));
     if !(near > 0.0 && far > near && far.is_finite()) {
         warnings.count("planes", || {
@@ -159,7 +150,7 @@ fn camera(
     Some(Camera {
         name,
         eye,
-        target: eye + forward,
+        target: eye + forward * ahead,
         up,
         vfov_deg: perspective.yfov.to_degrees(),
         near,
@@ -168,14 +159,17 @@ fn camera(
 }
 
 /// Punctual lights with their photometric intensity as it stands; a spot light lights all round.
-fn light(
+pub(super) fn light(
     root: &Root,
-    node: &Node,
     index: usize,
     transform: Affine3A,
     warnings: &mut Warnings,
 ) -> Option<Light> {
-    let reference = node.extensions.as_ref()?.khr_lights_punctual.as_ref()?;
+    let reference = root.nodes[index]
+        .extensions
+        .as_ref()?
+        .khr_lights_punctual
+        .as_ref()?;
     let light: &JsonLight = root.get(reference.light)?;
     let color = Vec3::from(light.color) * light.intensity;
     if !color.is_finite() || color.min_element() < 0.0 {

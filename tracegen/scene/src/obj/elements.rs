@@ -3,7 +3,8 @@
 use super::statements::{Statement, for_each};
 use crate::error::SceneError;
 use crate::files::{Origin, shown};
-use glam::{Vec2, Vec3, Vec4};
+use crate::origin;
+use glam::{DVec3, DVec4, Vec2, Vec3, Vec4};
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -43,7 +44,9 @@ pub(super) struct Run {
 /// What an OBJ file holds.
 #[derive(Debug, Default)]
 pub(super) struct Elements {
-    pub positions: Vec<Vec3>,
+    positions: Vec<DVec3>,
+    /// World position that [`Self::position`] is relative to.
+    pub origin: DVec3,
     /// sRGB colours with alpha of the first positions; NaN for what the file leaves out.
     pub colors: Vec<Vec4>,
     /// True where the file's colours go from 0 to 255; `colors` goes to 1 all the same.
@@ -67,7 +70,7 @@ impl Elements {
     ///
     /// # Errors
     /// Numbers and indices that are none or point outside the file, with their line.
-    pub fn read(text: &str, origin: &Origin) -> Result<Self, SceneError> {
+    pub fn read(text: &str, file: &Origin) -> Result<Self, SceneError> {
         let mut elements = Self::default();
         elements.runs.push(Run {
             object: UNNAMED.into(),
@@ -75,15 +78,25 @@ impl Elements {
             material: None,
             faces: 0..0,
         });
-        for_each(text, |statement| elements.add(&statement, origin))?;
+        for_each(text, |statement| elements.add(&statement, file))?;
         elements.finish_run();
-        elements.check(origin)?;
+        elements.check(file)?;
+        let used = elements
+            .corners
+            .iter()
+            .map(|c| elements.positions[c.position as usize]);
+        elements.origin = origin::of(origin::bounds(used));
         elements.colors_of_bytes =
             (elements.colors.iter()).any(|c| c.to_array().iter().any(|&v| v > 1.0));
         if elements.colors_of_bytes {
             elements.colors.iter_mut().for_each(|c| *c /= 255.0);
         }
         Ok(elements)
+    }
+
+    /// A position by its number.
+    pub fn position(&self, index: u32) -> Vec3 {
+        origin::relative(self.positions[index as usize], self.origin)
     }
 
     /// The corners of a face, at least three.
@@ -99,11 +112,11 @@ impl Elements {
             "vt" => {
                 let uv = numbers(statement, origin, 1)?;
                 let v = uv.get(1).copied().unwrap_or_default();
-                self.uvs.push(Vec2::new(uv[0], v));
+                self.uvs.push(Vec2::new(uv[0] as f32, v as f32));
             }
             "vn" => {
                 let normal = numbers(statement, origin, 3)?;
-                self.normals.push(Vec3::from_slice(&normal));
+                self.normals.push(DVec3::from_slice(&normal).as_vec3());
             }
             "f" | "fo" => self.add_face(statement, origin)?,
             "o" | "g" => {
@@ -138,14 +151,15 @@ impl Elements {
         origin: &Origin,
     ) -> Result<(), SceneError> {
         let v = numbers(statement, origin, 3)?;
-        let mut position = Vec3::from_slice(&v);
+        let mut position = DVec3::from_slice(&v);
         match v[3..] {
             [] => {}
             [weight] if weight != 0.0 => position /= weight,
             [red, green, blue, ref alpha @ ..] => {
-                let alpha = alpha.first().copied().unwrap_or(f32::NAN);
+                let alpha = alpha.first().copied().unwrap_or(f64::NAN);
                 self.colors.resize(self.positions.len(), Vec4::NAN);
-                self.colors.push(Vec4::new(red, green, blue, alpha));
+                self.colors
+                    .push(DVec4::new(red, green, blue, alpha).as_vec4());
             }
             _ => {
                 return Err(origin.invalid(
@@ -236,7 +250,7 @@ impl Elements {
                     }
                 }
                 let position = self.positions[corner.position as usize];
-                if !position.is_finite() {
+                if !position.as_vec3().is_finite() {
                     return Err(origin.invalid(
                         format!("line {line}, f, v number {}", corner.position + 1),
                         "a finite position",
@@ -278,7 +292,7 @@ fn numbers(
     statement: &Statement<'_>,
     origin: &Origin,
     at_least: usize,
-) -> Result<Vec<f32>, SceneError> {
+) -> Result<Vec<f64>, SceneError> {
     let invalid = |found: String| {
         let place = format!("line {}, {}", statement.line, statement.keyword);
         origin.invalid(place, format!("at least {at_least} numbers"), found)

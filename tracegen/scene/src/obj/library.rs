@@ -3,7 +3,7 @@
 use super::statements::{Statement, for_each, number, without_comment};
 use crate::files::Origin;
 use crate::warnings::Warnings;
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::convert::Infallible;
 
 /// A material as the library describes it; `None` for what it leaves out.
@@ -111,18 +111,21 @@ impl Entry {
 /// Three numbers, or one for grey.
 fn color(statement: &Statement<'_>) -> Result<Vec3, &'static str> {
     let color = match statement.numbers().as_deref() {
-        Ok([grey]) => Some(Vec3::splat(*grey)),
-        Ok([red, green, blue, ..]) => Some(Vec3::new(*red, *green, *blue)),
+        Ok([grey]) => Some(DVec3::splat(*grey)),
+        Ok([red, green, blue, ..]) => Some(DVec3::new(*red, *green, *blue)),
         _ => None,
     };
-    (color.filter(|color| color.is_finite()))
-        .ok_or("1 or 3 numbers (spectral files and CIE XYZ are not read)")
+    (color
+        .map(|color| color.as_vec3())
+        .filter(|color| color.is_finite()))
+    .ok_or("1 or 3 numbers (spectral files and CIE XYZ are not read)")
 }
 
 /// One number, of which `d -halo 0.5` has an option before it.
 fn scalar(statement: &Statement<'_>) -> Result<f32, &'static str> {
     (statement.words().find(|word| *word != "-halo"))
         .and_then(number)
+        .map(|value| value as f32)
         .filter(|value| value.is_finite())
         .ok_or("a number")
 }
@@ -148,7 +151,7 @@ fn map(statement: &Statement<'_>) -> Result<Map, &'static str> {
         };
         let (values, after) = values(after, least, most).ok_or("values of the option")?;
         let numbers: Vec<f32> = (values.iter())
-            .map(|value| number(value).filter(|n| n.is_finite()))
+            .map(|value| number(value).map(|n| n as f32).filter(|n| n.is_finite()))
             .map(Option::unwrap_or_default)
             .collect();
         let pair = |default| Vec2::new(numbers[0], *numbers.get(1).unwrap_or(&default));

@@ -61,7 +61,7 @@ impl<'a> Part<'a> {
         }
         let polygon: Vec<Vec3> = corners
             .iter()
-            .map(|c| self.elements.positions[c.position as usize])
+            .map(|c| self.elements.position(c.position))
             .collect();
         for triangle in triangulate(&polygon) {
             for i in triangle {
@@ -88,7 +88,7 @@ impl<'a> Part<'a> {
         } = self;
         let at = |index: u32| index as usize;
         let positions: Vec<Vec3> = (vertices.iter())
-            .map(|c| elements.positions[at(c.position)])
+            .map(|c| elements.position(c.position))
             .collect();
         let uv0: Vec<Vec2> = (vertices.iter())
             .map(|c| match c.uv {

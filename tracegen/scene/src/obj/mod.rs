@@ -39,7 +39,10 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
 
     let mut lookup = Lookup::default();
     let mut requests = Requests::default();
-    let mut scene = Scene::default();
+    let mut scene = Scene {
+        origin: elements.origin,
+        ..Scene::default()
+    };
     // The last material of a name counts.
     let mut by_name: HashMap<String, usize> = HashMap::new();
     // Names may hold ` #`, which may as well begin a comment.

@@ -43,7 +43,7 @@ impl Statement<'_> {
     }
 
     /// The numbers before any comment; the word that is none is the error.
-    pub fn numbers(&self) -> Result<Vec<f32>, &str> {
+    pub fn numbers(&self) -> Result<Vec<f64>, &str> {
         self.words().map(|w| number(w).ok_or(w)).collect()
     }
 }
@@ -63,11 +63,11 @@ fn continued(line: &str) -> Option<&str> {
 }
 
 /// A number, with the not-a-numbers that C libraries print.
-pub(super) fn number(word: &str) -> Option<f32> {
+pub(super) fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| {
         let lower = word.to_ascii_lowercase();
         let not_a_number = ["#ind", "#qnan", "#snan", "nan("];
-        (not_a_number.iter().any(|n| lower.contains(n))).then_some(f32::NAN)
+        (not_a_number.iter().any(|n| lower.contains(n))).then_some(f64::NAN)
     })
 }
 

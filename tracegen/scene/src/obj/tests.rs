@@ -2,7 +2,7 @@
 
 use crate::{AlphaMode, LoadOptions, Loaded, SceneError, TextureRef, load_file};
 use formats::texture::Wrap;
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::path::Path;
 
 const QUAD: &str = "mtllib a.mtl\no quad\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
@@ -40,6 +40,28 @@ fn a_quad_becomes_two_triangles_with_v_turned_over() {
         .unwrap();
     assert_eq!(mesh.uv0[at], Vec2::new(0.0, 1.0));
     assert_eq!(scene.materials[0].base_color.y, 0.25);
+}
+
+#[test]
+fn positions_far_out_keep_the_digits_that_the_file_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |far: f64| {
+        let point = |x: f64, y: f64| format!("v {} {} {far}\n", far + x, y - 2.0 * far);
+        let corners = [[-1.0, 0.0], [0.75, 0.0], [0.5, 1.0 / 1024.0]];
+        let corners = corners.map(|[x, y]| point(x, y)).concat();
+        // A point that no face uses says nothing of where the scene is.
+        let text = format!("{corners}v 1e20 0 0\nf 1 2 3\n");
+        load(folder.path(), &text, None).unwrap().scene
+    };
+    let near = at(0.0);
+    assert_eq!(near.origin, DVec3::ZERO);
+    for far in [1e3, 1e5, 1e6, 1e7] {
+        let scene = at(far);
+        assert_eq!(scene.origin, DVec3::new(far, -2.0 * far, far));
+        assert_eq!(scene.meshes[0].positions, near.meshes[0].positions, "{far}");
+        assert_eq!(scene.meshes[0].normals, near.meshes[0].normals);
+        assert_eq!(scene.cameras, near.cameras);
+    }
 }
 
 #[test]

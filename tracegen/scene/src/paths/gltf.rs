@@ -3,7 +3,7 @@
 use super::keys::bracket;
 use crate::SceneError;
 use crate::files::Origin;
-use glam::{Affine3A, Mat3, Quat, Vec3, Vec4};
+use glam::{DAffine3, DMat3, DQuat, DVec3, DVec4};
 use std::path::{Path, PathBuf};
 
 /// How values between keys come about.
@@ -24,7 +24,7 @@ pub(crate) struct Curve {
     /// Seconds, ascending; at least one.
     pub times_s: Vec<f64>,
     /// One a key, three with [`Interpolation::Cubic`].
-    pub values: Vec<Vec4>,
+    pub values: Vec<DVec4>,
 }
 
 /// The property that a curve moves.
@@ -39,9 +39,9 @@ pub(crate) enum Channel {
 #[derive(Clone, Debug)]
 pub struct Joint {
     /// Its transform where nothing moves it.
-    pub(crate) rest: Affine3A,
+    pub(crate) rest: DAffine3,
     /// Translation, rotation and scale where nothing moves them.
-    pub(crate) parts: (Vec3, Quat, Vec3),
+    pub(crate) parts: (DVec3, DQuat, DVec3),
     pub(crate) curves: Vec<(Channel, Curve)>,
 }
 
@@ -50,6 +50,8 @@ pub struct Joint {
 pub struct CameraTrack {
     pub(crate) file: PathBuf,
     pub(crate) camera: String,
+    /// What poses are relative to.
+    pub(crate) origin: DVec3,
     /// From the root down to the camera's node.
     pub(crate) joints: Vec<Joint>,
     /// First and last key of all curves, seconds.
@@ -57,9 +59,8 @@ pub struct CameraTrack {
 }
 
 impl Curve {
-    fn at(&self, time_s: f64, is_rotation: bool) -> Vec4 {
+    fn at(&self, time_s: f64, is_rotation: bool) -> DVec4 {
         let (key, t) = bracket(&self.times_s, time_s);
-        let t32 = t as f32;
         let last = self.times_s.len() - 1;
         let next = (key + 1).min(last);
         match self.interpolation {
@@ -67,20 +68,20 @@ impl Curve {
             Interpolation::Linear => {
                 let (a, b) = (self.values[key], self.values[next]);
                 if is_rotation {
-                    let (a, b) = (Quat::from_vec4(a), Quat::from_vec4(b));
-                    Vec4::from(a.slerp(b, t32))
+                    let (a, b) = (DQuat::from_vec4(a), DQuat::from_vec4(b));
+                    DVec4::from(a.slerp(b, t))
                 } else {
-                    a.lerp(b, t32)
+                    a.lerp(b, t)
                 }
             }
             Interpolation::Cubic => {
                 // glTF 2.0, appendix C: tangents are per second.
-                let step = (self.times_s[next] - self.times_s[key]) as f32;
+                let step = self.times_s[next] - self.times_s[key];
                 let (value, out) = (self.values[3 * key + 1], self.values[3 * key + 2]);
                 let (into, next) = (self.values[3 * next], self.values[3 * next + 1]);
-                let (t2, t3) = (t32 * t32, t32 * t32 * t32);
+                let (t2, t3) = (t * t, t * t * t);
                 value * (2.0 * t3 - 3.0 * t2 + 1.0)
-                    + out * (step * (t3 - 2.0 * t2 + t32))
+                    + out * (step * (t3 - 2.0 * t2 + t))
                     + next * (3.0 * t2 - 2.0 * t3)
                     + into * (step * (t3 - t2))
             }
@@ -89,7 +90,7 @@ impl Curve {
 }
 
 impl Joint {
-    fn transform(&self, time_s: f64) -> Affine3A {
+    fn transform(&self, time_s: f64) -> DAffine3 {
         if self.curves.is_empty() {
             return self.rest;
         }
@@ -98,11 +99,11 @@ impl Joint {
             let value = curve.at(time_s, *channel == Channel::Rotation);
             match channel {
                 Channel::Translation => translation = value.truncate(),
-                Channel::Rotation => rotation = Quat::from_vec4(value.normalize_or(Vec4::W)),
+                Channel::Rotation => rotation = DQuat::from_vec4(value.normalize_or(DVec4::W)),
                 Channel::Scale => scale = value.truncate(),
             }
         }
-        Affine3A::from_scale_rotation_translation(scale, rotation, translation)
+        DAffine3::from_scale_rotation_translation(scale, rotation, translation)
     }
 }
 
@@ -123,15 +124,15 @@ impl CameraTrack {
     ///
     /// # Errors
     /// A camera that looks nowhere at that time, as one that is scaled to nothing.
-    pub fn pose(&self, time_s: f64) -> Result<Affine3A, SceneError> {
+    pub fn pose(&self, time_s: f64) -> Result<DAffine3, SceneError> {
         let time_s = self.span_s[0] + time_s;
-        let world = (self.joints.iter()).fold(Affine3A::IDENTITY, |parent, joint| {
+        let world = (self.joints.iter()).fold(DAffine3::IDENTITY, |parent, joint| {
             parent * joint.transform(time_s)
         });
-        let back = Vec3::from(world.matrix3.z_axis).normalize_or_zero();
-        let up = Vec3::from(world.matrix3.y_axis).normalize_or_zero();
+        let back = world.matrix3.z_axis.normalize_or_zero();
+        let up = world.matrix3.y_axis.normalize_or_zero();
         let right = up.cross(back);
-        if !world.is_finite() || right.length() < 1e-4 {
+        if !world.as_affine3a().is_finite() || right.length() < 1e-4 {
             return Err(Origin::new(&self.file).invalid(
                 format!("camera '{}' at {time_s} s", self.camera),
                 "a place and a direction",
@@ -139,10 +140,8 @@ impl CameraTrack {
             ));
         }
         let right = right.normalize();
-        let axes = Mat3::from_cols(right, back.cross(right), back);
-        Ok(Affine3A::from_mat3_translation(
-            axes,
-            world.translation.into(),
-        ))
+        let axes = DMat3::from_cols(right, back.cross(right), back);
+        let place = world.translation - self.origin;
+        Ok(DAffine3::from_mat3_translation(axes, place))
     }
 }

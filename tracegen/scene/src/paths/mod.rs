@@ -22,7 +22,7 @@ pub use poses::PoseTrack;
 use crate::cameras::head_pose;
 use crate::files::Origin;
 use crate::{Camera, SceneError};
-use glam::{Affine3A, DVec3, Mat3, Quat, Vec3};
+use glam::{Affine3A, DAffine3, DMat3, DVec3};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -160,6 +160,21 @@ impl HeadPath {
         }
     }
 
+    /// The same path for a scene whose coordinates are relative to `origin`.
+    #[must_use]
+    pub fn relative_to(mut self, origin: DVec3) -> Self {
+        match &mut self {
+            Self::Walk | Self::Head => {}
+            Self::Poses(track, _) => {
+                for (position, _) in &mut track.poses {
+                    *position -= origin;
+                }
+            }
+            Self::Gltf(track, _) => track.origin += origin,
+        }
+        self
+    }
+
     /// The head's poses (head to world, rigid) in the frames of `moments`, for a head that starts
     /// at `camera`.
     ///
@@ -178,13 +193,13 @@ impl HeadPath {
             Self::Poses(track, origin) => {
                 let start = align(track.pose(0.0), *origin, camera);
                 Ok(frames
-                    .map(|frame| start * track.pose(seconds(moments, frame)))
+                    .map(|frame| (start * track.pose(seconds(moments, frame))).as_affine3a())
                     .collect())
             }
             Self::Gltf(track, origin) => {
                 let start = align(track.pose(0.0)?, *origin, camera);
                 frames
-                    .map(|frame| Ok(start * track.pose(seconds(moments, frame))?))
+                    .map(|frame| Ok((start * track.pose(seconds(moments, frame))?).as_affine3a()))
                     .collect()
             }
         }
@@ -200,13 +215,17 @@ impl HeadPath {
             Self::Gltf(track, PathOrigin::World) => track.pose(0.0)?,
             _ => return Ok(camera.clone()),
         };
-        let axis = |v: glam::Vec3A| Vec3::from(v);
-        let eye = axis(first.translation);
+        let [eye, back, up] = [
+            first.translation,
+            first.matrix3.z_axis,
+            first.matrix3.y_axis,
+        ]
+        .map(|v| v.as_vec3());
         Ok(Camera {
             name: "path".into(),
             eye,
-            target: eye - axis(first.matrix3.z_axis),
-            up: axis(first.matrix3.y_axis),
+            target: eye - back,
+            up,
             ..camera.clone()
         })
     }
@@ -243,32 +262,26 @@ fn seconds(moments: &Moments, frame: u32) -> f64 {
 }
 
 /// What moves a path that starts at `first` to where it belongs.
-fn align(first: Affine3A, origin: PathOrigin, camera: &Camera) -> Affine3A {
+fn align(first: DAffine3, origin: PathOrigin, camera: &Camera) -> DAffine3 {
     if origin == PathOrigin::World {
-        return Affine3A::IDENTITY;
+        return DAffine3::IDENTITY;
     }
-    let wanted = head_pose(camera);
+    let wanted = head_pose(camera).as_daffine3();
     let turn = heading(&wanted) - heading(&first);
-    let turn = Mat3::from_rotation_y(turn);
-    let moved = turn * Vec3::from(first.translation);
-    Affine3A::from_mat3_translation(turn, Vec3::from(wanted.translation) - moved)
+    let turn = DMat3::from_rotation_y(turn);
+    DAffine3::from_mat3_translation(turn, wanted.translation - turn * first.translation)
 }
 
 /// Angle about +y from -z to where a pose looks, radians; a pose that looks straight up or down
 /// heads where the chin or the top of
 /// the head points.
-fn heading(pose: &Affine3A) -> f32 {
+fn heading(pose: &DAffine3) -> f64 {
     let back = pose.matrix3.z_axis;
-    let level = |v: glam::Vec3A| v.x.hypot(v.z);
+    let level = |v: DVec3| v.x.hypot(v.z);
     let back = if level(back) > 1e-3 {
         back
     } else {
         pose.matrix3.y_axis * -back.y.signum()
     };
     back.x.atan2(back.z)
-}
-
-/// A rigid pose.
-fn rigid(rotation: Quat, position: DVec3) -> Affine3A {
-    Affine3A::from_rotation_translation(rotation, position.as_vec3())
 }

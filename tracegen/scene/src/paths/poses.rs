@@ -1,10 +1,10 @@
 //! Recorded head poses.
 
 use super::keys::bracket;
-use super::{rigid, table};
+use super::table;
 use crate::SceneError;
 use crate::files::Origin;
-use glam::{Affine3A, DQuat, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 use std::path::{Path, PathBuf};
 
 /// The header of a file of poses. Position between the eyes in metres; the rotation, a unit
@@ -14,8 +14,8 @@ const COLUMNS: [&str; 8] = ["time_s", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw
 /// How far from 1 the length of a quaternion may be: six decimals are written far better.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Positions further out have steps of more than a decimetre in 32 bits.
-const MAX_POSITION_M: f64 = 1e6;
+/// Positions further out have steps of more than a tenth of a micrometre in 64 bits.
+const MAX_POSITION_M: f64 = 1e9;
 
 /// Head poses by time.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct PoseTrack {
     file: PathBuf,
     /// Seconds from the first pose, ascending.
     times_s: Vec<f64>,
-    poses: Vec<(DVec3, DQuat)>,
+    pub(super) poses: Vec<(DVec3, DQuat)>,
 }
 
 impl PoseTrack {
@@ -79,12 +79,12 @@ impl PoseTrack {
     /// The pose `time_s` after the first one: positions are interpolated linearly, rotations along
     /// the shorter arc.
     #[must_use]
-    pub fn pose(&self, time_s: f64) -> Affine3A {
+    pub fn pose(&self, time_s: f64) -> DAffine3 {
         let (key, t) = bracket(&self.times_s, time_s);
         let (position, rotation) = self.poses[key];
         let (next_position, next_rotation) = self.poses.get(key + 1).unwrap_or(&self.poses[key]);
-        rigid(
-            rotation.slerp(*next_rotation, t).as_quat().normalize(),
+        DAffine3::from_rotation_translation(
+            rotation.slerp(*next_rotation, t).normalize(),
             position.lerp(*next_position, t),
         )
     }

@@ -2,6 +2,7 @@
 
 use super::head::{PITCH, ROLL, YAW, sum};
 use super::*;
+use glam::{Mat3, Quat, Vec3};
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 fn camera() -> Camera {
@@ -191,6 +192,25 @@ fn a_path_from_the_camera_takes_its_place_and_heading_and_keeps_its_pitch() {
 }
 
 #[test]
+fn a_path_far_out_has_the_poses_of_one_at_zero_in_a_scene_that_is_as_far_out() {
+    let text = |far: f64| {
+        let row = |t: f64, x: f64| format!("{t},{},{},{far},0,0.6,0,0.8\n", far + x, far - 0.25);
+        format!("{HEADER}{}{}", row(0.0, 0.5), row(1.0, 0.75))
+    };
+    let moments = Moments {
+        frames: 0..5,
+        fps: 4.0,
+    };
+    for origin in [PathOrigin::World, PathOrigin::Camera] {
+        let [near, far] = [0.0, 1e7].map(|far| {
+            let path = open_csv(&text(far), origin).relative_to(DVec3::splat(far));
+            path.poses(&camera(), &moments).unwrap()
+        });
+        assert_eq!(near, far, "{origin:?}");
+    }
+}
+
+#[test]
 fn a_head_that_looks_straight_up_or_down_still_has_a_heading() {
     for (direction, up) in [(Vec3::Y, Vec3::Z), (Vec3::NEG_Y, Vec3::NEG_Z)] {
         // Both have bent away from looking along -z.
@@ -198,6 +218,7 @@ fn a_head_that_looks_straight_up_or_down_still_has_a_heading() {
             up,
             ..looking(Vec3::ZERO, direction)
         });
+        let pose = pose.as_daffine3();
         assert!(
             heading(&pose).abs() < 1e-5,
             "{direction}: {}",
@@ -205,7 +226,7 @@ fn a_head_that_looks_straight_up_or_down_still_has_a_heading() {
         );
     }
     let left = head_pose(&looking(Vec3::ZERO, Vec3::NEG_X));
-    assert!((heading(&left) - FRAC_PI_2).abs() < 1e-5);
+    assert!((heading(&left.as_daffine3()) - f64::from(FRAC_PI_2)).abs() < 1e-5);
 }
 
 #[test]
@@ -278,8 +299,8 @@ fn a_file_that_is_no_path_is_refused_with_line_and_column() {
             ["line 2, column time_s", "1000000000000", "1000"],
         ),
         (
-            format!("{HEADER}0,0,2e6,0,0,0,0,1\n"),
-            ["line 2, columns x_m to z_m", "1000000 m", "2000000"],
+            format!("{HEADER}0,0,2e9,0,0,0,0,1\n"),
+            ["line 2, columns x_m to z_m", "1000000000 m", "2000000000"],
         ),
         (
             format!("{HEADER}0,0,0,0,0,0,0,0\n"),

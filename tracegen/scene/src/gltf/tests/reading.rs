@@ -1,6 +1,7 @@
 //! What is read.
 
 use super::*;
+use glam::DVec3;
 
 #[test]
 fn a_file_without_normals_camera_or_lights_gets_them() {
@@ -42,6 +43,42 @@ fn the_same_scene_comes_from_gltf_data_uris_and_glb() {
     let path = files.path("scene.glb");
     let scene = load_file(&path, &LoadOptions::ALL).unwrap().scene;
     assert_eq!(scene.meshes[0].positions, expected);
+}
+
+#[test]
+fn a_scene_far_out_has_the_coordinates_of_one_at_zero() {
+    let at = |far: f64| {
+        let json = with(
+            base(),
+            "/nodes",
+            json!([
+                {"children": [1, 2], "translation": [far, -far, 2.0 * far]},
+                {"mesh": 0, "translation": [0.1, 0.2, 0.3], "rotation": [0.0, 0.6, 0.0, 0.8]},
+                {"camera": 0, "translation": [0.0, 1.25, 3.0]}
+            ]),
+        );
+        let lens = json!([{"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}]);
+        let files = Files::new(&with(json, "/cameras", lens));
+        files.load().unwrap().scene
+    };
+    let near = at(0.0);
+    assert_eq!(near.origin, DVec3::ZERO);
+    for far in [1e5, 1e6, 1e7] {
+        let scene = at(far);
+        let moved = DVec3::new(far, -far, 2.0 * far);
+        let origin = scene.origin - moved;
+        // On a grid as wide as half of the scene: a metre.
+        assert_eq!(origin, origin.round());
+        let [a, b] = [&near, &scene].map(|scene| scene.instances[0].transform);
+        assert_eq!(a.matrix3, b.matrix3);
+        let same = |a: Vec3, b: Vec3| {
+            let b = b + origin.as_vec3();
+            assert!(a.abs_diff_eq(b, 1e-6), "{a} {b} at {far}");
+        };
+        same(a.translation.into(), b.translation.into());
+        same(near.cameras[0].eye, scene.cameras[0].eye);
+        same(near.cameras[0].target, scene.cameras[0].target);
+    }
 }
 
 #[test]

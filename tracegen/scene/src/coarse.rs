@@ -1,0 +1,43 @@
+//! Texture coordinates that single precision is too coarse for.
+
+use crate::{Mesh, Scene, TextureRef};
+use glam::Vec2;
+
+/// Steps of a coordinate may be this large, in texels: filtering weighs texels by 1/256 of one, and
+/// interpolation adds a few steps.
+const STEP_TEXELS: f32 = 1.0 / 16.0;
+
+/// What is too coarse in a scene, as a warning.
+pub(crate) fn warning(scene: &Scene) -> Option<String> {
+    let steps = (scene.meshes.iter()).map(|mesh| (largest_step(scene, mesh), mesh));
+    let coarse: Vec<_> = steps.filter(|(step, _)| *step > STEP_TEXELS).collect();
+    let (step, mesh) = coarse.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "texture coordinates of {} meshes are so large that they have steps of up to {step:.3} texels (mesh '{}'): \
+         their footprints are off by a few of these; take whole repeats from them",
+        coarse.len(),
+        mesh.name
+    ))
+}
+
+/// The largest step of a mesh's coordinates, in texels of the textures that they are for.
+fn largest_step(scene: &Scene, mesh: &Mesh) -> f32 {
+    let Some(material) = scene.materials.get(mesh.material) else {
+        return 0.0;
+    };
+    let largest = [&mesh.uv0, &mesh.uv1].map(|set| {
+        let abs = set.iter().map(|uv| uv.abs());
+        abs.fold(Vec2::ZERO, Vec2::max)
+    });
+    let step = |texture: &TextureRef| {
+        let [u, v] = largest[usize::from(texture.uv_set == 1)].to_array();
+        let size = scene.images.get(texture.image).map_or([0; 2], |i| i.size);
+        let texels = |row: [f32; 3], size: u32| {
+            (row[0].abs() * u + row[1].abs() * v + row[2].abs()) * size as f32
+        };
+        let [across, down] = texture.uv_transform;
+        texels(across, size[0]).max(texels(down, size[1])) * f32::EPSILON
+    };
+    let textures = material.textures();
+    textures.iter().flatten().map(step).fold(0.0, f32::max)
+}

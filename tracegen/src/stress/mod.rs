@@ -1,0 +1,153 @@
+//! Captures that try to break `tracegen raster`: each sweep drives one figure to where arithmetic
+//! ends, and holds the capture against a reference or against the same scene in an easy place.
+//!
+//! A point is in order where the error keeps its bound, or where the program says that it does not:
+//! by refusing (exit code 2) or by a warning. Anything else is a break.
+
+mod probe;
+mod report;
+mod shapes;
+mod sweeps;
+
+pub use report::Report;
+pub use sweeps::SWEEPS;
+
+use probe::{Capture, Probe};
+use serde::Serialize;
+use std::path::Path;
+
+/// A sweep: a file in [`sweeps`] and a row of [`SWEEPS`].
+pub struct Sweep {
+    /// Name on the command line and in the table.
+    pub name: &'static str,
+    /// What is driven, and what the error is measured against.
+    pub about: &'static str,
+    /// Bounds that its points have to keep.
+    bounds: Bounds,
+    run: fn(&mut Points<'_>) -> anyhow::Result<()>,
+}
+
+/// Largest errors that a sweep's points may have without saying so.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Bounds {
+    /// Fragments that only one of capture and reference has, percent of all.
+    pub fragments_pct: f64,
+    /// Distance of texture coordinates, texels.
+    pub uv_texels: f64,
+}
+
+/// How far a capture is from what it is held against.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Error {
+    /// Fragments (pixel and primitive) in either.
+    pub fragments: u64,
+    /// Those that only one has, percent.
+    pub fragments_pct: f64,
+    /// Largest distance of texture coordinates, texels; whole repeats do not count.
+    pub uv_texels: f64,
+}
+
+/// What became of a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// Captured, within the bounds.
+    Within,
+    /// Captured beyond the bounds, with a warning.
+    Warned,
+    /// Refused with exit code 2.
+    Refused,
+    /// Captured beyond the bounds without a word, or neither captured nor refused.
+    Broken,
+}
+
+/// A point of a sweep.
+#[derive(Clone, Debug, Serialize)]
+pub struct Point {
+    /// The figure's value.
+    pub at: String,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Its error, where there is a capture.
+    pub error: Option<Error>,
+    /// What the program said, its first warning or error.
+    pub said: Option<String>,
+}
+
+/// The points of a sweep as they are made.
+pub struct Points<'a> {
+    probe: &'a Probe<'a>,
+    bounds: Bounds,
+    points: Vec<Point>,
+}
+
+impl Points<'_> {
+    /// Captures a scene of the sweep's folder and adds the point.
+    fn add(
+        &mut self,
+        at: impl Into<String>,
+        capture: &Capture,
+        measure: impl FnOnce(&Probe<'_>) -> anyhow::Result<Error>,
+    ) -> anyhow::Result<()> {
+        let ran = self.probe.capture(capture)?;
+        let (outcome, error) = match ran.exit_code {
+            Some(0) => {
+                let error = measure(self.probe)?;
+                let within = error.fragments_pct <= self.bounds.fragments_pct
+                    && error.uv_texels <= self.bounds.uv_texels;
+                let outcome = match (within, &ran.said) {
+                    (true, _) => Outcome::Within,
+                    (false, Some(_)) => Outcome::Warned,
+                    (false, None) => Outcome::Broken,
+                };
+                (outcome, Some(error))
+            }
+            Some(2) if ran.said.is_some() => (Outcome::Refused, None),
+            _ => (Outcome::Broken, None),
+        };
+        self.points.push(Point {
+            at: at.into(),
+            outcome,
+            error,
+            said: ran.said,
+        });
+        Ok(())
+    }
+
+    /// As [`Self::add`], held against the reference in double precision.
+    fn add_against_reference(
+        &mut self,
+        at: impl Into<String>,
+        capture: &Capture,
+    ) -> anyhow::Result<()> {
+        self.add(at, capture, |probe| probe.against_reference(capture))
+    }
+}
+
+/// Runs the sweeps of these names (all where there are none); scratch files go into `folder`.
+///
+/// # Errors
+/// A folder that cannot be written, a program that cannot be started.
+pub fn run(
+    folder: &Path,
+    names: &[String],
+    mut progress: impl FnMut(&Sweep),
+) -> anyhow::Result<Report> {
+    let probe = Probe::new(folder)?;
+    let mut report = Report::default();
+    let chosen = |sweep: &&Sweep| names.is_empty() || names.iter().any(|name| name == sweep.name);
+    for sweep in SWEEPS.iter().filter(chosen) {
+        progress(sweep);
+        // What a sweep may replace.
+        probe.write("stress.png", shapes::checker([64, 64])?)?;
+        probe.write("stress.mtl", shapes::MATERIALS)?;
+        let mut points = Points {
+            probe: &probe,
+            bounds: sweep.bounds,
+            points: Vec::new(),
+        };
+        (sweep.run)(&mut points)?;
+        report.add(sweep, points.points);
+    }
+    Ok(report)
+}

@@ -1,0 +1,191 @@
+//! Captures by this very program, as a user runs it, and what they are held against.
+
+use super::Error;
+use crate::verify::compare::{FragmentKey, Lane, lanes};
+use crate::verify::reference;
+use anyhow::{Context, anyhow};
+use formats::textrace::{Textrace, Tile};
+use formats::view::Eye;
+use glam::DVec2;
+use raster::backend::{Fragments, View};
+use raster::draws::DrawList;
+use raster::lighting::Lighting;
+use scene::{LoadOptions, load_file};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use techniques::Layer;
+
+/// The views of a trace, left and right.
+type Views = [BTreeMap<FragmentKey, Lane>; 2];
+
+/// A scene and how it is captured.
+#[derive(Clone, Debug)]
+pub(super) struct Capture {
+    /// The scene's file.
+    pub scene: PathBuf,
+    /// Flags after `tracegen raster SCENE`.
+    pub flags: Vec<String>,
+}
+
+impl Capture {
+    /// Flags are separated by spaces.
+    pub fn new(scene: PathBuf, flags: &str) -> Self {
+        Self {
+            scene,
+            flags: flags.split_whitespace().map(str::to_owned).collect(),
+        }
+    }
+}
+
+/// What a run of the program did.
+pub(super) struct Ran {
+    /// `None` after a signal.
+    pub exit_code: Option<i32>,
+    /// Its first warning or error.
+    pub said: Option<String>,
+}
+
+/// Runs captures in a folder.
+pub(super) struct Probe<'a> {
+    folder: &'a Path,
+    program: PathBuf,
+}
+
+impl<'a> Probe<'a> {
+    pub fn new(folder: &'a Path) -> anyhow::Result<Self> {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make {}", folder.display()))?;
+        Ok(Self {
+            folder,
+            program: std::env::current_exe()?,
+        })
+    }
+
+    /// A file of the folder with this content.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> anyhow::Result<PathBuf> {
+        let path = self.folder.join(name);
+        std::fs::write(&path, content)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(path)
+    }
+
+    fn trace(&self) -> PathBuf {
+        self.folder.join("stress.textrace")
+    }
+
+    /// Captures; the trace of the capture before is gone.
+    pub fn capture(&self, capture: &Capture) -> anyhow::Result<Ran> {
+        let _ = std::fs::remove_file(self.trace());
+        let output = Command::new(&self.program)
+            .arg("raster")
+            .arg(&capture.scene)
+            .args(&capture.flags)
+            .args(["--no-plain", "--quiet", "-o"])
+            .arg(self.trace())
+            .output()?;
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let said =
+            (text.lines()).find(|line| ["warning:", "error:"].iter().any(|w| line.contains(w)));
+        let panicked = text.contains("panicked");
+        Ok(Ran {
+            exit_code: output.status.code().filter(|_| !panicked),
+            said: said.map(|line| line.replace(&format!("{}/", self.folder.display()), "")),
+        })
+    }
+
+    /// The fragments of the last capture.
+    pub fn views(&self) -> anyhow::Result<Views> {
+        let trace = Textrace::open(&self.trace())?;
+        let tables = trace.tables();
+        let mut views = Views::default();
+        for (pass, of) in tables.passes.iter().enumerate() {
+            let tiles = (0..of.tile_count())
+                .map(|index| {
+                    let mut tile = Tile::default();
+                    trace.decode_tile(pass, index as usize, &mut tile)?;
+                    Ok(([index % of.tiles[0], index / of.tiles[0]], tile))
+                })
+                .collect::<formats::Result<Vec<_>>>()?;
+            let tiles = tiles.iter().map(|(at, tile)| (*at, tile));
+            let eye = usize::from(of.eye == Some(Eye::Right));
+            views[eye] = lanes(&tables.draws, tiles).map_err(|e| anyhow!(e))?;
+        }
+        Ok(views)
+    }
+
+    /// The last capture against the brute-force rasteriser.
+    pub fn against_reference(&self, capture: &Capture) -> anyhow::Result<Error> {
+        let scene = load_file(&capture.scene, &LoadOptions::ALL)?.scene;
+        let draws = DrawList::new(&scene, 0)?;
+        let lighting = Lighting::new(&scene);
+        let trace = Textrace::open(&self.trace())?;
+        let meta = &trace.tables().meta;
+        let size_px = meta.hmd.eye_size_px;
+        let views = self.views()?;
+        let mut total = Totals::default();
+        for (number, eye) in [Eye::Left, Eye::Right].into_iter().enumerate() {
+            let layer = Layer::whole(eye, meta.frames[0].eyes[number], size_px);
+            let view = View {
+                target: number,
+                layer: &layer,
+                lighting: &lighting,
+                visible: &[],
+            };
+            let tested = Fragments::DepthTested;
+            let expected = reference::render(&scene, &draws, &view, size_px, &|_, _| true, tested);
+            let expected = (expected.iter()).map(|f| ((f.pixel, f.primitive), f.uv));
+            total.add(expected, &views[number]);
+        }
+        Ok(total.error())
+    }
+
+    /// The last capture against an earlier one of the same thing.
+    pub fn against(&self, expected: &Views) -> anyhow::Result<Error> {
+        let mut total = Totals::default();
+        for (expected, found) in expected.iter().zip(&self.views()?) {
+            total.add(expected.iter().map(|(key, lane)| (*key, lane.uv)), found);
+        }
+        Ok(total.error())
+    }
+}
+
+/// Sums over views.
+#[derive(Default)]
+struct Totals {
+    both: u64,
+    one: u64,
+    uv_texels: f64,
+}
+
+impl Totals {
+    fn add(
+        &mut self,
+        expected: impl Iterator<Item = (FragmentKey, DVec2)>,
+        found: &BTreeMap<FragmentKey, Lane>,
+    ) {
+        let mut both = 0;
+        for (key, uv) in expected {
+            let Some(lane) = found.get(&key) else {
+                self.one += 1;
+                continue;
+            };
+            both += 1;
+            let off = uv - lane.uv;
+            // A trace leaves out multiples of two repeats where numbers get large.
+            let off = off - 2.0 * (off / 2.0).round();
+            self.uv_texels = self.uv_texels.max((off * lane.extent).length());
+        }
+        self.one += found.len() as u64 - both;
+        self.both += both;
+    }
+
+    fn error(&self) -> Error {
+        let fragments = self.both + self.one;
+        Error {
+            fragments,
+            fragments_pct: 100.0 * self.one as f64 / fragments.max(1) as f64,
+            uv_texels: self.uv_texels,
+        }
+    }
+}
