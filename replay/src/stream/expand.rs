@@ -180,7 +180,7 @@ impl<'a> Expander<'a> {
         } = work;
         lines.begin(self.bins.place(at));
         let first_cell = self.bins.first_cell(at);
-        let mut accesses = TileAccesses::default();
+        let mut sums = TileSums::default();
         for run in &tile.runs {
             if let Some(strip) = strip {
                 strip.begin();
@@ -189,7 +189,7 @@ impl<'a> Expander<'a> {
                 let lanes = feed::lanes(records);
                 counts.quads += 1;
                 counts.lanes += u64::from(lanes);
-                accesses.lanes = accesses.lanes.wrapping_add(lanes);
+                sums.lanes += u64::from(lanes);
                 let mut footprints = 0;
                 self.footprints
                     .for_quad(run.draw, records, scratch, |sample, bundle| {
@@ -201,8 +201,9 @@ impl<'a> Expander<'a> {
                         cell.footprints += u64::from(bundle.count);
                         cell.line_lookups += u64::from(lookups);
                         footprints += u32::from(bundle.count);
+                        sums.line_lookups += u64::from(lookups);
                     });
-                accesses.footprints = accesses.footprints.wrapping_add(footprints);
+                sums.footprints += u64::from(footprints);
                 if let Some(distinct) = distinct {
                     let start = lines.quads.last().map_or(0, |quad| quad.end as usize);
                     let (lines_of, tags) = (&lines.lines[start..], &lines.tags[start..]);
@@ -218,8 +219,9 @@ impl<'a> Expander<'a> {
                 primitive: run.primitive,
                 end: lines.quads.len() as u32,
             });
+            sums.checked(at)?;
         }
-        Ok(accesses)
+        sums.checked(at)
     }
 
     /// Appends the footprints of a bundle; the sum of their [`access_hash`] and of their lines.
@@ -266,6 +268,33 @@ impl<'a> Expander<'a> {
     }
 }
 
+/// What a tile's accesses come to.
+#[derive(Clone, Copy, Debug, Default)]
+struct TileSums {
+    lanes: u64,
+    footprints: u64,
+    line_lookups: u64,
+}
+
+impl TileSums {
+    /// As what tiles count in. Whatever else is counted or listed by tile, footprints and lines that miss,
+    /// is no more than its line look-ups.
+    fn checked(self, at: TileRef) -> Result<TileAccesses, StreamError> {
+        let fit = |name, count: u64| {
+            u32::try_from(count).map_err(|_| StreamError::Tile {
+                pass: at.pass,
+                tile: at.tile,
+                message: format!("expected fewer than 2^32 {name}, found {count}"),
+            })
+        };
+        fit("line look-ups", self.line_lookups)?;
+        Ok(TileAccesses {
+            lanes: fit("lanes", self.lanes)?,
+            footprints: fit("footprints", self.footprints)?,
+        })
+    }
+}
+
 /// Hash of one line access; accesses are summed, so their order does not matter.
 #[inline(always)]
 fn access_hash(line: u32) -> u64 {
@@ -301,5 +330,49 @@ impl Drop for Frame<'_> {
     fn drop(&mut self) {
         let bytes = self.kept.iter().flatten().flatten().map(TileLines::bytes);
         self.memory.give_back(bytes.sum());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tile_whose_counters_would_wrap_is_refused() {
+        let at = TileRef { pass: 3, tile: 17 };
+        let most = u64::from(u32::MAX);
+        let full = TileSums {
+            lanes: most,
+            footprints: most,
+            line_lookups: most,
+        };
+        let accesses = full.checked(at).unwrap();
+        assert_eq!((accesses.lanes, accesses.footprints), (u32::MAX, u32::MAX));
+        let over = [
+            TileSums {
+                lanes: most + 1,
+                ..full
+            },
+            TileSums {
+                footprints: most + 1,
+                ..full
+            },
+            TileSums {
+                line_lookups: most + 1,
+                ..full
+            },
+        ];
+        for (sums, name) in over
+            .into_iter()
+            .zip(["lanes", "footprints", "line look-ups"])
+        {
+            let error = sums.checked(at).unwrap_err().to_string();
+            assert!(
+                error.contains(&format!(
+                    "expected fewer than 2^32 {name}, found 4294967296"
+                )) && error.contains("17"),
+                "{error}"
+            );
+        }
     }
 }
