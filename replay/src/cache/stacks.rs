@@ -127,7 +127,11 @@ fn to_front_of<const N: usize>(stack: &mut [u32; N], line: u32) -> u8 {
         depth = depth.min(here);
     }
     for at in 1..N {
-        stack[at] = if at as u32 <= depth { old[at - 1] } else { old[at] };
+        stack[at] = if at as u32 <= depth {
+            old[at - 1]
+        } else {
+            old[at]
+        };
     }
     stack[0] = line;
     depth as u8

@@ -53,6 +53,7 @@ pub struct Expander<'a> {
     bins: Bins,
     touched: LineSet,
     distinct: bool,
+    all: bool,
     /// Fewest sets of the caches that only what they notice is listed for.
     sets: Option<u32>,
 }
@@ -83,6 +84,7 @@ impl<'a> Expander<'a> {
             bins: Bins::new(tables)?,
             source,
             distinct: false,
+            all: true,
             sets: None,
         })
     }
@@ -91,6 +93,16 @@ impl<'a> Expander<'a> {
     #[must_use]
     pub fn with_distinct_lines(self, distinct: bool) -> Self {
         Self { distinct, ..self }
+    }
+
+    /// Lists nothing but each quad's distinct lines.
+    #[must_use]
+    pub fn only_distinct_lines(self) -> Self {
+        Self {
+            distinct: true,
+            all: false,
+            ..self
+        }
     }
 
     /// Lists only what caches of at least so many sets, a power of two, may notice if they have no latencies
@@ -208,6 +220,10 @@ impl<'a> Expander<'a> {
                     let start = lines.quads.last().map_or(0, |quad| quad.end as usize);
                     let (lines_of, tags) = (&lines.lines[start..], &lines.tags[start..]);
                     distinct.list(lines_of, tags, &mut lines.distinct, &mut lines.uses);
+                }
+                if !self.all {
+                    lines.lines.clear();
+                    lines.tags.clear();
                 }
                 lines.quads.push(QuadEnd {
                     end: lines.lines.len() as u32,
