@@ -1,6 +1,6 @@
 //! Many configurations of one trace: who shares what.
 //!
-//! Configurations of one sampling and layout are a *stream*: frame by frame its lines are expanded
+//! Configurations of one sampling, layout and mode are a *stream*: frame by frame its lines are expanded
 //! once and read by all. Of those, LRU caches without latencies that see the same order share a
 //! *pass* ([`OnePass`]); every other configuration (another policy, timed) is a pass of its own.
 
@@ -159,7 +159,7 @@ fn grouped(
     groups
 }
 
-/// The configuration without what the lines do not depend on.
+/// The configuration without what the lines that are listed do not depend on.
 fn stream_key(config: &RunConfig) -> RunConfig {
     let usual = RunConfig::default();
     RunConfig {
@@ -167,7 +167,6 @@ fn stream_key(config: &RunConfig) -> RunConfig {
         seed: usual.seed,
         cores: usual.cores,
         assign: usual.assign,
-        mode: usual.mode,
         between_frames: usual.between_frames,
         ..pass_key(config)
     }
@@ -252,6 +251,16 @@ impl Pass<'_> {
     }
 }
 
+/// Fewest sets of any L1.
+fn fewest_sets(passes: &[Pass<'_>]) -> Option<u32> {
+    let points = passes.iter().flat_map(|pass| &pass.points);
+    let sets = points.map(|&index| {
+        let RunConfig { l1, line_bytes, .. } = &passes[0].configs[index];
+        l1.sets("L1", *line_bytes).unwrap_or(1)
+    });
+    sets.min()
+}
+
 /// What the passes of a wave need.
 struct Wave<'a> {
     trace: &'a dyn TileSource,
@@ -265,9 +274,17 @@ impl Wave<'_> {
     fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
         let trace_passes = &self.trace.tables().passes;
         let shaded = shaded(self.trace, passes[0].config().hsr)?;
-        // Only the timed machine asks for them.
-        let distinct = passes.iter().any(|pass| pass.config().mode == Mode::Timed);
-        let expander = Expander::new(&shaded, passes[0].config())?.with_distinct_lines(distinct);
+        let timed = passes[0].config().mode == Mode::Timed;
+        let expander = Expander::new(&shaded, passes[0].config())?;
+        // Where a miss fills at once, the timed machine looks footprints up one by one.
+        let instant = |pass: &Pass<'_>| pass.config().tmu.l1_penalty_cycles == 0;
+        let expander = if !timed {
+            expander.for_sets(fewest_sets(&passes))
+        } else if passes.iter().any(instant) {
+            expander.with_distinct_lines(true)
+        } else {
+            expander.only_distinct_lines()
+        };
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
         frames.sort_unstable();

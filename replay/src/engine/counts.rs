@@ -22,7 +22,7 @@ pub struct CellMisses {
     pub l2: Misses,
 }
 
-/// Misses of one tile.
+/// Misses of one tile, which has fewer than 2^32 accesses: the expander refuses more.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileMisses {
     /// Footprints with an L1 miss.
@@ -87,8 +87,8 @@ impl CacheCounts {
         l2.lines += u64::from(misses.l2_lines);
         l2.secondary += u64::from(misses.l2_secondary);
         if let Some(tile) = self.tiles.get_mut(tile) {
-            tile.l1_footprints = tile.l1_footprints.wrapping_add(u32::from(missed_l1));
-            tile.l2_lines = tile.l2_lines.wrapping_add(misses.l2_lines);
+            tile.l1_footprints += u32::from(missed_l1);
+            tile.l2_lines += misses.l2_lines;
         }
     }
 }

@@ -5,6 +5,7 @@ mod counts;
 mod functional;
 mod one_pass;
 mod summary;
+mod tally;
 #[cfg(test)]
 mod tests;
 mod timed;

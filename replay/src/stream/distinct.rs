@@ -14,79 +14,59 @@ const FOOTPRINTS: u32 = 24;
 const BUCKETS: usize = 512;
 
 /// Who uses a distinct line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Use(u32);
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Use {
+    bits: u32,
+    /// Its cell within the view.
+    pub(super) cell: u32,
+}
 
 impl Use {
     const LAST: u32 = 1 << 31;
 
-    fn new(footprints: u32, first_line: usize) -> Self {
-        Self(footprints | (first_line as u32) << FOOTPRINTS)
+    fn new(footprints: u32, first_line: usize, cell: u32) -> Self {
+        Self {
+            bits: footprints | (first_line as u32) << FOOTPRINTS,
+            cell,
+        }
     }
 
     /// A bit for each footprint of the segment, repeats counted.
     #[inline(always)]
     #[must_use]
     pub fn footprints(self) -> u32 {
-        self.0 & ((1 << FOOTPRINTS) - 1)
+        self.bits & ((1 << FOOTPRINTS) - 1)
     }
 
     /// Where it stands first among the segment's lines.
     #[inline(always)]
     #[must_use]
     pub fn first_line(self) -> usize {
-        ((self.0 & !Self::LAST) >> FOOTPRINTS) as usize
+        ((self.bits & !Self::LAST) >> FOOTPRINTS) as usize
     }
 
     /// True for the last distinct line of a segment.
     #[inline(always)]
     fn ends_segment(self) -> bool {
-        self.0 & Self::LAST != 0
+        self.bits & Self::LAST != 0
     }
-}
-
-/// A part of a quad.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Segment {
-    /// Its first line.
-    pub first_line: usize,
-    /// The end of its distinct lines, which follow those of the segment before.
-    pub distinct_end: usize,
 }
 
 impl<'a> QuadLines<'a> {
-    /// The segments of the distinct lines.
+    /// Where the distinct lines of each segment end.
     #[inline(always)]
-    pub fn segments(self) -> impl Iterator<Item = Segment> + use<'a> {
-        let mut next = Segment {
-            first_line: 0,
-            distinct_end: 0,
-        };
+    pub fn segments(self) -> impl Iterator<Item = usize> + use<'a> {
+        let mut start = 0;
         std::iter::from_fn(move || {
-            let start = next.distinct_end;
             let uses = &self.uses[start..];
-            let end = start + 1 + uses.iter().position(|of| of.ends_segment())?;
-            let segment = Segment {
-                distinct_end: end,
-                ..next
+            start += if self.footprints <= FOOTPRINTS && !uses.is_empty() {
+                // All of them fit into one.
+                uses.len()
+            } else {
+                1 + uses.iter().position(|of| of.ends_segment())?
             };
-            next = segment;
-            if end < self.uses.len() {
-                let all = |all, of: &Use| all | of.footprints();
-                let footprints = self.uses[start..end].iter().fold(0, all).count_ones();
-                next.first_line = self.skip(segment.first_line, footprints);
-            }
-            Some(segment)
+            Some(start)
         })
-    }
-
-    /// The line after so many footprints, repeats counted, from the one at `line` on.
-    fn skip(&self, mut line: usize, mut footprints: u32) -> usize {
-        while footprints > 0 {
-            footprints = footprints.saturating_sub(1 + self.tags[line].repeats());
-            line = self.end_of_footprint(line);
-        }
-        line
     }
 }
 
@@ -200,16 +180,21 @@ impl Distinct {
         let first = distinct.len();
         let mut slot = first + self.seen.len();
         distinct.resize(slot, 0);
-        uses.resize(slot, Use(0));
-        let mut last = Use::LAST;
+        uses.resize(slot, Use::default());
+        if let Some(last) = uses.last_mut() {
+            last.bits = Use::LAST;
+        }
         for &index in self.indexes.iter().rev() {
             let seen = &mut self.seen[usize::from(index)];
             let footprints = std::mem::take(&mut seen.footprints);
             if footprints != 0 {
                 slot -= 1;
+                let of = Use::new(footprints, seen.first_line, self.cells[usize::from(index)]);
                 distinct[slot] = seen.line;
-                uses[slot] = Use(Use::new(footprints, seen.first_line).0 | last);
-                last = 0;
+                uses[slot] = Use {
+                    bits: of.bits | uses[slot].bits,
+                    ..of
+                };
             }
         }
     }
@@ -249,42 +234,48 @@ mod tests {
                 tile.quads.push(QuadEnd {
                     end: tile.lines.len() as u32,
                     distinct_end: tile.distinct.len() as u32,
-                    footprints: 0,
+                    footprints: footprints.iter().map(|(_, repeats, _)| 1 + repeats).sum(),
                 });
             }
             for index in 0..quads.len() {
                 let quad = tile.quad(index);
-                let mut begin = 0;
-                let ends: Vec<usize> = quad.segments().skip(1).map(|s| s.first_line).collect();
-                for (segment, end) in quad.segments().zip(ends.into_iter().chain([quad.lines.len()])) {
+                let (mut begin, mut first_line) = (0, 0);
+                for segment_end in quad.segments() {
+                    let listed = begin..segment_end;
+                    let all = |all, of: &Use| all | of.footprints();
+                    let mut footprints = quad.uses[listed.clone()].iter().fold(0, all).count_ones();
+                    let mut end = first_line;
+                    while footprints > 0 {
+                        footprints -= 1 + quad.tags[end].repeats();
+                        end = quad.end_of_footprint(end);
+                    }
                     // Footprints and last position by line and cell.
                     let mut plain: HashMap<(u32, u32), (u32, usize, usize)> = HashMap::new();
                     let (mut bit, mut bits) = (0, 0);
-                    for at in segment.first_line..end {
+                    for at in first_line..end {
                         if quad.tags[at].is_first() {
                             let times = 1 + quad.tags[at].repeats();
                             bits = ((1 << times) - 1) << bit;
                             bit += times;
                         }
                         let key = (quad.lines[at], quad.tags[at].cell());
-                        let first = at - segment.first_line;
+                        let first = at - first_line;
                         let entry = plain.entry(key).or_insert((0, first, 0));
                         *entry = (entry.0 | bits, entry.1, at);
                     }
                     prop_assert!(bit <= FOOTPRINTS);
-                    let listed = begin..segment.distinct_end;
-                    begin = segment.distinct_end;
+                    begin = segment_end;
                     prop_assert_eq!(listed.len(), plain.len());
                     let mut before = 0;
                     for (line, of) in quad.distinct[listed.clone()].iter().zip(&quad.uses[listed]) {
-                        let cell = quad.tags[segment.first_line + of.first_line()].cell();
-                        let (footprints, first, last) = plain[&(*line, cell)];
+                        let (footprints, first, last) = plain[&(*line, of.cell)];
                         prop_assert_eq!((of.footprints(), of.first_line()), (footprints, first));
                         prop_assert!(before <= last);
                         before = last;
                     }
+                    first_line = end;
                 }
-                prop_assert_eq!(begin, quad.distinct.len());
+                prop_assert_eq!((begin, first_line), (quad.distinct.len(), quad.lines.len()));
             }
         }
     }

@@ -8,6 +8,7 @@
 use super::distinct::Distinct;
 use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
 use super::lines::{QuadEnd, QuadRun, Tag, TileLines};
+use super::strip::Strip;
 use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, feed};
 use crate::config::RunConfig;
 use crate::order::TileRef;
@@ -52,6 +53,9 @@ pub struct Expander<'a> {
     bins: Bins,
     touched: LineSet,
     distinct: bool,
+    all: bool,
+    /// Fewest sets of the caches that only what they notice is listed for.
+    sets: Option<u32>,
 }
 
 /// Memory for the expansion of a tile, kept from tile to tile, and what was counted.
@@ -61,6 +65,7 @@ pub(super) struct Work {
     scratch: Scratch,
     counts: TraceCounts,
     distinct: Option<Distinct>,
+    strip: Option<Strip>,
     /// The last tile's lines.
     pub(super) lines: TileLines,
 }
@@ -79,6 +84,8 @@ impl<'a> Expander<'a> {
             bins: Bins::new(tables)?,
             source,
             distinct: false,
+            all: true,
+            sets: None,
         })
     }
 
@@ -86,6 +93,23 @@ impl<'a> Expander<'a> {
     #[must_use]
     pub fn with_distinct_lines(self, distinct: bool) -> Self {
         Self { distinct, ..self }
+    }
+
+    /// Lists nothing but each quad's distinct lines.
+    #[must_use]
+    pub fn only_distinct_lines(self) -> Self {
+        Self {
+            distinct: true,
+            all: false,
+            ..self
+        }
+    }
+
+    /// Lists only what caches of at least so many sets, a power of two, may notice if they have no latencies
+    /// (all else hits). Counts are of all accesses as ever.
+    #[must_use]
+    pub fn for_sets(self, sets: Option<u32>) -> Self {
+        Self { sets, ..self }
     }
 
     /// Where accesses count.
@@ -150,6 +174,7 @@ impl<'a> Expander<'a> {
             scratch: self.footprints.scratch(),
             counts: TraceCounts::without_tiles(&self.bins),
             distinct: self.distinct.then(Distinct::default),
+            strip: self.sets.map(Strip::new),
             lines: TileLines::default(),
         }
     }
@@ -162,35 +187,43 @@ impl<'a> Expander<'a> {
             scratch,
             counts,
             distinct,
+            strip,
             lines,
         } = work;
         lines.begin(self.bins.place(at));
         let first_cell = self.bins.first_cell(at);
-        let mut accesses = TileAccesses::default();
+        let mut sums = TileSums::default();
         for run in &tile.runs {
+            if let Some(strip) = strip {
+                strip.begin();
+            }
             for records in feed::quads(tile, run) {
                 let lanes = feed::lanes(records);
                 counts.quads += 1;
                 counts.lanes += u64::from(lanes);
-                accesses.lanes = accesses.lanes.wrapping_add(lanes);
+                sums.lanes += u64::from(lanes);
                 let mut footprints = 0;
                 self.footprints
                     .for_quad(run.draw, records, scratch, |sample, bundle| {
                         let cell = self.bins.cell(sample.texture, bundle.level);
-                        let before = lines.lines.len();
-                        let (hash, lookups) = self.append(cell, sample, bundle, lines);
-                        debug_assert!(lines.lines.len() > before || bundle.count == 0);
+                        let strip = strip.as_mut();
+                        let (hash, lookups) = self.append(cell, sample, bundle, strip, lines);
                         counts.hash = counts.hash.wrapping_add(hash);
                         let cell = &mut counts.cells[first_cell + cell as usize];
                         cell.footprints += u64::from(bundle.count);
                         cell.line_lookups += u64::from(lookups);
                         footprints += u32::from(bundle.count);
+                        sums.line_lookups += u64::from(lookups);
                     });
-                accesses.footprints = accesses.footprints.wrapping_add(footprints);
+                sums.footprints += u64::from(footprints);
                 if let Some(distinct) = distinct {
                     let start = lines.quads.last().map_or(0, |quad| quad.end as usize);
                     let (lines_of, tags) = (&lines.lines[start..], &lines.tags[start..]);
                     distinct.list(lines_of, tags, &mut lines.distinct, &mut lines.uses);
+                }
+                if !self.all {
+                    lines.lines.clear();
+                    lines.tags.clear();
                 }
                 lines.quads.push(QuadEnd {
                     end: lines.lines.len() as u32,
@@ -202,8 +235,9 @@ impl<'a> Expander<'a> {
                 primitive: run.primitive,
                 end: lines.quads.len() as u32,
             });
+            sums.checked(at)?;
         }
-        Ok(accesses)
+        sums.checked(at)
     }
 
     /// Appends the footprints of a bundle; the sum of their [`access_hash`] and of their lines.
@@ -213,6 +247,7 @@ impl<'a> Expander<'a> {
         cell: u32,
         sample: SampleRef,
         bundle: &Bundle,
+        mut strip: Option<&mut Strip>,
         out: &mut TileLines,
     ) -> (u64, u32) {
         let (mut hash, mut lookups) = (0_u64, 0);
@@ -224,23 +259,55 @@ impl<'a> Expander<'a> {
                 next += 1;
             }
             let times = (next - index) as u32;
-            let [first, other] = Tag::of_footprint(cell, times - 1);
-            let mut tag = first;
-            let mut once = 0_u64;
             let relative = bundle.lines_of(index);
-            for relative in relative {
-                let line = sample.base_line + relative;
-                out.lines.push(line);
-                out.tags.push(tag);
-                tag = other;
+            let lines = relative.iter().map(|line| sample.base_line + line);
+            let mut once = 0_u64;
+            for line in lines.clone() {
                 self.touched.insert(line);
                 once = once.wrapping_add(access_hash(line));
+            }
+            if let Some(strip) = &mut strip {
+                strip.list(cell, lines, times, out);
+            } else {
+                let [first, other] = Tag::of_footprint(cell, times - 1);
+                let tags = std::iter::once(first).chain(std::iter::repeat(other));
+                for (line, tag) in lines.zip(tags) {
+                    out.lines.push(line);
+                    out.tags.push(tag);
+                }
             }
             hash = hash.wrapping_add(once.wrapping_mul(times.into()));
             lookups += relative.len() as u32 * times;
             index = next;
         }
         (hash, lookups)
+    }
+}
+
+/// What a tile's accesses come to.
+#[derive(Clone, Copy, Debug, Default)]
+struct TileSums {
+    lanes: u64,
+    footprints: u64,
+    line_lookups: u64,
+}
+
+impl TileSums {
+    /// As what tiles count in. Whatever else is counted or listed by tile, footprints and lines that miss,
+    /// is no more than its line look-ups.
+    fn checked(self, at: TileRef) -> Result<TileAccesses, StreamError> {
+        let fit = |name, count: u64| {
+            u32::try_from(count).map_err(|_| StreamError::Tile {
+                pass: at.pass,
+                tile: at.tile,
+                message: format!("expected fewer than 2^32 {name}, found {count}"),
+            })
+        };
+        fit("line look-ups", self.line_lookups)?;
+        Ok(TileAccesses {
+            lanes: fit("lanes", self.lanes)?,
+            footprints: fit("footprints", self.footprints)?,
+        })
     }
 }
 
@@ -279,5 +346,49 @@ impl Drop for Frame<'_> {
     fn drop(&mut self) {
         let bytes = self.kept.iter().flatten().flatten().map(TileLines::bytes);
         self.memory.give_back(bytes.sum());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tile_whose_counters_would_wrap_is_refused() {
+        let at = TileRef { pass: 3, tile: 17 };
+        let most = u64::from(u32::MAX);
+        let full = TileSums {
+            lanes: most,
+            footprints: most,
+            line_lookups: most,
+        };
+        let accesses = full.checked(at).unwrap();
+        assert_eq!((accesses.lanes, accesses.footprints), (u32::MAX, u32::MAX));
+        let over = [
+            TileSums {
+                lanes: most + 1,
+                ..full
+            },
+            TileSums {
+                footprints: most + 1,
+                ..full
+            },
+            TileSums {
+                line_lookups: most + 1,
+                ..full
+            },
+        ];
+        for (sums, name) in over
+            .into_iter()
+            .zip(["lanes", "footprints", "line look-ups"])
+        {
+            let error = sums.checked(at).unwrap_err().to_string();
+            assert!(
+                error.contains(&format!(
+                    "expected fewer than 2^32 {name}, found 4294967296"
+                )) && error.contains("17"),
+                "{error}"
+            );
+        }
     }
 }

@@ -70,6 +70,7 @@ pub struct TileLines {
     pub(super) place: Place,
     pub(super) runs: Vec<QuadRun>,
     pub(super) quads: Vec<QuadEnd>,
+    /// Empty where only distinct lines are asked for, like their tags.
     pub(super) lines: Vec<u32>,
     pub(super) tags: Vec<Tag>,
     /// Empty where nobody asked for them, like their uses.
@@ -104,13 +105,11 @@ impl TileLines {
         /// Words of a cache line.
         const STEP: usize = 16;
         let distinct = self.distinct.iter().step_by(STEP);
-        let uses = self.uses.iter().step_by(STEP);
-        let tags = self.tags.iter().step_by(STEP);
+        let uses = self.uses.iter().step_by(STEP / 2);
         let quads = self.quads.iter().step_by(STEP / 3);
         std::hint::black_box((
             distinct.fold(0, |sum, line| sum ^ line),
             uses.fold(0, |sum, of| sum ^ of.footprints()),
-            tags.fold(0, |sum, tag| sum ^ tag.0),
             quads.fold(0, |sum, quad| sum ^ quad.end),
         ));
     }
@@ -217,6 +216,13 @@ impl<'a> QuadLines<'a> {
     #[must_use]
     pub fn cell(&self, index: usize) -> usize {
         self.place.first_cell as usize + self.tags[index].cell() as usize
+    }
+
+    /// The cell in which footprints of the distinct line `index` count.
+    #[inline(always)]
+    #[must_use]
+    pub fn distinct_cell(&self, index: usize) -> usize {
+        self.place.first_cell as usize + self.uses[index].cell as usize
     }
 
     /// Where the footprint that holds line `index` ends.

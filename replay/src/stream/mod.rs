@@ -18,13 +18,14 @@ mod interleave;
 mod line_set;
 mod lines;
 mod source;
+mod strip;
 pub mod synthetic;
 #[cfg(test)]
 pub mod testing;
 
 pub use cores::Cores;
 pub use counts::{Bins, Cell, CellAccesses, TileAccesses, TraceCounts};
-pub use distinct::{Segment, Use};
+pub use distinct::Use;
 pub use error::StreamError;
 pub use expand::{Expander, Frame, LineMemory};
 pub use feed::{Quad, for_quads};

@@ -169,13 +169,13 @@ impl<C: Cache> Memory<C> {
             self.one_by_one(core, now, quad);
         }
         let (mut rest, mut segments) = (&*missing, 0);
-        for segment in quad.segments() {
+        for end in quad.segments() {
             if rest.is_empty() {
                 break;
             }
-            let inside = |(index, _): &&(u32, u64)| (*index as usize) < segment.distinct_end;
+            let inside = |(index, _): &&(u32, u64)| (*index as usize) < end;
             let (own, others) = rest.split_at(rest.iter().take_while(inside).count());
-            self.segment(core, now, quad, segment.first_line, own);
+            self.segment(core, now, quad, own);
             rest = others;
             segments += 1;
         }
@@ -190,14 +190,7 @@ impl<C: Cache> Memory<C> {
     /// Lines of a segment are not there: asks for those that nobody has asked for, and says who
     /// waits for them.
     #[inline(always)]
-    fn segment(
-        &mut self,
-        core: usize,
-        now: u64,
-        quad: &QuadLines<'_>,
-        first_line: usize,
-        missing: &[(u32, u64)],
-    ) {
+    fn segment(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, missing: &[(u32, u64)]) {
         self.waiting.clear();
         self.absent.clear();
         for &(index, arrival) in missing {
@@ -205,13 +198,13 @@ impl<C: Cache> Memory<C> {
             if arrival == UNKNOWN {
                 self.absent.push((of.first_line() as u32, index));
             } else {
-                let cell = quad.cell(first_line + of.first_line());
+                let cell = quad.distinct_cell(index as usize);
                 self.counts.secondary(cell, of.footprints().count_ones());
                 wait(&mut self.waiting, arrival, of.footprints());
             }
         }
         if !self.absent.is_empty() {
-            self.fetch_absent(core, now, quad, first_line);
+            self.fetch_absent(core, now, quad);
         }
         // A footprint waits for the last of its lines.
         let mut counted = 0;
@@ -225,13 +218,13 @@ impl<C: Cache> Memory<C> {
     }
 
     /// Asks for the absent lines of a segment, in the order in which the footprints do.
-    fn fetch_absent(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, first_line: usize) {
+    fn fetch_absent(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) {
         self.absent.sort_unstable();
         let mut asking = 0;
         let mut misses = FootprintMisses::default();
         let mut cell = 0;
         for at in 0..self.absent.len() {
-            let (first_use, index) = self.absent[at];
+            let (_, index) = self.absent[at];
             let (line, users) = (
                 quad.distinct[index as usize],
                 quad.uses[index as usize].footprints(),
@@ -243,7 +236,7 @@ impl<C: Cache> Memory<C> {
                 }
                 misses = FootprintMisses::default();
                 asking = first_user;
-                cell = quad.cell(first_line + first_use as usize);
+                cell = quad.distinct_cell(index as usize);
             }
             // Another segment, or another cell of this one, may have asked for it just now.
             let known = match self.fetches {
