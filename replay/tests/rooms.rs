@@ -10,7 +10,7 @@ const FLOORS: [&[&str]; 11] = [
     &["paper", "tmu"],
     &["addresses", "stream"],
     &["engine"],
-    &["locality"],
+    &["compare", "locality"],
     &["sgrt"],
     &["experiment"],
     &["techniques"],

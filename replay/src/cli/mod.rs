@@ -1,6 +1,7 @@
 //! The command line, one file a subcommand.
 
 mod addresses;
+mod compare;
 mod config_args;
 pub mod convert;
 pub mod diff;
@@ -64,6 +65,8 @@ enum Command {
     Dump(dump::DumpArgs),
     /// Print the first difference between two traces.
     Diff(diff::DiffArgs),
+    /// Hold two captures of the same views against each other, and what differs in the caches.
+    Compare(Box<compare::Args>),
     /// Write a trace's accesses for other simulators, or the trace in another encoding.
     Convert(Box<convert::ConvertArgs>),
     /// Replay the Z2 paper's experiment: its caches and orders, beside its published figures.
@@ -93,6 +96,7 @@ pub fn main() -> ExitCode {
             Command::Validate(args) => validate::run(&args),
             Command::Dump(args) => dump::run(&args),
             Command::Diff(args) => diff::run(&args),
+            Command::Compare(args) => compare::run(&args),
             Command::Convert(args) => convert::run(&args),
             Command::Paper(args) => paper::run(&args),
             Command::Sweep(args) => sweep::run(&args),

@@ -2,6 +2,7 @@
 
 pub mod addresses;
 pub mod columns;
+pub mod compare;
 pub mod figures;
 pub mod html;
 pub mod locality;
