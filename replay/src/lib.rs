@@ -13,6 +13,7 @@ pub mod locality;
 pub mod order;
 mod palette;
 pub mod paper;
+pub mod preset;
 mod registry;
 pub mod report;
 pub mod result;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const FLOORS: [&[&str]; 11] = [
     &["files", "palette", "registry", "result", "size"],
     &["cache", "config", "order"],
-    &["paper", "tmu"],
+    &["paper", "preset", "tmu"],
     &["addresses", "stream"],
     &["engine"],
     &["compare", "locality"],

@@ -1,6 +1,7 @@
 //! The command line, one file a subcommand.
 
 mod addresses;
+mod calibrate;
 mod compare;
 mod config_args;
 pub mod convert;
@@ -71,6 +72,8 @@ enum Command {
     Convert(Box<convert::ConvertArgs>),
     /// Replay the Z2 paper's experiment: its caches and orders, beside its published figures.
     Paper(Box<paper::Args>),
+    /// Try settings of the paper's machine on some scenes and judge them on others.
+    Calibrate(Box<calibrate::Args>),
     /// Replay every point of an experiment file; goes on where it stopped.
     Sweep(sweep::Args),
     /// Write the experiment as one self-contained page, with JSON and CSV beside it.
@@ -99,6 +102,7 @@ pub fn main() -> ExitCode {
             Command::Compare(args) => compare::run(&args),
             Command::Convert(args) => convert::run(&args),
             Command::Paper(args) => paper::run(&args),
+            Command::Calibrate(args) => calibrate::run(&args),
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),
             Command::Techniques(args) => techniques::run(&args),

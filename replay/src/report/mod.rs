@@ -1,6 +1,7 @@
 //! Prints results: tables, plots, JSON, CSV and pages. What is printed is computed elsewhere.
 
 pub mod addresses;
+pub mod calibration;
 pub mod columns;
 pub mod compare;
 pub mod figures;

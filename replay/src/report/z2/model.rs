@@ -72,14 +72,15 @@ impl Row for Average {
     }
 }
 
-/// How far utilisation is from the surface of the paper's table.
+/// How far utilisation is from the surface of the paper's table, at rates that are counted as the
+/// paper's are: on the machine of `--preset z2-paper`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Deviation {
-    /// Mean absolute deviation over the timed rows, points.
+    /// Mean absolute deviation, points.
     pub mean_absolute_points: f64,
     /// Largest absolute deviation, points.
     pub largest_points: f64,
-    /// Timed rows.
+    /// Rows of that machine.
     pub rows: usize,
 }
 
@@ -359,7 +360,7 @@ fn conservation<'r>(
 fn deviation(rows: &[ResultRow]) -> Deviation {
     let points: Vec<f64> = rows
         .iter()
-        .filter_map(|row| Some(number(row, "closed_form_deviation_points")?.abs()))
+        .filter_map(|row| Some(number(row, "z2_paper.closed_form_deviation_points")?.abs()))
         .collect();
     Deviation {
         mean_absolute_points: mean(points.iter().copied()).unwrap_or(0.0),
