@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques test bench lint build deps golden clean
+.PHONY: demo techniques accuracy test bench lint build deps golden clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -14,6 +14,10 @@ demo: deps build
 # Every stereo rendering technique on three scenes, measured against its image error.
 techniques: deps build
 	@OUT="$(OUT)" scripts/techniques.sh
+
+# Run time against error: quicker ways of counting, samples, two cycle models.
+accuracy: deps build
+	@OUT="$(OUT)" scripts/accuracy.sh
 
 test:
 	@scripts/install-deps.sh test

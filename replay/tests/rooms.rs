@@ -13,7 +13,7 @@ const FLOORS: [&[&str]; 11] = [
     &["compare", "locality"],
     &["sgrt"],
     &["experiment"],
-    &["techniques"],
+    &["accuracy", "techniques"],
     &["report"],
     &["cli"],
 ];

@@ -1,5 +1,6 @@
 //! The command line, one file a subcommand.
 
+mod accuracy;
 mod addresses;
 mod calibrate;
 mod compare;
@@ -72,6 +73,8 @@ enum Command {
     Convert(Box<convert::ConvertArgs>),
     /// Replay the Z2 paper's experiment: its caches and orders, beside its published figures.
     Paper(Box<paper::Args>),
+    /// Measure what quicker or other ways of counting cost in accuracy and spare in time.
+    Accuracy(Box<accuracy::Args>),
     /// Try settings of the paper's machine on some scenes and judge them on others.
     Calibrate(Box<calibrate::Args>),
     /// Replay every point of an experiment file; goes on where it stopped.
@@ -102,6 +105,7 @@ pub fn main() -> ExitCode {
             Command::Compare(args) => compare::run(&args),
             Command::Convert(args) => convert::run(&args),
             Command::Paper(args) => paper::run(&args),
+            Command::Accuracy(args) => accuracy::run(&args),
             Command::Calibrate(args) => calibrate::run(&args),
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),

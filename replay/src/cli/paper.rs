@@ -3,6 +3,7 @@
 use super::experiment_args::{ExperimentArgs, page_outputs, write_page};
 use super::parquet_arg::ParquetArg;
 use crate::files::write_atomically;
+use crate::report::errors;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::tables;
 use anyhow::{Result, ensure};
@@ -99,6 +100,13 @@ pub fn text(report: &PaperReport) -> String {
             text,
             "\nTMU utilisation against the paper's surface, at first look-ups: mean absolute deviation {:.2} points, largest {:.2}, over {} rows\n",
             fit.mean_absolute_points, fit.largest_points, fit.rows
+        );
+    }
+    if let Some(source) = errors::source() {
+        let _ = write!(
+            text,
+            "\nHow far the figures are off ({source})\n{}",
+            errors::table().text()
         );
     }
     for c in report

@@ -4,6 +4,7 @@ use crate::config::{Order, RunConfig};
 use crate::experiment::{Outcome, ResultRow, Subject, frame_count};
 use crate::paper::z2::{self, PublishedRow};
 use crate::report::columns::{Column, Records, Row, Value};
+use crate::report::errors::{self, KnownError};
 use crate::report::figures::{Figure, number};
 use crate::report::table::Table;
 use crate::result::{Part, TOOL, TileMap, TraceId};
@@ -267,6 +268,7 @@ impl<'a> PaperReport<'a> {
             },
             closed_form: self.closed_form,
             conservation: &self.conservation,
+            errors: errors::known(),
             details: details.map(Detail::new).collect(),
         })
     }
@@ -283,6 +285,8 @@ struct Document<'a, 'r> {
     averages: Records<'a, 'static, Average>,
     closed_form: Deviation,
     conservation: &'a [Conservation],
+    /// What is known of the figures' errors.
+    errors: &'a [KnownError],
     details: Vec<Detail<'a>>,
 }
 

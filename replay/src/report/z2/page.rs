@@ -4,6 +4,7 @@ use super::model::{PaperReport, TraceInfo};
 use super::plots::{self, TileMeasure};
 use super::tables;
 use crate::config::{Mode, Order};
+use crate::report::errors;
 use crate::report::html::{self, Section, figures, folded};
 use crate::report::picture::EmbeddedPicture;
 use crate::report::plots::PlotError;
@@ -60,6 +61,12 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
     sections.push(Section::new("Heat maps by tile", heat_maps(report)?));
     sections.push(Section::new("By mip level", levels(report)?));
     sections.push(Section::new("By texture", textures(report)?));
+    if let Some(source) = errors::source() {
+        sections.push(Section::new(
+            "How far the figures are off",
+            html! { p { "Measured by " (source) "; what is not listed was not measured." } (errors::table().markup()) },
+        ));
+    }
     sections.push(Section::new("Configuration", configuration(report)));
     let lead = html! {
         p {
