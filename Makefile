@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques stress test bench lint build deps golden clean
+.PHONY: demo techniques accuracy stress test bench lint build deps golden clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -17,7 +17,11 @@ techniques: deps build
 
 # Numbers that try to break a capture: errors and bounds in $(OUT)/stress/stress.md.
 stress: deps build
-	@target/release/tracegen stress -o "$(OUT)/stress"
+	@$${CARGO_TARGET_DIR:-target}/release/tracegen stress -o "$(OUT)/stress"
+
+# Run time against error: quicker ways of counting, samples, two cycle models.
+accuracy: deps build
+	@OUT="$(OUT)" scripts/accuracy.sh
 
 test:
 	@scripts/install-deps.sh test

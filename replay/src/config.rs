@@ -21,6 +21,9 @@ pub enum Mode {
     /// The cycle model of the texture unit decides how the cores' accesses interleave.
     #[default]
     Timed,
+    /// The machine of the Z2 paper as its table suggests it: a thread stops at its first miss, and
+    /// rates count first look-ups beside primary misses.
+    FirstMiss,
     /// Without latencies: a footprint is a unit of time, and a miss fills at once.
     Functional,
 }

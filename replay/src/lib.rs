@@ -1,9 +1,11 @@
 //! Trace to answer: replays texture traces through caches and a texture unit in any tile order,
 //! and ray traces through a model of a mobile ray-tracing GPU.
 
+pub mod accuracy;
 pub mod addresses;
 pub mod cache;
 pub mod cli;
+pub mod compare;
 pub mod config;
 pub mod engine;
 pub mod experiment;
@@ -12,6 +14,7 @@ pub mod locality;
 pub mod order;
 mod palette;
 pub mod paper;
+pub mod preset;
 mod registry;
 pub mod report;
 pub mod result;

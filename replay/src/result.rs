@@ -59,6 +59,37 @@ pub struct TmuResult {
     pub loops: u64,
 }
 
+/// What a replay counts whose threads stop at their first miss: first look-ups of footprints, where
+/// lines on their way are misses, too. Merged requests count, so that no traffic follows from it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FirstLookups {
+    /// `l1_misses` over footprints.
+    pub l1_miss_rate: f64,
+    /// `l2_misses` over `l2_lookups`.
+    pub l2_miss_rate: f64,
+    /// Footprints whose first look-up found a line absent or on its way.
+    pub l1_misses: u64,
+    /// Lines that these did not find.
+    pub l2_lookups: u64,
+    /// Those of them that the L2 had not, or was waiting for.
+    pub l2_misses: u64,
+    /// Look-ups that took their data from the fill, because the set could not hold it.
+    pub forwarded: u64,
+}
+
+impl FirstLookups {
+    /// With the rates, of so many footprints.
+    #[must_use]
+    pub fn over(self, footprints: u64) -> Self {
+        let rate = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
+        Self {
+            l1_miss_rate: rate(self.l1_misses, footprints),
+            l2_miss_rate: rate(self.l2_misses, self.l2_lookups),
+            ..self
+        }
+    }
+}
+
 /// L1 and L2 counters of a part of the traffic.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Part {
@@ -110,6 +141,9 @@ pub struct RunResult {
     pub tmu: Option<TmuResult>,
     /// Cycles until the last core is done; `None` in functional mode.
     pub cycles: Option<u64>,
+    /// Rates as the Z2 paper very probably counts them; only where threads stop at their first miss.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_lookups: Option<FirstLookups>,
     /// By view.
     pub by_view: Vec<Part>,
     /// By texture, in table order.

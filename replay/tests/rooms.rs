@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 const FLOORS: [&[&str]; 11] = [
     &["files", "palette", "registry", "result", "size"],
     &["cache", "config", "order"],
-    &["paper", "tmu"],
+    &["paper", "preset", "tmu"],
     &["addresses", "stream"],
     &["engine"],
-    &["locality"],
+    &["compare", "locality"],
     &["sgrt"],
     &["experiment"],
-    &["techniques"],
+    &["accuracy", "techniques"],
     &["report"],
     &["cli"],
 ];

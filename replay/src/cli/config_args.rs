@@ -4,6 +4,7 @@ use crate::config::{
     AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr, LodFormula, Mode,
     Order, Replacement, RunConfig, TextureOrder,
 };
+use crate::preset::Preset;
 use crate::size::{format_bytes, parse_bytes};
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
@@ -48,6 +49,9 @@ pub struct ConfigArgs {
     /// TOML file with the configuration; flags win over it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// Machine by name in place of the defaults; flags win over it
+    #[arg(long, conflicts_with = "config")]
+    preset: Option<Preset>,
     /// Tile order
     #[arg(long)]
     order: Option<Order>,
@@ -169,11 +173,30 @@ impl ConfigArgs {
         self.resolve_over(RunConfig::default())
     }
 
-    /// The configuration: `defaults`, or `--config` where it is given, then the flags.
+    /// The configuration: `defaults` with the preset, or `--config` where it is given, then the flags.
     ///
     /// # Errors
     /// As [`Self::resolve`].
     pub fn resolve_over(&self, defaults: RunConfig) -> Result<RunConfig> {
+        let preset = |config| self.preset.map_or(config, |preset| preset.over(config));
+        self.resolve_file_over(preset(defaults))
+    }
+
+    /// The configuration that is not the preset's: the defaults or `--config`, then the flags.
+    ///
+    /// # Errors
+    /// As [`Self::resolve`].
+    pub fn resolve_without_preset(&self) -> Result<RunConfig> {
+        self.resolve_file_over(RunConfig::default())
+    }
+
+    /// The machine of `--preset`.
+    #[must_use]
+    pub fn preset(&self) -> Option<Preset> {
+        self.preset
+    }
+
+    fn resolve_file_over(&self, defaults: RunConfig) -> Result<RunConfig> {
         let mut config = match &self.config {
             None => defaults,
             Some(path) => toml::from_str(&read_toml(path)?)
@@ -189,6 +212,7 @@ impl ConfigArgs {
     #[must_use]
     pub fn first_of_traces(&self) -> Option<&'static str> {
         let flags = [
+            ("--preset", self.preset.is_some()),
             ("--order", self.order.is_some()),
             ("--mode", self.mode.is_some()),
             ("--cores", self.cores.is_some()),

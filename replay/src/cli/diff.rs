@@ -1,4 +1,4 @@
-//! `replay diff`: the first difference between two traces.
+//! `replay diff`: how two traces' descriptions differ, and their first differing entries and record.
 
 use super::dump::record_lines;
 use super::tiles::{ray_tiles, tiles};
@@ -14,7 +14,8 @@ use std::process::ExitCode;
 /// Arguments of `replay diff`.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Exit code: 0 the same, 1 different, 2 unreadable.
-How tiles are encoded makes no difference.
+Every differing line of the description is printed, then the first differing entry of each table and
+the first differing record. How tiles are encoded makes no difference.
 
 Example: replay diff a.textrace b.textrace")]
 pub struct DiffArgs {
@@ -34,40 +35,47 @@ pub struct DiffArgs {
 pub fn run(args: &DiffArgs) -> Result<ExitCode> {
     let left = Trace::open(&args.left)?;
     let right = Trace::open(&args.right)?;
-    match first_difference(&left, &right, args.ignore_meta)? {
-        None => Ok(ExitCode::SUCCESS),
-        Some(difference) => {
-            super::print(&difference)?;
-            Ok(ExitCode::FAILURE)
-        }
+    let differences = differences(&left, &right, args.ignore_meta)?;
+    if differences.is_empty() {
+        return Ok(ExitCode::SUCCESS);
     }
+    super::print(&differences.join("\n"))?;
+    Ok(ExitCode::FAILURE)
 }
 
-/// Describes the first difference, if there is one.
-fn first_difference(left: &Trace, right: &Trace, ignore_meta: bool) -> Result<Option<String>> {
+/// Describes the differences; none where the traces hold the same.
+fn differences(left: &Trace, right: &Trace, ignore_meta: bool) -> Result<Vec<String>> {
     match (left, right) {
         (Trace::Texture(left), Trace::Texture(right)) => textures(left, right, ignore_meta),
         (Trace::Ray(left), Trace::Ray(right)) => rays(left, right, ignore_meta),
         _ => {
             let kind = |trace: &Trace| trace.container().kind();
-            Ok(Some(differ("kind", kind(left), kind(right))))
+            Ok(vec![differ("kind", kind(left), kind(right))])
         }
     }
 }
 
-fn textures(left: &Textrace, right: &Textrace, ignore_meta: bool) -> Result<Option<String>> {
+fn textures(left: &Textrace, right: &Textrace, ignore_meta: bool) -> Result<Vec<String>> {
     let (a, b) = (left.tables(), right.tables());
-    let meta = (!ignore_meta).then(|| keys("meta", &a.meta, &b.meta));
-    let tables = meta
-        .transpose()?
-        .flatten()
-        .or(entries("texture", &a.textures, &b.textures)?)
-        .or(entries("sampler", &a.samplers, &b.samplers)?)
-        .or(entries("draw", &a.draws, &b.draws)?)
-        .or(entries("pass", &a.passes, &b.passes)?);
-    if tables.is_some() {
-        return Ok(tables);
+    let mut found = Vec::new();
+    if !ignore_meta {
+        found = keys("meta", &a.meta, &b.meta)?;
     }
+    found.extend(entries("texture", &a.textures, &b.textures)?);
+    found.extend(entries("sampler", &a.samplers, &b.samplers)?);
+    found.extend(entries("draw", &a.draws, &b.draws)?);
+    let passes = entries("pass", &a.passes, &b.passes)?;
+    // Without the same tiles there are no records of the same place.
+    let same_tiles = passes.is_none();
+    found.extend(passes);
+    if same_tiles {
+        found.extend(first_record(left, right)?);
+    }
+    Ok(found)
+}
+
+/// The first different record of two traces with the same tiles.
+fn first_record(left: &Textrace, right: &Textrace) -> Result<Option<String>> {
     let (mut a, mut b) = (Tile::default(), Tile::default());
     for (pass, index) in tiles(&left.tables().passes) {
         left.decode_tile(pass, index, &mut a)?;
@@ -81,36 +89,41 @@ fn textures(left: &Textrace, right: &Textrace, ignore_meta: bool) -> Result<Opti
     Ok(None)
 }
 
-fn rays(left: &Raytrace, right: &Raytrace, ignore_meta: bool) -> Result<Option<String>> {
-    let (mut a, mut b) = (left.tables().clone(), right.tables().clone());
+fn rays(left: &Raytrace, right: &Raytrace, ignore_meta: bool) -> Result<Vec<String>> {
+    let (mut a, b) = (left.tables().clone(), right.tables());
     if ignore_meta {
         a.meta.trace = b.meta.trace.clone();
     }
-    let tables = keys("meta", &a.meta, &b.meta)?
-        .or(keys("hierarchy", &a.bvh, &b.bvh)?)
-        .or(entries("material", &a.materials, &b.materials)?)
-        .or(entries("light", &a.lights, &b.lights)?)
-        .or(entries("triangle", &a.triangles, &b.triangles)?);
-    if tables.is_some() {
-        return Ok(tables);
+    let mut found = keys("meta", &a.meta, &b.meta)?;
+    found.extend(keys("hierarchy", &a.bvh, &b.bvh)?);
+    found.extend(entries("material", &a.materials, &b.materials)?);
+    found.extend(entries("light", &a.lights, &b.lights)?);
+    found.extend(entries("triangle", &a.triangles, &b.triangles)?);
+    if ray_tiles(&a).eq(ray_tiles(b)) {
+        found.extend(first_sample(left, right)?);
     }
-    b.meta.trace = std::mem::take(&mut a.meta.trace);
-    let (mut tile_a, mut tile_b) = (RayTile::default(), RayTile::default());
-    for (eye, index) in ray_tiles(&a) {
-        left.decode_tile(eye, index, &mut tile_a)?;
-        right.decode_tile(eye, index, &mut tile_b)?;
-        if tile_a == tile_b {
+    Ok(found)
+}
+
+/// The first different sample of two traces with the same tiles.
+fn first_sample(left: &Raytrace, right: &Raytrace) -> Result<Option<String>> {
+    let (mut a, mut b) = (RayTile::default(), RayTile::default());
+    for (eye, index) in ray_tiles(left.tables()) {
+        left.decode_tile(eye, index, &mut a)?;
+        right.decode_tile(eye, index, &mut b)?;
+        if a == b {
             continue;
         }
-        let of = |tile: &RayTile| -> Result<Vec<String>> {
-            let samples = ray_samples(&b, eye, index, tile);
+        let of = |trace: &Raytrace, tile: &RayTile| -> Result<Vec<String>> {
+            let tables = trace.tables();
+            let samples = ray_samples(tables, eye, index, tile);
             Ok(samples
-                .map(|s| s.to_json(&b.bvh))
+                .map(|s| s.to_json(&tables.bvh))
                 .collect::<Result<_, _>>()?)
         };
         let place = format!("{eye:?} eye tile {index} sample").to_lowercase();
         // Texture coordinates may be NaN, which differs from itself but not in print.
-        let found = lines(&place, of(&tile_a)?, of(&tile_b)?);
+        let found = lines(&place, of(left, &a)?, of(right, &b)?);
         if found.is_some() {
             return Ok(found);
         }
@@ -122,19 +135,27 @@ fn differ(what: &str, left: impl std::fmt::Display, right: impl std::fmt::Displa
     format!("{what} differs\n< {left}\n> {right}")
 }
 
-/// First different key of two descriptions.
-fn keys<T: serde::Serialize>(what: &str, left: &T, right: &T) -> Result<Option<String>> {
-    fn first(path: &str, a: &Value, b: &Value) -> Option<String> {
+/// All different keys of two descriptions, those that only one has as well.
+fn keys<T: serde::Serialize>(what: &str, left: &T, right: &T) -> Result<Vec<String>> {
+    fn walk(path: &str, a: &Value, b: &Value, found: &mut Vec<String>) {
         match (a, b) {
-            (Value::Object(a), Value::Object(b)) => a.iter().find_map(|(key, value)| {
-                let other = b.get(key).unwrap_or(&Value::Null);
-                first(&format!("{path}.{key}"), value, other)
-            }),
-            _ => (a != b).then(|| differ(path, a, b)),
+            (Value::Object(a), Value::Object(b)) => {
+                let of_b_alone = b.keys().filter(|key| !a.contains_key(*key));
+                for key in a.keys().chain(of_b_alone) {
+                    let of = |side: &'_ serde_json::Map<String, Value>| {
+                        side.get(key).cloned().unwrap_or_default()
+                    };
+                    walk(&format!("{path}.{key}"), &of(a), &of(b), found);
+                }
+            }
+            _ if a != b => found.push(differ(path, a, b)),
+            _ => {}
         }
     }
+    let mut found = Vec::new();
     let (a, b) = (serde_json::to_value(left)?, serde_json::to_value(right)?);
-    Ok(first(what, &a, &b))
+    walk(what, &a, &b, &mut found);
+    Ok(found)
 }
 
 /// First different entry of two tables.
@@ -173,36 +194,34 @@ mod tests {
     use crate::cli::testing::file_of;
     use crate::stream::synthetic::Synthetic;
 
-    fn compare(change: impl FnOnce(&mut crate::stream::MemoryTrace)) -> Option<String> {
+    fn compare(change: impl FnOnce(&mut crate::stream::MemoryTrace)) -> Vec<String> {
         let mut memory = Synthetic::default().generate();
         let left = file_of(&memory);
         change(&mut memory);
         let right = file_of(&memory);
         let open = |file: &tempfile::NamedTempFile| Trace::open(file.path()).unwrap();
-        first_difference(&open(&left), &open(&right), false).unwrap()
+        differences(&open(&left), &open(&right), false).unwrap()
     }
 
     #[test]
     fn a_trace_equals_itself() {
-        assert_eq!(compare(|_| ()), None);
+        assert_eq!(compare(|_| ()), Vec::<String>::new());
     }
 
     #[test]
     fn the_first_different_record_is_named() {
-        let text = compare(|memory| {
+        let found = compare(|memory| {
             memory.tiles[1][3].records[2].uv[1] += 1;
             memory.tiles[1][4].records[0].uv[1] += 1;
         });
-        let text = text.unwrap();
-        assert!(
-            text.starts_with("pass 1 tile 3 record 2 differs\n< {"),
-            "{text}"
-        );
+        assert_eq!(found.len(), 1);
+        let expected = "pass 1 tile 3 record 2 differs\n< {";
+        assert!(found[0].starts_with(expected), "{found:?}");
     }
 
     #[test]
     fn a_missing_record_is_named() {
-        let text = compare(|memory| {
+        let found = compare(|memory| {
             let tile = &mut memory.tiles[0][0];
             tile.records.pop();
             let last = tile.runs.last_mut().unwrap();
@@ -211,14 +230,37 @@ mod tests {
                 tile.runs.pop();
             }
         });
-        assert!(text.unwrap().ends_with("> no more records"));
+        assert!(found[0].ends_with("> no more records"), "{found:?}");
     }
 
     #[test]
     fn tables_are_compared_entry_by_entry() {
-        let text = compare(|memory| memory.tables.textures[0].name = "other".to_owned());
-        assert!(text.unwrap().starts_with("texture 0 differs"));
-        let text = compare(|memory| memory.tables.meta.seed += 1);
-        assert!(text.unwrap().starts_with("meta.seed differs"));
+        let found = compare(|memory| memory.tables.textures[0].name = "other".to_owned());
+        assert!(found[0].starts_with("texture 0 differs"), "{found:?}");
+        let found = compare(|memory| memory.tables.meta.seed += 1);
+        assert_eq!(found, ["meta.seed differs\n< 1\n> 2"]);
+    }
+
+    #[test]
+    fn what_comes_after_a_different_description_is_compared_as_well() {
+        let found = compare(|memory| {
+            memory.tables.meta.driver = "another driver".to_owned();
+            memory.tables.meta.hmd.ipd_m = 0.07;
+            memory.tables.textures[2].name = "other".to_owned();
+            memory.tiles[0][5].records[0].dx[0] += 1;
+        });
+        let what: Vec<&str> = found
+            .iter()
+            .filter_map(|text| text.lines().next())
+            .collect();
+        assert_eq!(
+            what,
+            [
+                "meta.driver differs",
+                "meta.hmd.ipd_m differs",
+                "texture 2 differs",
+                "pass 0 tile 5 record 0 differs"
+            ]
+        );
     }
 }

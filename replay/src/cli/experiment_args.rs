@@ -2,7 +2,7 @@
 
 use super::ConfigArgs;
 use super::subjects::Traces;
-use crate::config::{Order, RunConfig};
+use crate::config::{Mode, Order, RunConfig};
 use crate::experiment::{self, Plan, Subject};
 use crate::files::{self, write_atomically};
 use crate::paper::{self, z2};
@@ -56,7 +56,7 @@ impl ExperimentArgs {
         print: impl FnOnce(&PaperReport) -> Result<()>,
     ) -> Result<ExitCode> {
         self.threads.start()?;
-        let base = self.machine.resolve()?;
+        let base = self.machine.resolve_without_preset()?;
         let usual = RunConfig::default();
         ensure!(
             base.order == usual.order,
@@ -76,6 +76,13 @@ impl ExperimentArgs {
         files::check_outputs(outputs, traces.chain(images).chain(self.machine.file()))?;
         let caches = parse_caches(&self.caches)?;
         let mut plan = Plan::paper(base, &caches, &parse_orders(&self.orders)?, functional)?;
+        if let Some(preset) = self.machine.preset() {
+            ensure!(
+                base.mode == Mode::Timed,
+                "--preset: it stands beside the timed model; leave out --mode"
+            );
+            plan = plan.beside(preset, self.machine.resolve()?)?;
+        }
         if tile_maps {
             plan = plan.with_tile_maps();
         }

@@ -1,6 +1,9 @@
 //! The command line, one file a subcommand.
 
+mod accuracy;
 mod addresses;
+mod calibrate;
+mod compare;
 mod config_args;
 pub mod convert;
 pub mod diff;
@@ -64,10 +67,16 @@ enum Command {
     Dump(dump::DumpArgs),
     /// Print the first difference between two traces.
     Diff(diff::DiffArgs),
+    /// Hold two captures of the same views against each other, and what differs in the caches.
+    Compare(Box<compare::Args>),
     /// Write a trace's accesses for other simulators, or the trace in another encoding.
     Convert(Box<convert::ConvertArgs>),
     /// Replay the Z2 paper's experiment: its caches and orders, beside its published figures.
     Paper(Box<paper::Args>),
+    /// Measure what quicker or other ways of counting cost in accuracy and spare in time.
+    Accuracy(Box<accuracy::Args>),
+    /// Try settings of the paper's machine on some scenes and judge them on others.
+    Calibrate(Box<calibrate::Args>),
     /// Replay every point of an experiment file; goes on where it stopped.
     Sweep(sweep::Args),
     /// Write the experiment as one self-contained page, with JSON and CSV beside it.
@@ -93,8 +102,11 @@ pub fn main() -> ExitCode {
             Command::Validate(args) => validate::run(&args),
             Command::Dump(args) => dump::run(&args),
             Command::Diff(args) => diff::run(&args),
+            Command::Compare(args) => compare::run(&args),
             Command::Convert(args) => convert::run(&args),
             Command::Paper(args) => paper::run(&args),
+            Command::Accuracy(args) => accuracy::run(&args),
+            Command::Calibrate(args) => calibrate::run(&args),
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),
             Command::Techniques(args) => techniques::run(&args),

@@ -3,6 +3,7 @@
 use super::experiment_args::{ExperimentArgs, page_outputs};
 use super::parquet_arg::ParquetArg;
 use crate::files::write_atomically;
+use crate::report::errors;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::tables;
 use anyhow::{Result, ensure};
@@ -17,7 +18,7 @@ use std::process::ExitCode;
   replay paper crytek.textrace
   replay paper *.textrace --orders all --csv table.csv --parquet table.parquet
   replay paper mine.textrace --as crytek-sponza --html out/report.html
-  replay paper a.textrace --block-order morton --json")]
+  replay paper a.textrace --preset z2-paper --json")]
 pub struct Args {
     #[command(flatten)]
     experiment: ExperimentArgs,
@@ -83,6 +84,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 pub fn text(report: &PaperReport) -> String {
     let mut text = tables::table_2(report).text();
     let _ = write!(text, "\n{}", tables::averages(&report.averages).text());
+    if let Some(table) = tables::as_the_paper_counts(report) {
+        let _ = write!(
+            text,
+            "\nAs the paper counts (--preset z2-paper): first look-ups, merged requests counted; what memory sends is to the right\n{}",
+            table.text()
+        );
+    }
     if let Some(modes) = tables::modes(report) {
         let _ = write!(text, "\n{}", modes.text());
     }
@@ -90,8 +98,15 @@ pub fn text(report: &PaperReport) -> String {
     if fit.rows > 0 {
         let _ = write!(
             text,
-            "\nTMU utilisation against the paper's surface: mean absolute deviation {:.2} points, largest {:.2}, over {} rows\n",
+            "\nTMU utilisation against the paper's surface, at first look-ups: mean absolute deviation {:.2} points, largest {:.2}, over {} rows\n",
             fit.mean_absolute_points, fit.largest_points, fit.rows
+        );
+    }
+    if let Some(source) = errors::source() {
+        let _ = write!(
+            text,
+            "\nHow far the figures are off ({source})\n{}",
+            errors::table().text()
         );
     }
     for c in report

@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, requires = "json", conflicts_with = "addresses")]
     tiles: bool,
     /// Replay in both modes and print the difference
-    #[arg(long, conflicts_with_all = ["mode", "addresses"])]
+    #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"])]
     compare_modes: bool,
     /// Print the whole configuration as TOML and stop
     #[arg(long, conflicts_with_all = ["json", "compare_modes", "addresses"])]

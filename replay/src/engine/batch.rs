@@ -5,6 +5,7 @@
 //! *pass* ([`OnePass`]); every other configuration (another policy, timed) is a pass of its own.
 
 use super::counts::CacheCounts;
+use super::first_miss::FirstMiss;
 use super::functional::Functional;
 use super::one_pass::{LevelGeometry, OnePass, geometry};
 use super::summary::summary;
@@ -245,6 +246,10 @@ impl Pass<'_> {
         Ok(match (config.mode, levels.all_four_way()) {
             (Mode::Timed, Ok(levels)) => Box::new(Timed::new(levels, config.tmu, counts())),
             (Mode::Timed, Err(levels)) => Box::new(Timed::new(levels, config.tmu, counts())),
+            (Mode::FirstMiss, Ok(levels)) => Box::new(FirstMiss::new(levels, config.tmu, counts())),
+            (Mode::FirstMiss, Err(levels)) => {
+                Box::new(FirstMiss::new(levels, config.tmu, counts()))
+            }
             (Mode::Functional, Ok(levels)) => Box::new(Functional::new(levels, counts())),
             (Mode::Functional, Err(levels)) => Box::new(Functional::new(levels, counts())),
         })
@@ -349,6 +354,7 @@ impl Wave<'_> {
             let result = RunResult {
                 tmu,
                 cycles,
+                first_lookups: machine.first_lookups(),
                 ..summary(tables, expander.bins(), counts, &outcome.counts, config)
             };
             (self.finished)(index, result);

@@ -2,6 +2,7 @@
 
 mod batch;
 mod counts;
+mod first_miss;
 mod functional;
 mod one_pass;
 mod summary;
@@ -14,7 +15,7 @@ pub use batch::{Work, replay_all, sharing};
 
 use crate::config::{Assign, ConfigError, RunConfig};
 use crate::order::Phase;
-use crate::result::RunResult;
+use crate::result::{FirstLookups, RunResult};
 use crate::stream::{Cores, LineMemory, StreamError, TileSource};
 use std::sync::Mutex;
 use thiserror::Error;
@@ -62,4 +63,9 @@ trait Machine: Send {
 
     /// What was counted for one of its configurations.
     fn outcome(&self, config: &RunConfig) -> batch::Outcome;
+
+    /// What it counts besides where threads stop at their first miss.
+    fn first_lookups(&self) -> Option<FirstLookups> {
+        None
+    }
 }

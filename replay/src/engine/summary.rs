@@ -56,6 +56,7 @@ pub fn summary(
         access_hash: format!("{:016x}", trace.hash),
         tmu: None,
         cycles: None,
+        first_lookups: None,
         by_view,
         by_texture: sums(
             tables.textures.iter().map(|t| t.name.clone()).collect(),

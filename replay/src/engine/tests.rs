@@ -531,6 +531,7 @@ fn caches_take_lines_that_no_trace_sent() {
 }
 
 mod one_pass;
+mod plain_first_miss;
 mod plain_timed;
 
 /// The same frame several times over.

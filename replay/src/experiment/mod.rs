@@ -6,6 +6,7 @@
 //! points out to machines, [`run_part`] replays what one of them has to, and [`merge`] puts what
 //! all have kept together.
 
+mod calibration;
 mod file;
 mod outcome;
 mod plan;
@@ -14,6 +15,7 @@ mod split;
 mod store;
 mod subject;
 
+pub use calibration::{Objective, SceneFit, Trial, is_of_the_table, trials};
 pub use file::ExperimentFile;
 pub use outcome::{Outcome, ResultRow};
 pub use plan::{Axis, MOST_POINTS, Plan, PlanError, Point, Setting, plain};

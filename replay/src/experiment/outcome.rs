@@ -1,10 +1,11 @@
 //! Results in the order of the plan, as rows that know the points they are held against.
 
-use super::plan::functional;
+use super::plan::{functional, on_preset};
 use super::{Plan, Point, Setting, Subject, frame_count};
 use crate::config::Order;
 use crate::engine::Work;
 use crate::paper::z2::{self, PublishedRow};
+use crate::preset::Preset;
 use crate::result::RunResult;
 use std::collections::HashMap;
 
@@ -35,6 +36,10 @@ pub struct ResultRow<'a> {
     pub unchanged: Option<&'a RunResult>,
     /// The same settings in functional mode, where this is not that change.
     pub functional: Option<&'a RunResult>,
+    /// The same settings on the machine of [`Preset::Z2_PAPER`], where this is not that change.
+    pub z2_paper: Option<&'a RunResult>,
+    /// The same in Morton order.
+    pub z2_paper_morton: Option<&'a RunResult>,
     /// The paper's row for the scene that the trace stands for.
     pub paper: Option<&'static PublishedRow>,
 }
@@ -86,7 +91,8 @@ impl<'a> Outcome<'a> {
             index.get(&name(settings, change, order)).copied()
         };
         let functional = functional();
-        let neighbours: Vec<[Option<usize>; 3]> = points
+        let z2_paper = on_preset(Preset::Z2_PAPER);
+        let neighbours: Vec<[Option<usize>; 5]> = points
             .iter()
             .map(|p| {
                 let varies = p.settings.iter().any(|(key, _)| key == "order");
@@ -95,6 +101,9 @@ impl<'a> Outcome<'a> {
                     varies.then(|| find(&p.settings, p.change.as_ref(), Some(morton))),
                     p.change.as_ref().map(|_| find(&p.settings, None, None)),
                     (p.change.is_none()).then(|| find(&p.settings, Some(&functional), None)),
+                    (p.change.is_none()).then(|| find(&p.settings, Some(&z2_paper), None)),
+                    (p.change.is_none() && varies)
+                        .then(|| find(&p.settings, Some(&z2_paper), Some(morton))),
                 ]
                 .map(Option::flatten)
             })
@@ -102,7 +111,8 @@ impl<'a> Outcome<'a> {
         let mut rows = Vec::with_capacity(self.results.len());
         for (subject, results) in self.subjects.iter().zip(self.results.chunks(points.len())) {
             for ((point, result), of) in points.iter().zip(results).zip(&neighbours) {
-                let [morton, unchanged, functional] = of.map(|i| i.map(|i| &results[i]));
+                let [morton, unchanged, functional, z2_paper, z2_paper_morton] =
+                    of.map(|i| i.map(|i| &results[i]));
                 rows.push(ResultRow {
                     subject,
                     point,
@@ -110,6 +120,8 @@ impl<'a> Outcome<'a> {
                     morton,
                     unchanged,
                     functional,
+                    z2_paper,
+                    z2_paper_morton,
                     paper: published(subject, point, point.config.order),
                 });
             }

@@ -2,6 +2,7 @@
 
 use super::file::{parsed, set};
 use crate::config::{Mode, Order, RunConfig};
+use crate::preset::Preset;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 use toml::{Table, Value};
@@ -231,6 +232,31 @@ impl Plan {
         self
     }
 
+    /// Adds every timed point on another machine: `machine` but for its caches' sizes and its order.
+    ///
+    /// # Errors
+    /// A configuration that no machine can have.
+    pub fn beside(mut self, preset: Preset, machine: RunConfig) -> Result<Self, PlanError> {
+        let timed = (self.points.iter())
+            .filter(|point| point.change.is_none() && point.config.mode == Mode::Timed);
+        let others = timed.map(|point| {
+            let mut config = RunConfig {
+                order: point.config.order,
+                ..machine
+            };
+            config.l1.size_bytes = point.config.l1.size_bytes;
+            config.l2.size_bytes = point.config.l2.size_bytes;
+            Point {
+                settings: point.settings.clone(),
+                change: Some(on_preset(preset)),
+                config,
+            }
+        });
+        let others: Vec<Point> = others.collect();
+        self.points.extend(others);
+        self.checked()
+    }
+
     /// Adds every timed point in functional mode.
     fn add_functional(&mut self) {
         let timed = self.points.iter().filter(|p| p.config.mode == Mode::Timed);
@@ -261,4 +287,9 @@ impl Plan {
 /// The change to functional mode.
 pub(super) fn functional() -> Setting {
     ("mode".to_owned(), Value::String("functional".to_owned()))
+}
+
+/// The change to the machine of a preset.
+pub(super) fn on_preset(preset: Preset) -> Setting {
+    ("preset".to_owned(), Value::String(preset.name().to_owned()))
 }

@@ -17,6 +17,7 @@ mod cost {
     pub const FUNCTIONAL: u64 = 3;
     pub const FUNCTIONAL_PART: (u64, u64) = (1, 8);
     pub const TIMED: u64 = 6;
+    pub const FIRST_MISS: u64 = 9;
 }
 
 /// Points of a trace that are replayed together.
@@ -130,6 +131,7 @@ fn pass_cost(config: &RunConfig, configs: u64) -> u64 {
     let (part, of) = cost::FUNCTIONAL_PART;
     match config.mode {
         Mode::Timed => cost::TIMED,
+        Mode::FirstMiss => cost::FIRST_MISS,
         Mode::Functional => cost::FUNCTIONAL + cost::FUNCTIONAL * (configs - 1) * part / of,
     }
 }

@@ -3,6 +3,7 @@
 //! The papers' scenes are not free. A scene of ours stands for one of them when its short name is
 //! in the paper's table, or when the command line says so; nothing is guessed from parts of names.
 
+pub mod score;
 pub mod sgrt;
 pub mod vr;
 pub mod z2;

@@ -48,10 +48,14 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("external traffic over the bound"),
         Figure::real("over_base", "external", "\u{d7} base", 3, |r| over(r.result.external_bytes, r.unchanged?.external_bytes))
             .about("external traffic over that of the same settings without the change"),
+        Figure::real("first_l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.result))
+            .about("footprints whose first look-up found a line absent or on its way"),
+        Figure::real("first_l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.result))
+            .about("lines of these look-ups that the L2 had not, merged requests counted"),
         Figure::real("closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.result))
-            .about("utilisation that the Z2 paper's table implies for these miss rates"),
-        Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| Some(tmu_util_pct(r.result)? - closed_form_pct(r.result)))
-            .about("simulated utilisation less the one that the Z2 paper's table implies for these miss rates"),
+            .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
+        Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.result))
+            .about("simulated utilisation less the one that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("cycles", "cycles", "", 0, |r| r.result.cycles)
             .about("cycles until the last core is done"),
     ]
@@ -80,9 +84,41 @@ fn functional<'a>() -> Vec<Figure<'a>> {
     ]
 }
 
+/// The same point on the machine of `--preset z2-paper`: rates of first look-ups, then what is
+/// counted as everywhere else.
+#[rustfmt::skip]
+fn z2_paper<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::real("z2_paper.l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.z2_paper?))
+            .about("footprints whose first look-up found a line absent or on its way"),
+        Figure::real("z2_paper.l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.z2_paper?))
+            .about("lines of these look-ups that the L2 had not, merged requests counted"),
+        Figure::real("z2_paper.tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.z2_paper?))
+            .about("cycles in which a footprint leaves the texture unit"),
+        Figure::real("z2_paper.tmu_ratio", "TMU", "\u{d7} Morton", 3, |r| Some(utilization(r.z2_paper?)? / utilization(r.z2_paper_morton?)?))
+            .about("utilisation over Morton order's"),
+        Figure::real("z2_paper.closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.z2_paper?))
+            .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
+        Figure::real("z2_paper.closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.z2_paper?))
+            .about("simulated utilisation less the one that the Z2 paper's table implies for the rates of first look-ups"),
+        Figure::real("z2_paper.product_reduction_pct", "saved, L1 \u{d7} L2", "% of Morton", 1, |r| product_saved_pct(r))
+            .about("saved by the product of both rates, as the paper's figures give it; merged requests count"),
+        Figure::real("z2_paper.primary_l1_miss_pct", "primary L1", "%", 2, |r| Some(100.0 * r.z2_paper?.l1.miss_rate))
+            .about("footprints that fetched a line"),
+        Figure::real("z2_paper.primary_l2_miss_pct", "primary L2", "%", 2, |r| Some(100.0 * r.z2_paper?.l2.miss_rate))
+            .about("fetched lines that came from memory"),
+        Figure::real("z2_paper.external_bytes", "external", "bytes", 0, |r| Some(r.z2_paper?.external_bytes))
+            .about("what memory sent"),
+        Figure::real("z2_paper.external_mb_per_frame", "external", "MB/frame", 2, |r| Some(r.mb_per_frame(r.z2_paper?.external_bytes)))
+            .about("what memory sent"),
+        Figure::real("z2_paper.reduction_pct", "saved", "% of Morton", 1, |r| saved_pct(r.z2_paper?, r.z2_paper_morton?))
+            .about("what memory sent less against Morton order"),
+    ]
+}
+
 impl Row for ResultRow<'_> {
     fn columns() -> Vec<Column<'static, Self>> {
-        [identity(), figures(), published(), functional()]
+        [identity(), figures(), published(), functional(), z2_paper()]
             .into_iter()
             .flatten()
             .collect()
@@ -125,8 +161,33 @@ fn tmu_util_pct(result: &RunResult) -> Option<f64> {
     Some(100.0 * utilization(result)?)
 }
 
-fn closed_form_pct(result: &RunResult) -> f64 {
-    100.0 * closed_form(result.l1.miss_rate, result.l2.miss_rate)
+fn first_l1_pct(result: &RunResult) -> Option<f64> {
+    Some(100.0 * result.first_lookups?.l1_miss_rate)
+}
+
+fn first_l2_pct(result: &RunResult) -> Option<f64> {
+    Some(100.0 * result.first_lookups?.l2_miss_rate)
+}
+
+/// The closed form relates rates that are counted as the paper's are; primary rates are others.
+fn closed_form_pct(result: &RunResult) -> Option<f64> {
+    let first = result.first_lookups?;
+    Some(100.0 * closed_form(first.l1_miss_rate, first.l2_miss_rate))
+}
+
+fn deviation_points(result: &RunResult) -> Option<f64> {
+    Some(tmu_util_pct(result)? - closed_form_pct(result)?)
+}
+
+fn product_saved_pct(row: &ResultRow) -> Option<f64> {
+    let product = |result: &RunResult| Some(first_l1_pct(result)? * first_l2_pct(result)?);
+    let morton = product(row.z2_paper_morton?)?;
+    (morton > 0.0).then_some(100.0 * (1.0 - product(row.z2_paper?)? / morton))
+}
+
+fn saved_pct(result: &RunResult, morton: &RunResult) -> Option<f64> {
+    let rest = over(result.external_bytes, morton.external_bytes)?;
+    Some(100.0 * (1.0 - rest))
 }
 
 /// `part / whole`, none when the whole is nothing.
@@ -154,7 +215,7 @@ mod tests {
             .collect();
         let mut runs = prefixes.clone();
         runs.dedup();
-        assert_eq!(runs, ["paper", "functional"]);
+        assert_eq!(runs, ["paper", "functional", "z2_paper"]);
     }
 
     #[test]

@@ -1,7 +1,11 @@
 //! Prints results: tables, plots, JSON, CSV and pages. What is printed is computed elsewhere.
 
+pub mod accuracy;
 pub mod addresses;
+pub mod calibration;
 pub mod columns;
+pub mod compare;
+pub mod errors;
 pub mod figures;
 pub mod html;
 pub mod locality;

@@ -62,6 +62,7 @@ pub fn text(row: &ResultRow) -> String {
     let views = Table::new(&Part::columns(), &result.by_view);
     let mode = match config.mode {
         Mode::Timed => "timed",
+        Mode::FirstMiss => "first-miss",
         Mode::Functional => "functional",
     };
     let mut text = format!(

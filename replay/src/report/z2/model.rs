@@ -4,6 +4,7 @@ use crate::config::{Order, RunConfig};
 use crate::experiment::{Outcome, ResultRow, Subject, frame_count};
 use crate::paper::z2::{self, PublishedRow};
 use crate::report::columns::{Column, Records, Row, Value};
+use crate::report::errors::{self, KnownError};
 use crate::report::figures::{Figure, number};
 use crate::report::table::Table;
 use crate::result::{Part, TOOL, TileMap, TraceId};
@@ -72,14 +73,15 @@ impl Row for Average {
     }
 }
 
-/// How far utilisation is from the surface of the paper's table.
+/// How far utilisation is from the surface of the paper's table, at rates that are counted as the
+/// paper's are: on the machine of `--preset z2-paper`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Deviation {
-    /// Mean absolute deviation over the timed rows, points.
+    /// Mean absolute deviation, points.
     pub mean_absolute_points: f64,
     /// Largest absolute deviation, points.
     pub largest_points: f64,
-    /// Timed rows.
+    /// Rows of that machine.
     pub rows: usize,
 }
 
@@ -266,6 +268,7 @@ impl<'a> PaperReport<'a> {
             },
             closed_form: self.closed_form,
             conservation: &self.conservation,
+            errors: errors::known(),
             details: details.map(Detail::new).collect(),
         })
     }
@@ -282,6 +285,8 @@ struct Document<'a, 'r> {
     averages: Records<'a, 'static, Average>,
     closed_form: Deviation,
     conservation: &'a [Conservation],
+    /// What is known of the figures' errors.
+    errors: &'a [KnownError],
     details: Vec<Detail<'a>>,
 }
 
@@ -359,7 +364,7 @@ fn conservation<'r>(
 fn deviation(rows: &[ResultRow]) -> Deviation {
     let points: Vec<f64> = rows
         .iter()
-        .filter_map(|row| Some(number(row, "closed_form_deviation_points")?.abs()))
+        .filter_map(|row| Some(number(row, "z2_paper.closed_form_deviation_points")?.abs()))
         .collect();
     Deviation {
         mean_absolute_points: mean(points.iter().copied()).unwrap_or(0.0),

@@ -4,9 +4,11 @@ use super::model::{PaperReport, TraceInfo};
 use super::plots::{self, TileMeasure};
 use super::tables;
 use crate::config::{Mode, Order};
+use crate::report::errors;
 use crate::report::html::{self, Section, figures, folded};
 use crate::report::picture::EmbeddedPicture;
 use crate::report::plots::PlotError;
+use crate::report::table::Table;
 use crate::result::TOOL;
 use maud::{Markup, html};
 
@@ -37,6 +39,12 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
         bandwidth(report)?,
     ));
     sections.push(Section::new("Charts of Table 2", rates(report)?));
+    if let Some(table) = tables::as_the_paper_counts(report) {
+        sections.push(Section::new(
+            "As the paper counts",
+            as_the_paper_counts(&table),
+        ));
+    }
     if report.closed_form.rows > 0 {
         sections.push(Section::new(
             "TMU utilisation and the paper's surface",
@@ -53,6 +61,12 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
     sections.push(Section::new("Heat maps by tile", heat_maps(report)?));
     sections.push(Section::new("By mip level", levels(report)?));
     sections.push(Section::new("By texture", textures(report)?));
+    if let Some(source) = errors::source() {
+        sections.push(Section::new(
+            "How far the figures are off",
+            html! { p { "Measured by " (source) "; what is not listed was not measured." } (errors::table().markup()) },
+        ));
+    }
     sections.push(Section::new("Configuration", configuration(report)));
     let lead = html! {
         p {
@@ -151,6 +165,22 @@ fn table_2(report: &PaperReport) -> Markup {
     html! {
         (table.markup())
         p.note { "A footprint is one bilinear fetch of one lane; MB are 10\u{2076} bytes. The paper's saving is computed from its two miss rates." }
+        dl.note {
+            @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
+                dt { (h.name) ", " (h.unit) } dd { (h.about) }
+            }
+        }
+    }
+}
+
+fn as_the_paper_counts(table: &Table) -> Markup {
+    html! {
+        p {
+            "The same frames on the machine of " code { "--preset z2-paper" } ": a thread stops at its first miss, and rates are of first "
+            "look-ups, where lines on their way are misses, too. Merged requests never leave the chip, so the product of these rates is "
+            "no traffic; what memory sends stands to the right. The settings were found by search."
+        }
+        (table.markup())
         dl.note {
             @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
                 dt { (h.name) ", " (h.unit) } dd { (h.about) }
@@ -304,6 +334,7 @@ fn configuration(report: &PaperReport) -> Markup {
     let caches = report.caches();
     let mode = match report.config.mode {
         Mode::Timed => "timed",
+        Mode::FirstMiss => "first-miss",
         Mode::Functional => "functional",
     };
     html! {

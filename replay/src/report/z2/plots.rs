@@ -105,7 +105,7 @@ pub fn rates(report: &PaperReport, scene: &str) -> Vec<BarChart> {
     .collect()
 }
 
-/// Miss rates of every row on the paper's utilisation surface.
+/// Rates of first look-ups of every row on the paper's utilisation surface.
 ///
 /// # Errors
 /// See [`ContourChart::svg`].
@@ -129,8 +129,8 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
                 .iter()
                 .filter(|r| r.point.config.order == order)
                 .filter_map(|r| {
-                    let l1_miss_pct = number(r, "l1_miss_pct")?;
-                    Some((l1_miss_pct.max(0.5), number(r, "l2_miss_pct")?))
+                    let l1_miss_pct = number(r, "z2_paper.l1_miss_pct")?;
+                    Some((l1_miss_pct.max(0.5), number(r, "z2_paper.l2_miss_pct")?))
                 })
                 .collect(),
             hollow: false,
@@ -141,7 +141,7 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
         .flat_map(|s| s.points.iter().map(|p| p.0))
         .fold(32.0, f64::max);
     ContourChart {
-        title: "Miss rates on the surface of TMU utilisation".to_owned(),
+        title: "First look-ups on the surface of TMU utilisation".to_owned(),
         x_label: "L1 miss rate, % (logarithmic)".to_owned(),
         y_label: "L2 miss rate, %; lines: utilisation that the paper's table implies".to_owned(),
         x_range: (0.5, largest.log2().ceil().exp2()),
@@ -152,7 +152,7 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
     .svg()
 }
 
-/// Simulated utilisation against the closed form; `None` when no row was timed.
+/// Simulated utilisation against the closed form; `None` without the machine of the preset.
 #[must_use]
 pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
     let mut series: Vec<LineSeries> = report
@@ -166,8 +166,8 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
                 .filter(|r| r.point.config.order == order)
                 .filter_map(|r| {
                     Some((
-                        number(r, "closed_form_util_pct")?,
-                        number(r, "tmu_util_pct")?,
+                        number(r, "z2_paper.closed_form_util_pct")?,
+                        number(r, "z2_paper.tmu_util_pct")?,
                     ))
                 })
                 .collect(),

@@ -5,7 +5,10 @@ use crate::config::RunConfig;
 use crate::engine::Work;
 use crate::experiment::{Outcome, Plan, Subject};
 use crate::paper::z2;
-use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap, TmuResult, TraceId};
+use crate::preset::Preset;
+use crate::result::{
+    FirstLookups, LevelCounters, LevelResult, Part, RunResult, TileMap, TmuResult, TraceId,
+};
 use crate::stream::MemoryTrace;
 use crate::stream::testing::tables;
 
@@ -28,7 +31,10 @@ pub(crate) fn with_edited<T>(
         ..Subject::new(&trace, TraceId::default(), scene.to_owned())
     });
     let caches = z2::CACHES_KIB.map(|(l1, l2)| (u64::from(l1) << 10, u64::from(l2) << 10));
-    let plan = Plan::paper(RunConfig::default(), &caches, &z2::ORDERS, true)
+    let base = RunConfig::default();
+    let preset = Preset::Z2_PAPER;
+    let plan = Plan::paper(base, &caches, &z2::ORDERS, true)
+        .and_then(|plan| plan.beside(preset, preset.over(base)))
         .unwrap()
         .with_tile_maps();
     let mut results = Vec::new();
@@ -110,6 +116,11 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
             ..TmuResult::default()
         }),
         cycles: Some(30_000_000),
+        first_lookups: Some(FirstLookups {
+            l1_miss_rate: l1_pct / 100.0,
+            l2_miss_rate: l2_pct / 100.0,
+            ..FirstLookups::default()
+        }),
         by_view: parts(&["left", "right"]),
         by_texture: parts(&textures),
         by_level: parts(&["level 0", "level 1", "level 2", "level 3", "level 4"]),

@@ -1,0 +1,176 @@
+//! `replay calibrate`: settings tried on some scenes and judged on others, against the Z2 paper.
+
+use super::ConfigArgs;
+use super::subjects::Traces;
+use crate::config::Mode;
+use crate::experiment::{self, Axis, Objective, Plan, Store, trials};
+use crate::paper::z2;
+use crate::preset::Preset;
+use crate::report::calibration::CalibrationReport;
+use anyhow::{Context, Result, bail, ensure};
+use shell::Progress;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use toml::Value;
+
+/// Arguments of `replay calibrate`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  replay calibrate *.textrace --try tmu.loop_cycles=16,20,24,28,32
+  replay calibrate *.textrace --held-out atrium,jungle --objective table \\
+    --try sampling.max_anisotropy=1,2 --try layout.base_align_bytes=64,4096,65536")]
+pub struct Args {
+    /// Texture traces
+    #[arg(required = true, value_name = "TRACE")]
+    traces: Vec<PathBuf>,
+    /// Values to try of a key of the configuration; several keys: every combination
+    #[arg(long = "try", value_name = "KEY=V1,V2,...", required = true)]
+    tries: Vec<String>,
+    /// Labels of the scenes that settings are not chosen by, comma-separated; every second one if
+    /// not given
+    #[arg(long, value_name = "LABELS")]
+    held_out: Option<String>,
+    /// What settings are chosen by
+    #[arg(long, value_enum, default_value_t = Objective::Surface)]
+    objective: Objective,
+    /// Folder that keeps results, so that a search goes on where it stopped
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    machine: ConfigArgs,
+    /// Print one JSON object (schema replay.calibration/1)
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    threads: shell::Threads,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// Wrong arguments, an impossible configuration, an unreadable trace.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let preset = args.machine.preset().unwrap_or(Preset::Z2_PAPER);
+    let usual = crate::config::RunConfig::default();
+    let base = args.machine.resolve_over(preset.over(usual))?;
+    ensure!(
+        base.mode == Mode::FirstMiss,
+        "--mode: expected first-miss, whose rates are counted as the paper's are"
+    );
+    let tries: Vec<Axis> = args
+        .tries
+        .iter()
+        .map(|text| axis(text))
+        .collect::<Result<_>>()?;
+    let sizes = |of: fn(&(u32, u32)) -> u32| {
+        let mut sizes: Vec<u32> = z2::CACHES_KIB.iter().map(of).collect();
+        sizes.sort_unstable();
+        sizes.dedup();
+        let bytes = |kib: u32| Value::Integer(i64::from(kib) << 10);
+        sizes.into_iter().map(bytes).collect()
+    };
+    let name = |order: &crate::config::Order| Value::String(order.name().to_owned());
+    let table = [
+        ("l1.size_bytes", sizes(|c| c.0)),
+        ("l2.size_bytes", sizes(|c| c.1)),
+        ("order", z2::ORDERS.iter().map(name).collect()),
+    ];
+    let table = table.map(|(key, values)| Axis {
+        key: key.to_owned(),
+        values,
+    });
+    let axes: Vec<Axis> = tries.into_iter().chain(table).collect();
+    let plan = Plan::cross(base, &axes, &[])?;
+    args.threads.start()?;
+    let traces = Traces::open(&args.traces)?;
+    let subjects = traces.subjects();
+    let labels: Vec<&str> = subjects.iter().map(|s| s.label.as_str()).collect();
+    let held_out = held_out(args.held_out.as_deref(), &labels)?;
+    let store = args.out.as_deref().map(Store::new);
+    let replays = (subjects.len() * plan.points.len()) as u64;
+    let progress = Progress::new("replaying", replays, "replays");
+    let done = |done| progress.advance(done);
+    let outcome = experiment::run(&plan, &subjects, store.as_ref(), &done)?;
+    drop(progress);
+    let trials = trials(&plan, &outcome, &held_out, args.objective);
+    let report = CalibrationReport::new(base, args.objective, trials);
+    super::print(&if args.json {
+        report.json()?
+    } else {
+        report.text()
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `KEY=V1,V2,...`; values are numbers and truth values where they read as such, else text.
+fn axis(text: &str) -> Result<Axis> {
+    let (key, values) = text
+        .split_once('=')
+        .filter(|(key, values)| !key.is_empty() && !values.is_empty())
+        .with_context(|| format!("--try {text}: expected KEY=V1,V2,..."))?;
+    ensure!(
+        !experiment::is_of_the_table(key),
+        "--try {key}: the paper's table varies it"
+    );
+    let value = |text: &str| {
+        let text = text.trim();
+        let number = text.parse().map(Value::Integer).ok();
+        let real = || text.parse().map(Value::Float).ok();
+        let flag = || text.parse().map(Value::Boolean).ok();
+        let value = number.or_else(real).or_else(flag);
+        value.unwrap_or_else(|| Value::String(text.to_owned()))
+    };
+    Ok(Axis {
+        key: key.to_owned(),
+        values: values.split(',').map(value).collect(),
+    })
+}
+
+/// Which labels are held out.
+fn held_out(asked: Option<&str>, labels: &[&str]) -> Result<Vec<bool>> {
+    let Some(asked) = asked else {
+        return Ok((0..labels.len()).map(|index| index % 2 == 1).collect());
+    };
+    let asked: Vec<&str> = asked.split(',').map(str::trim).collect();
+    for label in &asked {
+        if !labels.contains(label) {
+            let known = labels.join(", ");
+            bail!("--held-out: expected some of {known}, found `{label}`");
+        }
+    }
+    Ok(labels.iter().map(|label| asked.contains(label)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_as_what_they_look_like() {
+        let axis = axis("sampling.lod_bias=0,-0.5,true,softpipe").unwrap();
+        assert_eq!(axis.key, "sampling.lod_bias");
+        let values: Vec<String> = axis.values.iter().map(Value::to_string).collect();
+        assert_eq!(values, ["0", "-0.5", "true", "\"softpipe\""]);
+    }
+
+    #[test]
+    fn what_cannot_be_tried_is_refused() {
+        for (text, message) in [
+            ("loop", "--try loop: expected KEY=V1,V2,..."),
+            ("order=morton", "--try order: the paper's table varies it"),
+        ] {
+            assert_eq!(axis(text).unwrap_err().to_string(), message);
+        }
+    }
+
+    #[test]
+    fn every_second_scene_is_held_out_unless_said_otherwise() {
+        let labels = ["a", "b", "c"];
+        assert_eq!(held_out(None, &labels).unwrap(), [false, true, false]);
+        assert_eq!(held_out(Some("a,c"), &labels).unwrap(), [true, false, true]);
+        assert_eq!(
+            held_out(Some("d"), &labels).unwrap_err().to_string(),
+            "--held-out: expected some of a, b, c, found `d`"
+        );
+    }
+}

@@ -1,0 +1,91 @@
+//! `replay compare`: how two captures of the same views differ, and what that does to the caches.
+
+use super::ConfigArgs;
+use super::experiment_args::parse_orders;
+use super::subjects::Traces;
+use crate::compare::compare;
+use crate::config::Order;
+use crate::experiment::{self, Axis, Plan};
+use crate::report::compare::{CompareReport, Replayed, Side};
+use anyhow::{Context, Result, ensure};
+use shell::Progress;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use toml::Value;
+
+/// Arguments of `replay compare`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Exit code: 0 compared, 2 unreadable, or not of the same views and textures.
+
+Examples:
+  replay compare lavapipe.textrace osmesa.textrace
+  replay compare full.textrace foveated.textrace --mode functional --json
+  replay compare a.textrace b.textrace --orders all --l1 16KiB --l2 256KiB"
+)]
+pub struct Args {
+    /// One capture
+    a: PathBuf,
+    /// The other one, of the same views
+    b: PathBuf,
+    /// Orders to replay both in, comma-separated, or `all`
+    #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
+    orders: String,
+    #[command(flatten)]
+    machine: ConfigArgs,
+    /// Print one JSON object (schema replay.compare/1)
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    threads: shell::Threads,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// Wrong arguments, an unreadable trace, captures of different views or textures.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let config = args.machine.resolve()?;
+    ensure!(
+        args.machine.first_of_traces() != Some("--order"),
+        "--order is varied here; use --orders"
+    );
+    let orders = parse_orders(&args.orders)?;
+    args.threads.start()?;
+    let traces = Traces::open(&[args.a.clone(), args.b.clone()])?;
+    let subjects = traces.subjects();
+    let [a, b] = [&subjects[0], &subjects[1]];
+    let comparison = compare([a.source, b.source], &config.sampling)
+        .with_context(|| format!("{} and {}", args.a.display(), args.b.display()))?;
+    let name = |order: &Order| Value::String(order.name().to_owned());
+    let axis = Axis {
+        key: "order".to_owned(),
+        values: orders.iter().map(name).collect(),
+    };
+    let plan = Plan::cross(config, &[axis], &[])?;
+    let progress = Progress::new("replaying", 2 * orders.len() as u64, "replays");
+    let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
+    drop(progress);
+    let rows = outcome.rows();
+    let (of_a, of_b) = rows.split_at(orders.len());
+    let replayed = of_a.iter().zip(of_b).map(|(a, b)| Replayed {
+        order: a.point.config.order,
+        results: [a.result, b.result],
+        morton: a.morton.zip(b.morton).map(|(a, b)| [a, b]),
+    });
+    let report = CompareReport {
+        sides: [a, b].map(|subject| Side {
+            trace: &subject.id,
+            meta: &subject.source.tables().meta,
+        }),
+        config,
+        comparison: &comparison,
+        replayed: replayed.collect(),
+    };
+    super::print(&if args.json {
+        report.json()?
+    } else {
+        report.text()
+    })?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,31 @@
+//! Why two captures cannot be held against each other.
+
+use std::fmt::Debug;
+
+/// What the captures do not have in common.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: expected the same in both traces, found {left} and {right}")]
+pub struct NotComparable {
+    /// Which part of the tables.
+    pub what: String,
+    /// The first trace's.
+    pub left: String,
+    /// The second one's.
+    pub right: String,
+}
+
+/// Refuses what differs.
+pub fn same<T: PartialEq + Debug>(
+    what: impl FnOnce() -> String,
+    left: &T,
+    right: &T,
+) -> Result<(), NotComparable> {
+    if left == right {
+        return Ok(());
+    }
+    Err(NotComparable {
+        what: what(),
+        left: format!("{left:?}"),
+        right: format!("{right:?}"),
+    })
+}

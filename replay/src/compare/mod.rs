@@ -1,0 +1,124 @@
+//! How two captures of the same views differ, fragment by fragment.
+//!
+//! A fragment is a lane of a quad of a primitive; primitives have the same numbers in both. What is
+//! in both is held against each other: texture coordinates, levels of detail and footprints. What
+//! that does to caches is the replay's to say.
+
+mod fault;
+mod partners;
+mod spread;
+mod tally;
+#[cfg(test)]
+mod tests;
+mod tile;
+
+pub use fault::NotComparable;
+pub use spread::Spread;
+pub use tally::Tally;
+
+use crate::config::SamplingConfig;
+use crate::order::TileRef;
+use crate::stream::{StreamError, TileSource};
+use partners::Partners;
+use rayon::prelude::*;
+use serde::Serialize;
+use tile::Comparer;
+
+/// Why there is no comparison.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// The captures do not show the same.
+    #[error(transparent)]
+    NotComparable(#[from] NotComparable),
+    /// A trace cannot be read.
+    #[error(transparent)]
+    Trace(#[from] StreamError),
+}
+
+/// A part of the fragments: a material's, or those of opaque draws.
+#[derive(Clone, Debug, Serialize)]
+pub struct Class {
+    /// What they have in common.
+    pub name: String,
+    /// How they differ.
+    #[serde(flatten)]
+    pub tally: Tally,
+}
+
+/// How two captures differ.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// All fragments.
+    pub all: Tally,
+    /// Opaque draws and others, where the first trace tells them apart.
+    pub by_opacity: Vec<Class>,
+    /// By material, in the order of the first trace's draws.
+    pub by_material: Vec<Class>,
+    /// Tiles of which any record differs.
+    pub tiles_that_differ: u64,
+    /// Tiles of the views.
+    pub tiles: u64,
+}
+
+/// Holds two captures against each other under one sampling.
+///
+/// # Errors
+/// Captures that do not show the same views of the same textured triangles; a tile that cannot be
+/// read.
+pub fn compare(
+    traces: [&dyn TileSource; 2],
+    sampling: &SamplingConfig,
+) -> Result<Comparison, CompareError> {
+    /// Tiles that a thread compares at a time.
+    const CHUNK: usize = 64;
+    let partners = Partners::new(traces.map(TileSource::tables))?;
+    let passes = &traces[0].tables().passes;
+    let tiles: Vec<TileRef> = (0..)
+        .zip(passes)
+        .flat_map(|(pass, p)| (0..p.tile_count()).map(move |tile| TileRef { pass, tile }))
+        .collect();
+    let chunk = |tiles: &[TileRef]| -> Result<_, StreamError> {
+        let mut comparer = Comparer::new(traces, &partners, sampling);
+        for &at in tiles {
+            comparer.tile(at)?;
+        }
+        Ok(comparer.finish())
+    };
+    let chunks: Vec<_> = tiles.par_chunks(CHUNK).map(chunk).collect();
+    let mut by_draw = vec![Tally::default(); partners.count()];
+    let mut tiles_that_differ = 0;
+    for chunk in chunks {
+        let (tallies, differing) = chunk?;
+        tiles_that_differ += differing;
+        for (sum, tally) in by_draw.iter_mut().zip(&tallies) {
+            sum.add(tally);
+        }
+    }
+    let mut all = Tally::default();
+    by_draw.iter().for_each(|tally| all.add(tally));
+    Ok(Comparison {
+        all,
+        by_opacity: classes(&by_draw, |draw| partners.opacity(draw)),
+        by_material: classes(&by_draw, |draw| Some(partners.material(draw))),
+        tiles_that_differ,
+        tiles: tiles.len() as u64,
+    })
+}
+
+/// Draws of one name together, in the order in which names come up.
+fn classes<'n>(by_draw: &[Tally], name: impl Fn(usize) -> Option<&'n str>) -> Vec<Class> {
+    let mut classes: Vec<Class> = Vec::new();
+    for (draw, tally) in by_draw.iter().enumerate() {
+        let Some(name) = name(draw).filter(|_| !tally.is_empty()) else {
+            continue;
+        };
+        match classes.iter_mut().find(|class| class.name == name) {
+            Some(class) => class.tally.add(tally),
+            None => classes.push(Class {
+                name: name.to_owned(),
+                tally: tally.clone(),
+            }),
+        }
+    }
+    classes
+}

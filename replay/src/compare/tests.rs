@@ -1,0 +1,193 @@
+//! An altered capture whose differences are known exactly.
+
+use super::*;
+use crate::stream::MemoryTrace;
+use crate::stream::synthetic::Synthetic;
+use formats::textrace::SUBTEXELS;
+
+fn small() -> MemoryTrace {
+    Synthetic {
+        size_px: [64, 48],
+        patch_px: 20,
+        layers: 2,
+        materials: 3,
+        textures: 2,
+        ..Synthetic::default()
+    }
+    .generate()
+}
+
+fn compared(a: &MemoryTrace, b: &MemoryTrace) -> Comparison {
+    compare([a, b], &SamplingConfig::default()).unwrap()
+}
+
+fn refused(change: impl FnOnce(&mut MemoryTrace)) -> String {
+    let a = small();
+    let mut b = a.clone();
+    change(&mut b);
+    let error = compare([&a, &b], &SamplingConfig::default()).unwrap_err();
+    error.to_string()
+}
+
+/// The first tile of the right eye with a fully covered quad, and that record.
+fn full_quad(trace: &MemoryTrace) -> (usize, usize) {
+    let tiles = trace.tiles[1].iter().enumerate();
+    let find = |(tile, t): (usize, &formats::textrace::Tile)| {
+        let record = t.records.iter().position(|record| record.mask == 15)?;
+        Some((tile, record))
+    };
+    tiles.filter_map(find).next().unwrap()
+}
+
+#[test]
+fn a_capture_does_not_differ_from_itself() {
+    let trace = small();
+    let found = compared(&trace, &trace);
+    let lanes = trace.tiles.iter().flatten().flat_map(|tile| &tile.records);
+    let lanes: u64 = lanes
+        .map(|record| u64::from(record.mask.count_ones()))
+        .sum();
+    assert_eq!(found.all.fragments_in_both, lanes);
+    // Two textures, and two levels each or one.
+    assert!(found.all.footprints > 2 * lanes && found.all.footprints <= 4 * lanes);
+    assert_eq!(found.all.uv_texels.count(), lanes);
+    let differences = [
+        found.all.fragments_only_in_a,
+        found.all.fragments_only_in_b,
+        found.all.footprints_that_differ,
+        found.all.lanes_sampled_differently,
+        found.tiles_that_differ,
+    ];
+    assert_eq!(differences, [0; 5]);
+    assert_eq!(found.all.uv_texels.largest(), 0.0);
+    assert_eq!(found.all.intersection_over_union_pct(), 100.0);
+}
+
+#[test]
+fn lanes_that_one_capture_lacks_are_counted_on_its_side() {
+    let a = small();
+    let mut b = a.clone();
+    let (tile, record) = full_quad(&b);
+    b.tiles[1][tile].records[record].mask = 0b0110;
+    let found = compared(&a, &b);
+    let counts = |t: &Tally| {
+        (
+            t.fragments_only_in_a,
+            t.fragments_only_in_b,
+            t.footprints_that_differ,
+        )
+    };
+    assert_eq!(counts(&found.all), (2, 0, 0));
+    assert_eq!(counts(&compared(&b, &a).all), (0, 2, 0));
+    assert_eq!(found.tiles_that_differ, 1);
+    assert_eq!(
+        found.by_material.iter().map(|c| counts(&c.tally).0).max(),
+        Some(2)
+    );
+    assert_eq!(
+        found
+            .by_material
+            .iter()
+            .map(|c| counts(&c.tally).0)
+            .sum::<u64>(),
+        2
+    );
+}
+
+#[test]
+fn a_primitive_that_one_capture_lacks_takes_its_fragments_along() {
+    let a = small();
+    let mut b = a.clone();
+    let tile = b.tiles[0].iter().position(|t| !t.runs.is_empty()).unwrap();
+    let tile = &mut b.tiles[0][tile];
+    let gone = tile.runs.pop().unwrap();
+    let gone = tile.records.split_off(gone.first as usize);
+    let lanes: u64 = gone.iter().map(|r| u64::from(r.mask.count_ones())).sum();
+    assert_eq!(compared(&a, &b).all.fragments_only_in_a, lanes);
+}
+
+#[test]
+fn moved_coordinates_are_measured_in_texels() {
+    let a = small();
+    let mut b = a.clone();
+    let (tile, record) = full_quad(&b);
+    // By three and a half texels of level 0: no footprint of the four lanes on any level that is
+    // read stays the same only where levels are coarse; at level 0 all differ.
+    let moved = &mut b.tiles[1][tile].records[record];
+    moved.uv[1] += 7 * SUBTEXELS / 2;
+    moved.uv[0] -= SUBTEXELS / 4;
+    let found = compared(&a, &b).all;
+    assert_eq!(found.uv_texels.largest(), 3.5);
+    let mean = 4.0 * 3.5 / found.uv_texels.count() as f64;
+    assert!((found.uv_texels.mean() - mean).abs() < 1e-12);
+    assert_eq!(found.uv_texels.percentile(50.0), 0.0);
+    assert_eq!(found.lod_levels.largest(), 0.0);
+    assert!(found.footprints_that_differ > 0 && found.footprints_that_differ <= 16);
+}
+
+#[test]
+fn doubled_derivatives_are_a_level_of_detail() {
+    let a = small();
+    let mut b = a.clone();
+    let (tile, record) = full_quad(&b);
+    let changed = &mut b.tiles[1][tile].records[record];
+    changed.dx = changed.dx.map(|d| 2 * d);
+    changed.dy = changed.dy.map(|d| 2 * d);
+    let found = compared(&a, &b).all;
+    assert!((found.lod_levels.largest() - 1.0).abs() < 1e-4);
+    assert!(found.footprints_that_differ > 0);
+}
+
+#[test]
+fn draws_in_another_order_are_the_same_fragments() {
+    let a = small();
+    let mut b = a.clone();
+    b.tables.draws.swap(0, 1);
+    for run in b.tiles.iter_mut().flatten().flat_map(|tile| &mut tile.runs) {
+        run.draw = [1, 0, 2][run.draw as usize];
+    }
+    let (found, itself) = (compared(&a, &b), compared(&a, &a));
+    assert_eq!(found.all, itself.all);
+    let names = |of: &Comparison| -> Vec<String> {
+        of.by_material
+            .iter()
+            .map(|class| class.name.clone())
+            .collect()
+    };
+    assert_eq!(names(&found), ["material 0", "material 1", "material 2"]);
+}
+
+#[test]
+fn another_texture_is_another_sample() {
+    let a = small();
+    let mut b = a.clone();
+    for draw in &mut b.tables.draws {
+        draw.groups[0].samples.swap(0, 1);
+    }
+    let found = compared(&a, &b).all;
+    assert_eq!(found.lanes_sampled_differently, found.fragments_in_both);
+    assert_eq!(found.footprints, 0);
+}
+
+#[test]
+fn what_does_not_show_the_same_is_refused_by_name() {
+    let text = refused(|b| b.tables.passes[1].size_px = [1, 1]);
+    assert_eq!(
+        text,
+        "pass 1, size in pixels: expected the same in both traces, found [64, 48] and [1, 1]"
+    );
+    let text = refused(|b| {
+        b.tables.passes.pop();
+    });
+    assert_eq!(
+        text,
+        "number of passes: expected the same in both traces, found 2 and 1"
+    );
+    let text = refused(|b| b.tables.textures[3].levels = 2);
+    assert!(
+        text.starts_with("texture 3 (texture 3), levels: expected"),
+        "{text}"
+    );
+    let text = refused(|b| b.tables.draws[0].primitives += 1);
+    assert!(text.starts_with("number of primitives: expected"), "{text}");
+}
