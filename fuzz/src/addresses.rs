@@ -140,7 +140,7 @@ pub fn run(bytes: &[u8]) {
 /// Changes the file, or what is compressed in it.
 pub fn mutate(bytes: &[u8], most_bytes: usize, seed: u32, change: Change<'_>) -> Vec<u8> {
     let inside = match bytes {
-        [_, rest @ ..] if seed % 4 > 0 => inflated(rest),
+        [_, rest @ ..] if !seed.is_multiple_of(4) => inflated(rest),
         _ => None,
     };
     let Some(mut inside) = inside else {

@@ -93,7 +93,9 @@ fn check(scene: &Scene) {
 
 /// Changes the text, or one of a GLB's two chunks; the lengths before them follow.
 pub fn mutate(bytes: &[u8], most_bytes: usize, seed: u32, change: Change<'_>) -> Vec<u8> {
-    let chunks = (seed % 8 > 0).then(|| glb_chunks(bytes)).flatten();
+    let chunks = (!seed.is_multiple_of(8))
+        .then(|| glb_chunks(bytes))
+        .flatten();
     let Some([mut json, mut bin]) = chunks else {
         return crate::plain(bytes, most_bytes, seed, change);
     };

@@ -19,7 +19,7 @@ struct EveryOther;
 
 impl AlphaTest for EveryOther {
     fn opaque(&self, primitive: u32, _: [f32; 2]) -> bool {
-        primitive % 2 == 0
+        primitive.is_multiple_of(2)
     }
 }
 
@@ -80,7 +80,7 @@ pub fn run(bytes: &[u8]) {
     let triangles: Vec<[[f32; 3]; 3]> = (0..MOST_TRIANGLES)
         .map_while(|_| Some([numbers.vector()?, numbers.vector()?, numbers.vector()?]))
         .collect();
-    let masked = |number: u32| way & 4 != 0 && number % 3 == 0;
+    let masked = |number: u32| way & 4 != 0 && number.is_multiple_of(3);
     let fast = Bvh::build(&triangles, masked).expect("few triangles");
     let trees = [TraversalKind::Bvh2, TraversalKind::Bvh8];
     let all = |bvh: &Bvh| -> Vec<[Found; 2]> {
