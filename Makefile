@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques accuracy stress test bench lint build deps golden clean
+.PHONY: demo techniques accuracy stress test fuzz faults bench lint build deps golden clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -26,6 +26,15 @@ accuracy: deps build
 test:
 	@scripts/install-deps.sh test
 	@CARGO="$(CARGO)" scripts/test.sh
+
+# Every reader of foreign bytes under a coverage-guided fuzzer, SECONDS each (docs/robustness.md).
+SECONDS ?= 60
+fuzz:
+	@OUT="$(OUT)" scripts/fuzz.sh -t $(SECONDS)
+
+# Programs killed at 200 random moments, and disks that are full at many sizes.
+faults:
+	KILLS=200 STEPS=20 $(CARGO) test --release --workspace --locked --test kills --test full_disk -- --nocapture
 
 # What each stage of a replay costs, beside this machine's bandwidth (TEXTRACE=file for another trace).
 bench:

@@ -1,7 +1,9 @@
 //! Helpers of the end-to-end tests: the built programs, the golden traces, the real scenes.
 
+pub mod exercise;
 pub mod repair;
 pub mod traces;
+pub mod writers;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

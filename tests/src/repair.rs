@@ -25,16 +25,24 @@ impl Parts {
     /// When it is not a container.
     #[must_use]
     pub fn of(bytes: &[u8]) -> Self {
-        let container = Container::from_bytes(bytes.to_vec()).expect("a sound container");
-        let chunks = container.directory().iter().map(|entry| {
-            let chunk = container.chunk(entry.tag).expect("a sound chunk");
-            (entry.tag.0, chunk.to_vec())
-        });
-        Self {
+        Self::read(bytes).expect("a sound container")
+    }
+
+    /// Takes a container apart.
+    ///
+    /// # Errors
+    /// Its header, directory or a chunk is damaged.
+    pub fn read(bytes: &[u8]) -> formats::Result<Self> {
+        let container = Container::from_bytes(bytes.to_vec())?;
+        let chunk = |tag| Ok(container.chunk(tag)?.to_vec());
+        let entries = container.directory().iter();
+        Ok(Self {
             kind: container.kind(),
             minor: container.version().1,
-            chunks: chunks.collect(),
-        }
+            chunks: entries
+                .map(|entry| Ok((entry.tag.0, chunk(entry.tag)?)))
+                .collect::<formats::Result<_>>()?,
+        })
     }
 
     /// Bytes of a chunk; empty where there is none.
@@ -150,17 +158,29 @@ fn number(bytes: &[u8], at: usize, size: usize) -> usize {
         .fold(0, |n, byte| n << 8 | usize::from(*byte))
 }
 
-/// CRC-32 of zlib and PNG, bit by bit: independent of the library that the traces use.
+/// CRC-32 of zlib and PNG, byte by byte: independent of the library that the traces use.
 #[must_use]
 pub fn crc32(bytes: &[u8]) -> u32 {
-    let mut crc = u32::MAX;
-    for byte in bytes {
-        crc ^= u32::from(*byte);
-        for _ in 0..8 {
+    const TABLE: [u32; 256] = crc32_table();
+    let step = |crc: u32, byte: &u8| crc >> 8 ^ TABLE[usize::from(crc as u8 ^ byte)];
+    !bytes.iter().fold(u32::MAX, step)
+}
+
+/// What each byte does to the checksum, bit by bit.
+const fn crc32_table() -> [u32; 256] {
+    let mut table = [0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let mut crc = byte as u32;
+        let mut bit = 0;
+        while bit < 8 {
             crc = crc >> 1 ^ (0xEDB8_8320 & (crc & 1).wrapping_neg());
+            bit += 1;
         }
+        table[byte] = crc;
+        byte += 1;
     }
-    !crc
+    table
 }
 
 /// Makes the checksums of directory and header right, if these are where the header says.

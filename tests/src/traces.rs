@@ -200,14 +200,19 @@ fn texture_tile(tables: &Tables, random: &mut Random) -> Tile {
 /// A texture trace; about a tile in three is untouched.
 #[must_use]
 pub fn texture_trace(encoding: Encoding, seed: u64) -> Vec<u8> {
-    let tables = texture_tables();
+    texture_trace_of(&texture_tables(), encoding, seed)
+}
+
+/// A texture trace with these tables.
+#[must_use]
+pub fn texture_trace_of(tables: &Tables, encoding: Encoding, seed: u64) -> Vec<u8> {
     let mut random = Random(seed);
-    let mut writer = TextraceWriter::in_memory(&tables).expect("sound tables");
+    let mut writer = TextraceWriter::in_memory(tables).expect("sound tables");
     for (pass, info) in tables.passes.iter().enumerate() {
         for index in 0..info.tile_count() as usize {
             if random.below(3) > 0 {
-                let tile = texture_tile(&tables, &mut random);
-                let encoded = encode_tile_as(encoding, &tables, &tile).expect("a sound tile");
+                let tile = texture_tile(tables, &mut random);
+                let encoded = encode_tile_as(encoding, tables, &tile).expect("a sound tile");
                 writer.append(pass, index, encoded).expect("in order");
             }
         }
@@ -372,17 +377,22 @@ fn push_rays(tile: &mut RayTile, random: &mut Random) {
 /// A ray trace.
 #[must_use]
 pub fn ray_trace(samples_per_px: u32, has_visits: bool, seed: u64) -> Vec<u8> {
-    let tables = ray_tables(samples_per_px, has_visits);
+    ray_trace_of(&ray_tables(samples_per_px, has_visits), seed)
+}
+
+/// A ray trace with these tables.
+#[must_use]
+pub fn ray_trace_of(tables: &RaytraceTables, seed: u64) -> Vec<u8> {
     let mut random = Random(seed);
     let mut writer = RaytraceWriter::in_memory().expect("in memory");
     for eye in [Eye::Left, Eye::Right] {
         for number in 0..tables.tile_count() {
-            let tile = ray_tile(&tables, eye, number, &mut random);
-            let encoded = encode_ray_tile(&tile, has_visits).expect("a sound tile");
+            let tile = ray_tile(tables, eye, number, &mut random);
+            let encoded = encode_ray_tile(&tile, tables.meta.has_visits).expect("a sound tile");
             writer.tile(&encoded).expect("in memory");
         }
     }
-    writer.into_bytes(&tables).expect("sound tables")
+    writer.into_bytes(tables).expect("sound tables")
 }
 
 /// One of each: both kinds, every encoding, with visits and without, one sample a pixel and more.

@@ -3,22 +3,10 @@
 //!
 //! `MUTATIONS=100000 cargo test --release -p parallax-tests --test mutations` tries more.
 
-use formats::Trace;
-use formats::footprint::SamplingOptions;
-use formats::interop::{Expander, Granularity, Origin, ray_samples};
-use formats::layout::{Layout, LayoutConfig};
-use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
-use formats::textrace::{Textrace, Tile};
-use formats::view::Eye;
-use parallax_tests::repair::{Parts, repair_header, validate};
+use parallax_tests::exercise::exercise;
+use parallax_tests::repair::{Parts, repair_header};
 use parallax_tests::traces::{self, Random};
-use replay::config::{Mode, RunConfig};
-use replay::sgrt::compose::Reuse;
-use replay::sgrt::config::SgrtConfig;
-use replay::sgrt::frame::RaySource;
-use replay::sgrt::loaded::LoadedTrace;
 use std::alloc::{GlobalAlloc, Layout as Block, System};
-use std::error::Error;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -319,109 +307,6 @@ fn edit_container(bytes: &[u8], random: &mut Random) -> (Vec<u8>, String) {
     };
     repair_header(&mut bytes);
     (bytes, what)
-}
-
-/// Reads a file and does with it what the commands do; true if it is valid.
-fn exercise(bytes: Vec<u8>) -> bool {
-    let Ok(trace) = Trace::from_bytes(bytes) else {
-        return false;
-    };
-    if validate(&trace).is_err() {
-        return false;
-    }
-    match trace {
-        Trace::Texture(trace) => {
-            expand(&trace);
-            for mode in [Mode::Functional, Mode::Timed] {
-                let config = RunConfig {
-                    mode,
-                    ..RunConfig::default()
-                };
-                // Textures may be too large for a layout, which is an error and no panic.
-                let _result = replay::engine::replay(&*trace, &config);
-            }
-        }
-        Trace::Ray(trace) => reproject(&trace),
-    }
-    true
-}
-
-/// Every access of a texture trace, as `replay convert` writes them.
-fn expand(trace: &Textrace) {
-    let tables = trace.tables();
-    let Ok(layout) = Layout::new(&tables.textures, &LayoutConfig::default()) else {
-        return;
-    };
-    let expander = Expander {
-        tables,
-        layout: &layout,
-        sampling: SamplingOptions::default(),
-        granularity: Granularity::Line,
-        line_bytes: 64,
-    };
-    let mut tile = Tile::default();
-    for (pass, info) in tables.passes.iter().enumerate() {
-        for index in 0..info.tile_count() {
-            trace
-                .decode_tile(pass, index as usize, &mut tile)
-                .expect("it was decoded before");
-            for run in &tile.runs {
-                let origin = Origin {
-                    draw: run.draw,
-                    ..Origin::default()
-                };
-                let records = tile.records.iter().skip(run.first as usize);
-                for record in records.take(run.count as usize) {
-                    expander
-                        .expand(origin, record, |_| Ok(()))
-                        .expect("nothing fails here");
-                }
-            }
-        }
-    }
-}
-
-struct Source<'a>(&'a Raytrace);
-
-impl RaySource for Source<'_> {
-    fn tables(&self) -> &RaytraceTables {
-        self.0.tables()
-    }
-
-    fn tile(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        Ok(self.0.decode_tile(eye, index, tile)?)
-    }
-}
-
-fn reproject(trace: &Raytrace) {
-    let tables = trace.tables();
-    let mut tile = RayTile::default();
-    trace
-        .decode_tile(Eye::Right, 0, &mut tile)
-        .expect("it was decoded before");
-    for sample in ray_samples(tables, Eye::Right, 0, &tile) {
-        sample.to_json(&tables.bvh).expect("JSON");
-        sample
-            .accesses(&tables.bvh, |access| {
-                access.lines(64).for_each(drop);
-                Ok(())
-            })
-            .expect("nothing fails here");
-    }
-    let source = Source(trace);
-    let Ok(loaded) = LoadedTrace::load(&source) else {
-        return;
-    };
-    for rule in ["none", replay::sgrt::DEFAULT_RULE] {
-        let rule = rule.parse().expect("a known rule");
-        // What the model cannot score is an error and no panic.
-        let _result = loaded.run(&rule, Reuse::Color, &SgrtConfig::default());
-    }
 }
 
 #[test]

@@ -1,0 +1,128 @@
+//! The plain kernel of the ray tracer against the AVX2 one and against all triangles one by one.
+//!
+//! An input is rays and triangles: a byte that says how numbers are read, a byte with the number of
+//! rays, then numbers, six for a ray and nine for a triangle.
+
+use formats::raytrace::TraversalKind;
+use glam::Vec3;
+use rays::bvh::count::Counts;
+use rays::bvh::{AllOpaque, AlphaTest, Bvh, Instructions, RayHit, TraversalStack};
+use rays::ray::{LARGEST_COORDINATE, Ray};
+use rays::reference::brute_force_f32;
+
+/// More would take long without finding more.
+const MOST_TRIANGLES: usize = 64;
+const MOST_RAYS: usize = 8;
+
+/// Lets rays pass every other triangle.
+struct EveryOther;
+
+impl AlphaTest for EveryOther {
+    fn opaque(&self, primitive: u32, _: [f32; 2]) -> bool {
+        primitive.is_multiple_of(2)
+    }
+}
+
+/// Numbers of an input.
+struct Numbers<'a>(&'a [u8], u8);
+
+impl Numbers<'_> {
+    /// The next one: any bits, or small whole numbers (where edges and vertices are hit exactly),
+    /// or these far out or close together.
+    fn next(&mut self) -> Option<f32> {
+        match self.1 % 4 {
+            0 => {
+                let (bytes, rest) = self.0.split_first_chunk()?;
+                self.0 = rest;
+                Some(f32::from_le_bytes(*bytes))
+            }
+            way => {
+                let (byte, rest) = self.0.split_first()?;
+                self.0 = rest;
+                let small = f32::from(*byte as i8);
+                Some(match way {
+                    1 => small,
+                    2 => small / 16.0,
+                    _ => small * 7e15,
+                })
+            }
+        }
+    }
+
+    fn vector(&mut self) -> Option<[f32; 3]> {
+        Some([self.next()?, self.next()?, self.next()?])
+    }
+}
+
+type Found = (Option<(u32, u32)>, bool, Counts);
+
+fn found(bvh: &Bvh, tree: TraversalKind, ray: &Ray, alpha: &impl AlphaTest) -> Found {
+    let mut stack = TraversalStack::default();
+    let mut counts = Counts::default();
+    let hit = bvh.closest(tree, ray, &mut stack, &mut counts, alpha);
+    let hit = hit.map(|h: RayHit| (h.t.to_bits(), h.primitive));
+    let any = bvh.occluded(tree, ray, &mut stack, &mut counts, alpha);
+    (hit, any, counts)
+}
+
+/// Equal hits, to the bit, and equal counts.
+pub fn run(bytes: &[u8]) {
+    let [way, rays, rest @ ..] = bytes else {
+        return;
+    };
+    let mut numbers = Numbers(rest, *way);
+    let rays: Vec<Ray> = (0..usize::from(*rays) % MOST_RAYS + 1)
+        .map_while(|_| {
+            let origin = numbers.vector()?.into();
+            Some(Ray::new(origin, numbers.vector()?.into()))
+        })
+        .collect();
+    let triangles: Vec<[[f32; 3]; 3]> = (0..MOST_TRIANGLES)
+        .map_while(|_| Some([numbers.vector()?, numbers.vector()?, numbers.vector()?]))
+        .collect();
+    let masked = |number: u32| way & 4 != 0 && number.is_multiple_of(3);
+    let fast = Bvh::build(&triangles, masked).expect("few triangles");
+    let trees = [TraversalKind::Bvh2, TraversalKind::Bvh8];
+    let all = |bvh: &Bvh| -> Vec<[Found; 2]> {
+        let each = rays.iter().flat_map(|ray| trees.map(|tree| (ray, tree)));
+        each.map(|(ray, tree)| {
+            [
+                found(bvh, tree, ray, &AllOpaque),
+                found(bvh, tree, ray, &EveryOther),
+            ]
+        })
+        .collect()
+    };
+    let with_best = all(&fast);
+    let plain = fast.with_instructions(Instructions::Scalar);
+    let with_plain = all(&plain);
+    assert_eq!(with_best, with_plain, "{rays:?} {triangles:?}");
+    for (ray, found) in rays.iter().zip(with_plain.chunks_exact(2)) {
+        let expected = one_by_one(&triangles, ray);
+        let [two, eight] = [&found[0], &found[1]].map(|found| found[0].0);
+        assert_eq!(two, expected, "{ray:?} {triangles:?}");
+        assert_eq!(eight, expected, "{ray:?} {triangles:?}");
+    }
+}
+
+/// The nearest of the triangles that the hierarchy keeps.
+fn one_by_one(triangles: &[[[f32; 3]; 3]], ray: &Ray) -> Option<(u32, u32)> {
+    let fits = |t: &[[f32; 3]; 3]| {
+        let numbers = t.as_flattened().iter();
+        numbers.clone().all(|x| x.abs() <= LARGEST_COORDINATE)
+    };
+    let kept = || (0..).zip(triangles).filter(|(_, t)| fits(t));
+    let points = kept().flat_map(|(_, t)| t.map(Vec3::from));
+    let bounds = points
+        .map(|p| (p, p))
+        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+    if !ray.is_valid() {
+        return None;
+    }
+    let hits = kept().filter_map(|(number, t)| {
+        let (t, _) = brute_force_f32(&[*t], bounds, ray)?;
+        Some((t, number))
+    });
+    let nearest = hits.reduce(|a, b| if b < a { b } else { a });
+    nearest.map(|(t, number)| (t.to_bits(), number))
+}

@@ -1,0 +1,246 @@
+//! The commands that write files, small, for tests that stop them or take their disk away.
+
+use crate::{program, root, run_ok};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// A command that writes into a folder of its own.
+pub struct Writer {
+    /// For messages.
+    pub name: &'static str,
+    /// The command, from what it reads and what it writes into.
+    pub command: fn(inputs: &Path, folder: &Path) -> Command,
+    /// It measures times, so that only the form of its JSON files can be foretold.
+    pub measures: bool,
+    /// It needs the driver.
+    pub draws: bool,
+}
+
+/// Every one; the first [`QUICK`] take a fraction of a second and need no driver.
+pub const ALL: &[Writer] = &[
+    Writer {
+        name: "tracegen rays",
+        command: |_, folder| {
+            let mut command = tracegen(&["rays", "teapot", "--size", "96x96", "-o"]);
+            command.arg(folder.join("a.raytrace"));
+            command.arg("--image").arg(folder.join("a.png"));
+            command
+        },
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "replay convert --to textrace",
+        command: |_, folder| {
+            let mut command = replay("convert", "atrium-shadows.textrace");
+            command.args(["--to", "textrace", "--encoding", "planes", "-o"]);
+            command.arg(folder.join("a.textrace"));
+            command
+        },
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "tracegen sweep",
+        command: |inputs, folder| {
+            let mut command = tracegen(&["sweep"]);
+            command.arg(inputs.join("captures.toml"));
+            command.arg("-o").arg(folder);
+            command
+        },
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "replay sweep",
+        command: |inputs, folder| sweep(inputs, folder),
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "replay paper",
+        command: |_, folder| {
+            let mut command = replay("paper", "atrium-shadows.textrace");
+            command.arg("--csv").arg(folder.join("table.csv"));
+            command.arg("--parquet").arg(folder.join("table.parquet"));
+            command.arg("--html").arg(folder.join("page.html"));
+            command
+        },
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "replay convert --to din",
+        command: |_, folder| {
+            let mut command = replay("convert", "atrium-shadows.textrace");
+            command.args(["--to", "din", "-o"]);
+            command.arg(folder.join("a.din.gz"));
+            command
+        },
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "replay run",
+        command: |_, _| replay("run", "atrium-shadows.textrace"),
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "replay report",
+        command: |_, folder| {
+            let mut command = replay("report", "atrium-shadows.textrace");
+            command.arg("-o").arg(folder.join("report.html"));
+            command
+        },
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "replay reproject",
+        command: |_, folder| {
+            let mut command = replay("reproject", "teapot-rays.raytrace");
+            command.arg("--html").arg(folder.join("page.html"));
+            command.arg("--image").arg(folder.join("a.png"));
+            command
+        },
+        measures: false,
+        draws: false,
+    },
+    Writer {
+        name: "tracegen raster",
+        command: |_, folder| {
+            let mut command = tracegen(&["raster", "teapot", "--size", "64x72", "-o"]);
+            command.arg(folder.join("a.textrace"));
+            command.arg("--image").arg(folder.join("a.png"));
+            command
+        },
+        measures: false,
+        draws: true,
+    },
+    Writer {
+        name: "tracegen techniques",
+        command: |_, folder| {
+            let mut command = tracegen(&["techniques", "atrium-plain", "--path", "head"]);
+            command.args(["--size", "64x72", "--path-frames", "4", "--frames", "2"]);
+            command.args(["--repeats", "1", "--only", "superfrustum,conical", "-o"]);
+            command.arg(folder);
+            command
+        },
+        measures: true,
+        draws: true,
+    },
+];
+
+/// How many of [`ALL`] every test run can afford.
+pub const QUICK: usize = 3;
+
+fn tracegen(arguments: &[&str]) -> Command {
+    let mut command = program("tracegen");
+    let (subcommand, rest) = arguments.split_at(1);
+    command.args(subcommand).arg("--quiet").args(rest);
+    command
+}
+
+fn replay(subcommand: &str, trace: &str) -> Command {
+    let mut command = program("replay");
+    command.arg(subcommand).arg("--quiet");
+    command.arg(root().join("traces").join(trace));
+    command
+}
+
+/// `replay sweep` of [`write_inputs`]' experiment.
+#[must_use]
+pub fn sweep(inputs: &Path, folder: &Path) -> Command {
+    let mut command = program("replay");
+    command.arg("sweep").arg("--quiet");
+    command.arg(inputs.join("experiment.toml"));
+    command.arg(root().join("traces/atrium-shadows.textrace"));
+    command.arg("--out").arg(folder);
+    for variable in ["ID", "COUNT", "MIN", "MAX", "STEP"] {
+        command.env_remove(format!("SLURM_ARRAY_TASK_{variable}"));
+    }
+    command
+}
+
+/// Writes what the writers read.
+///
+/// # Panics
+/// The folder cannot be written.
+pub fn write_inputs(inputs: &Path) {
+    let experiment = "[base]\nmode = \"functional\"\n[axes]\norder = [\"morton\", \"z2-sta\"]\n\
+        l1.size_bytes = [\"4KiB\", \"8KiB\"]\n[one-at-a-time]\nl2.replacement = [\"fifo\"]\n";
+    let captures = "[[captures]]\ncommand = \"rays\"\nscene = \"teapot\"\n\
+        size = [\"48x48\", \"64x64\"]\n";
+    for (name, text) in [("experiment.toml", experiment), ("captures.toml", captures)] {
+        fs::write(inputs.join(name), text).expect("a file");
+    }
+}
+
+/// Runs a writer to its end; what is printed is not looked at.
+///
+/// # Panics
+/// It fails.
+pub fn run_to_the_end(mut command: Command) {
+    run_ok(command.stdout(Stdio::null()));
+}
+
+/// A folder's files by their paths in it.
+#[derive(Debug, Default)]
+pub struct Files {
+    /// Those under a final name.
+    pub finished: BTreeMap<String, Vec<u8>>,
+    /// Names of those that were being written.
+    pub unfinished: Vec<String>,
+}
+
+impl Files {
+    /// Reads all files below a folder.
+    ///
+    /// # Panics
+    /// It cannot be read.
+    #[must_use]
+    pub fn below(folder: &Path) -> Self {
+        let mut files = Self::default();
+        let mut open = vec![folder.to_owned()];
+        while let Some(path) = open.pop() {
+            let Some(name) = path.file_name() else {
+                continue;
+            };
+            let name = name.to_string_lossy();
+            if path.is_dir() {
+                let entries = fs::read_dir(&path).expect("a folder");
+                open.extend(entries.map(|entry| entry.expect("an entry").path()));
+                continue;
+            }
+            let place = path.strip_prefix(folder).expect("inside");
+            let place = place.display().to_string();
+            if name.starts_with('.') && name.ends_with(".part") {
+                files.unfinished.push(place);
+            } else {
+                let bytes = fs::read(&path).expect("a file");
+                files.finished.insert(place, bytes);
+            }
+        }
+        files
+    }
+
+    /// Holds every finished file against that of an undisturbed run.
+    ///
+    /// # Panics
+    /// One is not the same, or of a writer that measures, no JSON.
+    pub fn assert_part_of(&self, whole: &Self, writer: &Writer, place: &str) {
+        for (name, bytes) in &self.finished {
+            let expected = whole.finished.get(name);
+            let expected = expected.unwrap_or_else(|| panic!("{place}: {name} is new"));
+            if writer.measures && name.ends_with(".json") {
+                let value = serde_json::from_slice::<serde_json::Value>(bytes);
+                assert!(value.is_ok(), "{place}: {name} is half written");
+            } else {
+                assert!(bytes == expected, "{place}: {name} differs");
+            }
+        }
+    }
+}

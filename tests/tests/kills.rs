@@ -1,0 +1,161 @@
+//! Programs that are killed at random moments: nothing incomplete under a final name, and another
+//! run ends with the bytes of one that nobody disturbed.
+//!
+//! `make faults` kills 200 times; `KILLS=n` says how often. A kill counts only if it came in time.
+#![cfg(unix)]
+
+use parallax_tests::traces::Random;
+use parallax_tests::writers::{self, Files, Writer, run_to_the_end};
+use std::fs;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// Without `KILLS`: as many as seconds allow, of the quick writers.
+const FEW: u32 = 6;
+
+fn kills() -> Option<u32> {
+    let kills = std::env::var("KILLS").ok()?;
+    Some(kills.parse().expect("KILLS: a number"))
+}
+
+/// Starts a program with a group of its own, in which its children are as well.
+fn start(mut command: Command) -> Child {
+    let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
+    quiet.process_group(0).spawn().expect("the program starts")
+}
+
+/// Waits and sends a signal to a program and its children, as terminals and clusters do; nothing
+/// where it has ended before.
+fn signal_after(child: &mut Child, moment: Duration, signal: &str) -> Option<ExitStatus> {
+    std::thread::sleep(moment);
+    if child.try_wait().expect("a child").is_some() {
+        return None;
+    }
+    let kill = format!("kill -{signal} -{}", child.id());
+    let sent = Command::new("sh").args(["-c", &kill]).status();
+    let status = child.wait().expect("it ends");
+    // It may have come to its end between the two.
+    (sent.expect("a shell").success() && !status.success()).then_some(status)
+}
+
+/// A writer, what it writes undisturbed, and how long that takes.
+struct Undisturbed<'a> {
+    writer: &'a Writer,
+    files: Files,
+    time: Duration,
+}
+
+impl<'a> Undisturbed<'a> {
+    fn of(writer: &'a Writer, inputs: &Path) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let start = Instant::now();
+        run_to_the_end((writer.command)(inputs, folder.path()));
+        let time = start.elapsed();
+        let files = Files::below(folder.path());
+        assert_eq!(files.unfinished, [""; 0], "{}", writer.name);
+        Self {
+            writer,
+            files,
+            time,
+        }
+    }
+}
+
+#[test]
+fn what_was_killed_leaves_nothing_incomplete_and_ends_with_the_same_bytes_the_next_time() {
+    let inputs = tempfile::tempdir().expect("a temporary folder");
+    writers::write_inputs(inputs.path());
+    let wanted = kills();
+    let writers = match wanted {
+        Some(_) => writers::ALL,
+        None => &writers::ALL[..writers::QUICK],
+    };
+    let whole: Vec<Undisturbed> = (writers.iter())
+        .map(|writer| Undisturbed::of(writer, inputs.path()))
+        .collect();
+    let mut random = Random(2012);
+    let (mut killed, mut finished, mut late) = (0, 0, 0);
+    'all: loop {
+        for Undisturbed {
+            writer,
+            files,
+            time,
+        } in &whole
+        {
+            let folder = tempfile::tempdir().expect("a temporary folder");
+            // The second kill meets what the first has left.
+            for round in 0..2 {
+                let signal = ["KILL", "TERM"][random.below(2) as usize];
+                let moment = time.mul_f64(f64::from(random.below(1000)) / 1000.0);
+                let mut child = start((writer.command)(inputs.path(), folder.path()));
+                let status = signal_after(&mut child, moment, signal);
+                let place = format!(
+                    "{}, kill {round}, SIG{signal} after {moment:?}",
+                    writer.name
+                );
+                let left = Files::below(folder.path());
+                left.assert_part_of(files, writer, &place);
+                finished += left.finished.len();
+                match status {
+                    None => late += 1,
+                    Some(_) => killed += 1,
+                }
+                if signal == "TERM" && round == 0 {
+                    assert_eq!(left.unfinished, [""; 0], "{place}");
+                }
+            }
+            run_to_the_end((writer.command)(inputs.path(), folder.path()));
+            let end = Files::below(folder.path());
+            end.assert_part_of(files, writer, writer.name);
+            let names = |files: &Files| files.finished.keys().cloned().collect::<Vec<_>>();
+            assert_eq!(names(&end), names(files), "{}", writer.name);
+            if killed >= wanted.unwrap_or(FEW) || late > 20 + killed {
+                break 'all;
+            }
+        }
+    }
+    println!("{killed} kills, {late} too late; {finished} whole files found, none incomplete");
+    assert!(
+        killed >= wanted.unwrap_or(FEW),
+        "{late} of the kills came too late"
+    );
+}
+
+#[test]
+fn a_sharded_sweep_of_which_a_worker_is_killed_merges_to_one_machines_bytes() {
+    let inputs = tempfile::tempdir().expect("a temporary folder");
+    writers::write_inputs(inputs.path());
+    let sweep = |folder: &Path, flags: &[&str]| {
+        let mut command = writers::sweep(inputs.path(), folder);
+        command.args(flags);
+        command
+    };
+    let whole = tempfile::tempdir().expect("a temporary folder");
+    let start_of_whole = Instant::now();
+    run_to_the_end(sweep(whole.path(), &[]));
+    let time = start_of_whole.elapsed();
+    let whole = Files::below(whole.path());
+    let mut random = Random(7);
+    let rounds = kills().map_or(1, |kills| kills.div_ceil(20));
+    let mut killed = 0;
+    for _ in 0..rounds {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let shards = ["1/3", "2/3", "3/3"];
+        let mut workers = shards.map(|shard| start(sweep(folder.path(), &["--shard", shard])));
+        let victim = random.below(3) as usize;
+        let moment = time.mul_f64(f64::from(random.below(700)) / 1000.0);
+        killed += u32::from(signal_after(&mut workers[victim], moment, "KILL").is_some());
+        for (number, worker) in workers.iter_mut().enumerate() {
+            let status = worker.wait().expect("it ends");
+            assert!(status.success() || number == victim, "worker {number}");
+        }
+        run_to_the_end(sweep(folder.path(), &["--shard", shards[victim]]));
+        run_to_the_end(sweep(folder.path(), &["--merge-only"]));
+        let merged = Files::below(folder.path());
+        assert!(merged.finished == whole.finished, "the merge differs");
+        fs::remove_dir_all(folder.path()).expect("removable");
+    }
+    println!("{killed} workers of {rounds} sweeps killed in time");
+}
