@@ -53,7 +53,14 @@ impl Granularity {
             Self::None => &[PRODUCT, include_str!("shaders/plain.wgsl")],
             Self::Quads => &[PRODUCT, BY_BALLOT, RECORDING, CAPTURING, TEXELS],
             Self::Fragments => &[PRODUCT, BY_INDEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS],
-            Self::NumberedFragments => &[BY_COLUMNS, BY_VERTEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS],
+            Self::NumberedFragments => &[
+                BY_COLUMNS,
+                BY_VERTEX,
+                BY_FRAGMENT,
+                RECORDING,
+                CAPTURING,
+                TEXELS,
+            ],
         }
     }
 

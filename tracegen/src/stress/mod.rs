@@ -4,6 +4,7 @@
 //! A point is in order where the error keeps its bound, or where the program says that it does not:
 //! by refusing (exit code 2) or by a warning. Anything else is a break.
 
+mod lanes;
 mod probe;
 mod report;
 mod shapes;

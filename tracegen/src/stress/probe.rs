@@ -1,20 +1,20 @@
 //! Captures by this very program, as a user runs it, and what they are held against.
 
 use super::Error;
-use crate::verify::compare::{FragmentKey, Lane, lanes};
-use crate::verify::reference;
+use super::lanes::{FragmentKey, Lane, lanes};
+use crate::verify::geometry::Geometry;
+use crate::verify::piece::center;
+use crate::verify::reference::render_tile;
 use anyhow::{Context, anyhow};
 use formats::textrace::{Textrace, Tile};
 use formats::view::Eye;
 use glam::DVec2;
-use raster::backend::{Fragments, View};
-use raster::draws::DrawList;
-use raster::lighting::Lighting;
+use raster::backend::Fragments;
+use raster::draws::{DrawCall, DrawList};
 use scene::{LoadOptions, load_file};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use techniques::Layer;
 
 /// The views of a trace, left and right.
 type Views = [BTreeMap<FragmentKey, Lane>; 2];
@@ -118,24 +118,35 @@ impl<'a> Probe<'a> {
     pub fn against_reference(&self, capture: &Capture) -> anyhow::Result<Error> {
         let scene = load_file(&capture.scene, &LoadOptions::ALL)?.scene;
         let draws = DrawList::new(&scene, 0)?;
-        let lighting = Lighting::new(&scene);
         let trace = Textrace::open(&self.trace())?;
         let meta = &trace.tables().meta;
         let size_px = meta.hmd.eye_size_px;
         let views = self.views()?;
         let mut total = Totals::default();
-        for (number, eye) in [Eye::Left, Eye::Right].into_iter().enumerate() {
-            let layer = Layer::whole(eye, meta.frames[0].eyes[number], size_px);
-            let view = View {
-                target: number,
-                layer: &layer,
-                lighting: &lighting,
-                visible: &[],
-            };
-            let tested = Fragments::DepthTested;
-            let expected = reference::render(&scene, &draws, &view, size_px, &|_, _| true, tested);
-            let expected = (expected.iter()).map(|f| ((f.pixel, f.primitive), f.uv));
-            total.add(expected, &views[number]);
+        for (eye, found) in meta.frames[0].eyes.iter().zip(&views) {
+            let geometry = Geometry::new(&scene, &draws, eye, size_px, |_| true);
+            let mut expected = Vec::new();
+            for tile in 0..(geometry.tiles[0] * geometry.tiles[1]) as usize {
+                let rendered = render_tile(
+                    &geometry,
+                    tile,
+                    &|_: &DrawCall, _| true,
+                    Fragments::DepthTested,
+                );
+                expected.extend(rendered.iter().map(|fragment| {
+                    let piece = geometry.piece(fragment.piece);
+                    let group = geometry.groups(piece).first();
+                    let leader =
+                        group.and_then(|slots| geometry.material(piece).textures()[slots[0]]);
+                    let uv = leader.map_or(DVec2::ZERO, |leader| {
+                        geometry
+                            .coordinates(piece, &leader)
+                            .at(center(fragment.pixel))
+                    });
+                    ((fragment.pixel, geometry.primitive(piece)), uv)
+                }));
+            }
+            total.add(expected.into_iter(), found);
         }
         Ok(total.error())
     }
