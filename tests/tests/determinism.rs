@@ -1,6 +1,6 @@
 //! The same input gives the same bytes, whatever the thread count and the run.
 
-use parallax_tests::traces::Parts;
+use parallax_tests::repair::Parts;
 use parallax_tests::{program, root, run_ok};
 use std::fs;
 use std::path::Path;
