@@ -220,16 +220,16 @@ fn a_sphere_of_any_size_gives_the_same_records() {
             assert!(a.abs_diff(b) * 500 <= a, "{a} quads, at {scale} {b}");
         }
     }
-    // Shadow cascades fit themselves to the scene.
-    let shadows = |scale: f64| of(scale, sphere.obj([0.0; 3], scale), "a.obj", &["--shadows"]);
-    let here = shadows(1.0);
-    assert!(quads(&here) > quads(&same[1]));
-    for exponent in [-20, 20] {
-        assert_eq!(
-            quads(&here),
-            quads(&shadows(2f64.powi(exponent))),
-            "2^{exponent}"
-        );
+    // Shadow cascades are fitted in steps of 1/16 m to scenes as large as buildings, and in steps of
+    // their own size to much smaller and much larger ones.
+    let shadows = |exponent: i32| {
+        let scale = 2f64.powi(exponent);
+        of(scale, sphere.obj([0.0; 3], scale), "a.obj", &["--shadows"])
+    };
+    for [a, b] in [[-20, -10], [10, 20]] {
+        let (a, b) = (shadows(a), shadows(b));
+        assert!(a != same[1], "the lookups are recorded");
+        assert!(a == b);
     }
 }
 
