@@ -279,16 +279,15 @@ impl Wave<'_> {
     fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
         let trace_passes = &self.trace.tables().passes;
         let shaded = shaded(self.trace, passes[0].config().hsr)?;
-        let timed = passes[0].config().mode == Mode::Timed;
         let expander = Expander::new(&shaded, passes[0].config())?;
-        // Where a miss fills at once, the timed machine looks footprints up one by one.
         let instant = |pass: &Pass<'_>| pass.config().tmu.l1_penalty_cycles == 0;
-        let expander = if !timed {
-            expander.for_sets(fewest_sets(&passes))
-        } else if passes.iter().any(instant) {
-            expander.with_distinct_lines(true)
-        } else {
-            expander.only_distinct_lines()
+        let expander = match passes[0].config().mode {
+            Mode::Functional => expander.for_sets(fewest_sets(&passes)),
+            // Where a miss fills at once, the timed machine looks footprints up one by one.
+            Mode::Timed if passes.iter().any(instant) => expander.with_distinct_lines(true),
+            Mode::Timed => expander.only_distinct_lines(),
+            // Every look-up takes its cycle.
+            Mode::FirstMiss => expander,
         };
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();

@@ -261,7 +261,11 @@ mod tests {
                 };
                 for (found, expected) in rgb.extend(alpha).to_array().into_iter().zip(expected) {
                     let steps = (255.0 * found - f64::from(*expected)).abs();
-                    assert!(steps <= 0.7, "{block:?} {texel}: {rgb} {alpha}, {expected}");
+                    // The library rounds sevenths of alpha down, but for one of them: up to 5/7 of a step.
+                    assert!(
+                        steps <= 0.72,
+                        "{block:?} {texel}: {rgb} {alpha}, {expected}"
+                    );
                 }
             }
         }
