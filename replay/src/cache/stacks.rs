@@ -102,37 +102,45 @@ fn retain(
     mut deeper: impl FnMut(&Access, u8),
     mut depth: impl FnMut(&Access) -> u8,
 ) {
-    accesses.retain(|access| {
-        let depth = depth(access);
+    let mut kept = 0;
+    for index in 0..accesses.len() {
+        let access = accesses[index];
+        let depth = depth(&access);
         if depth > 0 {
-            deeper(access, depth);
+            deeper(&access, depth);
+            accesses[kept] = access;
+            kept += 1;
         }
-        depth > 0
-    });
+    }
+    accesses.truncate(kept);
 }
 
-/// As [`to_front`]. Where a line lies is hard to foresee, so all tags are compared and moved, several at once.
+/// As [`to_front`], four tags at a time: among these, where a line lies is found and moved without branches.
 #[inline(always)]
 fn to_front_of<const N: usize>(stack: &mut [u32; N], line: u32) -> u8 {
     if N < 8 {
         return to_front(stack, line) as u8;
     }
-    let old = *stack;
-    if old[0] == line {
+    if stack[0] == line {
         return 0;
     }
-    let mut depth = N as u32;
-    for (at, tag) in (0..).zip(old) {
-        let here = if tag == line { at } else { N as u32 };
-        depth = depth.min(here);
+    let mut carried = line;
+    let (fours, _) = stack.as_chunks_mut::<4>();
+    for (above, four) in (0..).step_by(4).zip(fours) {
+        let [first, second, third, fourth] = *four;
+        let found = four.map(|tag| tag == line);
+        let in_front = found[0] | found[1];
+        if !(in_front | found[2] | found[3]) {
+            *four = [carried, first, second, third];
+            carried = fourth;
+            continue;
+        }
+        let second_kept = if found[0] { second } else { first };
+        let third_kept = if in_front { third } else { second };
+        let fourth_kept = if found[3] { third } else { fourth };
+        *four = [carried, second_kept, third_kept, fourth_kept];
+        let depth = 1 - u8::from(found[0]) + u8::from(!in_front) + u8::from(found[3]);
+        return above + depth;
     }
-    for at in 1..N {
-        stack[at] = if at as u32 <= depth {
-            old[at - 1]
-        } else {
-            old[at]
-        };
-    }
-    stack[0] = line;
-    depth as u8
+    N as u8
 }
