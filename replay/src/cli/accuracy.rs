@@ -99,7 +99,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         variants,
         samples,
     };
-    write(&report, &args.output)?;
+    let scenes = subjects.iter().map(|subject| {
+        let [width, height] = subject.source.tables().meta.hmd.eye_size_px;
+        format!("{} {width}x{height}", subject.label)
+    });
+    let scenes = scenes.collect::<Vec<_>>().join(", ");
+    write(&report, &scenes, &args.output)?;
     super::print(&format!(
         "{}\n{}\n{}",
         report.variants().text(),
@@ -109,9 +114,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn write(report: &AccuracyReport, folder: &Path) -> Result<()> {
+fn write(report: &AccuracyReport, scenes: &str, folder: &Path) -> Result<()> {
     let mut errors = csv::Writer::from_writer(Vec::new());
-    for error in report.errors("replay accuracy") {
+    for error in report.errors("replay accuracy", scenes) {
         errors.serialize(error)?;
     }
     let texts = [

@@ -153,13 +153,10 @@ impl AccuracyReport {
         })
     }
 
-    /// The rows of the report's table of errors: mean and largest of each contribution.
+    /// The rows of the report's table of errors: mean and largest of each contribution; `scenes` says
+    /// what they were measured on.
     #[must_use]
-    pub fn errors(&self, command: &str) -> Vec<KnownError> {
-        let mut scenes: Vec<&str> = self.variants.iter().map(|row| row.scene.as_str()).collect();
-        scenes.sort_unstable();
-        scenes.dedup();
-        let scenes = scenes.join(" ");
+    pub fn errors(&self, command: &str, scenes: &str) -> Vec<KnownError> {
         let mut contributions: Vec<_> = VARIANTS.iter().filter_map(|v| v.contribution).collect();
         contributions.dedup();
         let mut errors = Vec::new();
@@ -181,7 +178,7 @@ impl AccuracyReport {
                     mean: round(found.iter().sum::<f64>() / found.len() as f64),
                     largest: round(found.iter().copied().fold(0.0, f64::max)),
                     unit: unit.to_owned(),
-                    scenes: scenes.clone(),
+                    scenes: scenes.to_owned(),
                     command: command.to_owned(),
                 });
             }
