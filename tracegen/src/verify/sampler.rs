@@ -261,9 +261,10 @@ mod tests {
                 };
                 for (found, expected) in rgb.extend(alpha).to_array().into_iter().zip(expected) {
                     let steps = (255.0 * found - f64::from(*expected)).abs();
-                    // The library rounds sevenths of alpha down, but for one of them: up to 5/7 of a step.
+                    // The library rounds end points to the nearest of 8 bits, where repeating their bits may be a
+                    // step off, and sevenths of alpha down.
                     assert!(
-                        steps <= 0.72,
+                        steps <= 1.72,
                         "{block:?} {texel}: {rgb} {alpha}, {expected}"
                     );
                 }
