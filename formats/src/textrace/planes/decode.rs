@@ -4,7 +4,7 @@
 use super::codes::{Code, Codes};
 use super::mode::{Departure, Mode};
 use super::plane::{Plane, Quad};
-use super::residual::{Pair, WIDE, add, class_bits, of_classes, small, sum, unfold};
+use super::residual::{Pair, WIDE, add, class_bits, noise, small, sum, unfold};
 use super::state::{State, group_of};
 use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS, STEPS};
 use crate::textrace::bits::{BitReader, PEEK_BITS};
@@ -149,12 +149,12 @@ impl<'a> Decoder<'a> {
             let expected = known.plane.predict(x, y);
             let code = self.codes.sizes.get(known.noise).ok_or(SHORT)?;
             let (classes, length) = sizes(code, bits);
-            let of = of_classes(classes);
-            known.noise = usize::from(of.noise);
+            known.noise = noise(classes);
             // A class of 3 is two set bits side by side.
             let residual = if classes & classes >> 1 & 0x55 == 0 {
-                self.bits.skip(before + length + u32::from(of.bits));
-                small_pairs(classes, bits >> length)
+                let (residual, all) = small_pairs(classes, bits >> length);
+                self.bits.skip(before + length + all);
+                residual
             } else {
                 self.bits.skip(before + length);
                 self.wide(classes)?
@@ -340,19 +340,22 @@ fn sizes(code: &Code, bits: u64) -> (u32, u32) {
     }
 }
 
-/// Residuals none of which is wide.
+/// Residuals none of which is wide, and their bits.
 #[inline(always)]
-fn small_pairs(classes: u32, mut bits: u64) -> Quad {
+fn small_pairs(classes: u32, mut bits: u64) -> (Quad, u32) {
+    let mut used = 0;
     let mut next = |class: u32| {
         let pair = small(class & 3, bits);
-        bits >>= class_bits(class & 3);
+        let width = class_bits(class & 3);
+        bits >>= width;
+        used += width;
         pair
     };
     let dx = next(classes);
     let dy = next(classes >> 2);
     let cross = next(classes >> 4);
     let uv = next(classes >> 6);
-    [uv, dx, dy, cross]
+    ([uv, dx, dy, cross], used)
 }
 
 /// Column and row of a place on the Morton curve.

@@ -94,61 +94,18 @@ pub(super) fn unfold(bits: u64) -> i32 {
     low_u32(unzigzag(u64::from(low_u32(bits))).cast_unsigned()).cast_signed()
 }
 
-/// What follows from the classes of a quad's residuals.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Classes {
-    /// Bits of the pairs, where none is wide.
-    pub bits: u8,
-    /// Which code tells of the group's next residuals.
-    pub noise: u8,
-}
-
-/// By the classes as one number: the next record waits for both, and looking them up is fastest.
-const CLASSES: [Classes; 256] = {
-    let mut all = [Classes { bits: 0, noise: 0 }; 256];
-    let mut classes = 0;
-    while classes < 256 {
-        let (mut bits, mut sum, mut pair) = (0, 0, 0);
-        while pair < 4 {
-            let class = classes >> (2 * pair) & 3;
-            bits += CLASS_BITS >> (4 * class) & 15;
-            sum += class;
-            pair += 1;
-        }
-        let noise = match sum {
-            0 => 0,
-            1 | 2 => 1,
-            3 | 4 => 2,
-            5 | 6 => 3,
-            7..=9 => 4,
-            _ => 5,
-        };
-        #[allow(
-            clippy::indexing_slicing,
-            clippy::cast_possible_truncation,
-            reason = "evaluated when compiled"
-        )]
-        {
-            all[classes as usize] = Classes {
-                bits: bits as u8,
-                noise,
-            };
-        }
-        classes += 1;
-    }
-    all
-};
-
-/// What follows from classes, of which only the lowest eight bits count.
-#[inline(always)]
-pub(super) fn of_classes(classes: u32) -> Classes {
-    let found = CLASSES.get(usize::from(classes.to_le_bytes()[0])).copied();
-    found.unwrap_or_default()
-}
-
 /// Which code tells of a group's next residuals, from the classes of the last ones.
+#[inline(always)]
 pub(super) fn noise(classes: u32) -> usize {
-    usize::from(of_classes(classes).noise)
+    let sum = (classes & 3) + (classes >> 2 & 3) + (classes >> 4 & 3) + (classes >> 6 & 3);
+    match sum {
+        0 => 0,
+        1 | 2 => 1,
+        3 | 4 => 2,
+        5 | 6 => 3,
+        7..=9 => 4,
+        _ => 5,
+    }
 }
 
 /// `quad - expected`, wrapping.
