@@ -2,7 +2,9 @@
 # Fuzzes every target (or those named) for SECONDS each, on stable Rust: coverage comes from LLVM's
 # own pass, not from a nightly flag. The committed corpus is read, what is found new stays in $OUT.
 #
-#   scripts/fuzz.sh [-n RUNS] [-t SECONDS] [TARGET...]
+#   scripts/fuzz.sh [-b] [-n RUNS] [-t SECONDS] [TARGET...]
+#
+# -b: without building, for several at a time.
 #
 # A crash is written beside the new corpus as crash-*, and the script ends with 1.
 set -eu
@@ -10,8 +12,10 @@ cd "$(dirname "$0")/.."
 out="${OUT:-out}/fuzz"
 seconds=60
 runs=-1
-while getopts n:t: flag; do
+build=yes
+while getopts bn:t: flag; do
     case $flag in
+    b) build="" ;;
     n) runs=$OPTARG ;;
     t) seconds=$OPTARG ;;
     *) exit 2 ;;
@@ -25,10 +29,9 @@ flags="-Cpasses=sancov-module"
 for flag in level=4 inline-8bit-counters pc-table trace-compares; do
     flags="$flags -Cllvm-args=-sanitizer-coverage-$flag"
 done
-RUSTFLAGS="$flags" ${CARGO:-cargo} build --profile fuzz --locked -p parallax-fuzz --features libfuzzer \
+[ -z "$build" ] || RUSTFLAGS="$flags" ${CARGO:-cargo} build --profile fuzz --locked -p parallax-fuzz --features libfuzzer \
     --target "$host" --target-dir target/fuzz
 program=target/fuzz/$host/fuzz/parallax-fuzz
-[ "${1:-}" != --build ] || exit 0
 
 # Scenes are files: in memory where the system has such a folder.
 scratch=$(mktemp -d "$([ -w /dev/shm ] && echo /dev/shm || echo "${TMPDIR:-/tmp}")/parallax-fuzz.XXXXXX")
@@ -39,9 +42,15 @@ for target; do
     mkdir -p "$out/$target"
     words=""
     [ ! -f "fuzz/dictionaries/$target.dict" ] || words="-dict=fuzz/dictionaries/$target.dict"
+    # Short inputs run fast; traces and scenes need room for their tables.
+    case $target in
+    textrace | raytrace | gltf) length=8192 ;;
+    kernels | paths) length=400 ;;
+    *) length=1500 ;;
+    esac
     # A second an input is the target's own check, in processor time; -timeout catches what never ends.
     # shellcheck disable=SC2086
-    FUZZ_TARGET=$target TMPDIR=$scratch nice -n 19 "$program" $words -max_len=8192 -timeout=120 \
+    FUZZ_TARGET=$target TMPDIR=$scratch nice -n 19 "$program" $words -max_len=$length -timeout=120 \
         -rss_limit_mb=2048 -reload=0 -print_final_stats=1 -max_total_time="$seconds" -runs="$runs" \
         -artifact_prefix="$out/$target-" "$out/$target" "fuzz/corpus/$target" \
         >"$out/$target.log" 2>&1 || failed=1

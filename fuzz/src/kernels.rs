@@ -11,7 +11,7 @@ use rays::ray::{LARGEST_COORDINATE, Ray};
 use rays::reference::brute_force_f32;
 
 /// More would take long without finding more.
-const MOST_TRIANGLES: usize = 64;
+const MOST_TRIANGLES: usize = 24;
 const MOST_RAYS: usize = 8;
 
 /// Lets rays pass every other triangle.

@@ -111,6 +111,7 @@ fn what_was_killed_leaves_nothing_incomplete_and_ends_with_the_same_bytes_the_ne
             end.assert_part_of(files, writer, writer.name);
             let names = |files: &Files| files.finished.keys().cloned().collect::<Vec<_>>();
             assert_eq!(names(&end), names(files), "{}", writer.name);
+            println!("{}: {killed} kills so far", writer.name);
             if killed >= wanted.unwrap_or(FEW) || late > 20 + killed {
                 break 'all;
             }
