@@ -53,7 +53,11 @@ for target; do
     FUZZ_TARGET=$target TMPDIR=$scratch nice -n 19 "$program" $words -max_len=$length -timeout=120 \
         -rss_limit_mb=2048 -reload=0 -print_final_stats=1 -max_total_time="$seconds" -runs="$runs" \
         -artifact_prefix="$out/$target-" "$out/$target" "fuzz/corpus/$target" \
-        >"$out/$target.log" 2>&1 || failed=1
+        >"$out/$target.log" 2>&1 || {
+        failed=1
+        echo "$target: stopped by a fault, see $out/$target.log"
+        grep -a -m 1 -A 1 "panicked at\|ERROR: libFuzzer" "$out/$target.log" || true
+    }
     awk -v target="$target" '
         / cov: / { for (i = 1; i < NF; i++) { if ($i == "cov:") cov = $(i + 1); if ($i == "ft:") ft = $(i + 1) } }
         /number_of_executed_units/ { runs = $2 } /average_exec_per_sec/ { rate = $2 }

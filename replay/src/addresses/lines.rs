@@ -108,7 +108,7 @@ impl<V: FnMut(LineBlock<'_>)> Lines<V> {
             self.totals.left_out += 1;
             return Some(());
         }
-        let last = access.address + u64::from(access.bytes.max(1)) - 1;
+        let last = access.address + u64::from(access.bytes.max(1) - 1);
         let lines = access.address >> self.shift..=last >> self.shift;
         let kind = access.kind as usize;
         self.totals.accesses[kind] += 1;
