@@ -171,7 +171,13 @@ pub(super) const MATERIALS: &str =
 
 /// A PNG of this size.
 pub(super) fn checker(size: [u32; 2]) -> anyhow::Result<Vec<u8>> {
-    let texel = |x: u32, y: u32| image::Luma([if (x / 4 + y / 4) % 2 == 0 { 220 } else { 40 }]);
+    let texel = |x: u32, y: u32| {
+        image::Luma([if (x / 4 + y / 4).is_multiple_of(2) {
+            220
+        } else {
+            40
+        }])
+    };
     let picture = image::GrayImage::from_fn(size[0], size[1], texel);
     let mut png = std::io::Cursor::new(Vec::new());
     picture.write_to(&mut png, image::ImageFormat::Png)?;
