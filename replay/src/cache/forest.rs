@@ -1,9 +1,32 @@
-//! Many LRU caches of several numbers of sets, line by line ([`Stacks`] takes a batch at once).
+//! Many LRU caches in one pass: a stack of lines for every set of every number of sets.
 //!
-//! The lines of a set are those of some sets of a cache with fewer sets, so a line that was used last in
-//! its set was so with more sets, too, and the search ends there, with nothing to move (Hill & Smith 1989).
+//! An LRU cache of `w` ways holds the `w` lines of a set that were used last, so one stack, as deep
+//! as the largest associativity asked for, answers all associativities: a line found at depth `d`
+//! is a hit where there are more than `d` ways (Mattson et al. 1970). The lines of a set are those
+//! of some sets of a cache with fewer sets, so a line that was used last in its set was so with
+//! more sets, too, and the search ends there, with nothing to move (Hill & Smith 1989).
 
-use super::stacks::Stacks;
+use super::EMPTY;
+use super::lru::to_front;
+
+/// The stacks of one number of sets.
+#[derive(Clone, Debug)]
+struct Stacks {
+    /// Lines by set, the one used last first.
+    lines: Vec<u32>,
+    set_mask: u32,
+    depth: usize,
+}
+
+impl Stacks {
+    /// Moves the line to the front of its stack: how deep it was; the stack's depth if it was not
+    /// there.
+    #[inline(always)]
+    fn access(&mut self, line: u32) -> u8 {
+        let first = (line & self.set_mask) as usize * self.depth;
+        to_front(&mut self.lines[first..first + self.depth], line) as u8
+    }
+}
 
 /// LRU caches of several numbers of sets and ways that see the same lines.
 #[derive(Clone, Debug)]
@@ -18,7 +41,11 @@ impl Forest {
     #[must_use]
     pub fn new(trees: &[(u32, u32)]) -> Self {
         debug_assert!(!trees.is_empty() && trees.is_sorted_by(|a, b| a.0 < b.0));
-        let stacks = |&(sets, ways): &(u32, u32)| Stacks::new(1, sets, ways);
+        let stacks = |&(sets, ways): &(u32, u32)| Stacks {
+            lines: vec![EMPTY; sets as usize * ways as usize],
+            set_mask: sets - 1,
+            depth: ways as usize,
+        };
         Self {
             trees: trees.iter().map(stacks).collect(),
         }
@@ -26,7 +53,9 @@ impl Forest {
 
     /// Empties all caches.
     pub fn clear(&mut self) {
-        self.trees.iter_mut().for_each(Stacks::clear);
+        self.trees
+            .iter_mut()
+            .for_each(|tree| tree.lines.fill(EMPTY));
     }
 
     /// Accesses lines from the first on until one lies `ways` deep or deeper for any number of sets:

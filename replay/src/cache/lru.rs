@@ -197,4 +197,9 @@ impl<W: Ways> Cache for Lru<W> {
     fn access(&mut self, line: u32) -> bool {
         Self::access(self, line)
     }
+
+    /// No more lines than ways can crowd each other out, and a repeat leaves the same stack.
+    fn repeat_safe_lines(&self) -> u32 {
+        self.ways.ways() as u32
+    }
 }

@@ -10,7 +10,6 @@ mod in_flight;
 mod levels;
 mod lru;
 mod random;
-mod stacks;
 mod tree_plru;
 
 pub use forest::Forest;
@@ -19,7 +18,6 @@ pub use levels::Levels;
 #[cfg(test)]
 pub(crate) use lru::WaysOf;
 pub use lru::{AnyWays, FourWayLru, Lru};
-pub use stacks::{Access, Stacks};
 
 use crate::config::{CacheConfig, ConfigError};
 use crate::registry::{Named, registry};
@@ -117,6 +115,12 @@ pub trait Cache: Send {
         }
         hit
     }
+
+    /// Up to this many distinct lines accessed one after another are all still there right after,
+    /// and accessing the same sequence again changes nothing: such repeats need no simulation.
+    fn repeat_safe_lines(&self) -> u32 {
+        1
+    }
 }
 
 impl Cache for Box<dyn Cache> {
@@ -138,6 +142,10 @@ impl Cache for Box<dyn Cache> {
 
     fn access(&mut self, line: u32) -> bool {
         (**self).access(line)
+    }
+
+    fn repeat_safe_lines(&self) -> u32 {
+        (**self).repeat_safe_lines()
     }
 }
 

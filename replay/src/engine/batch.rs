@@ -256,16 +256,6 @@ impl Pass<'_> {
     }
 }
 
-/// Fewest sets of any L1.
-fn fewest_sets(passes: &[Pass<'_>]) -> Option<u32> {
-    let points = passes.iter().flat_map(|pass| &pass.points);
-    let sets = points.map(|&index| {
-        let RunConfig { l1, line_bytes, .. } = &passes[0].configs[index];
-        l1.sets("L1", *line_bytes).unwrap_or(1)
-    });
-    sets.min()
-}
-
 /// What the passes of a wave need.
 struct Wave<'a> {
     trace: &'a dyn TileSource,
@@ -282,12 +272,10 @@ impl Wave<'_> {
         let expander = Expander::new(&shaded, passes[0].config())?;
         let instant = |pass: &Pass<'_>| pass.config().tmu.l1_penalty_cycles == 0;
         let expander = match passes[0].config().mode {
-            Mode::Functional => expander.for_sets(fewest_sets(&passes)),
+            Mode::Functional | Mode::FirstMiss => expander,
             // Where a miss fills at once, the timed machine looks footprints up one by one.
             Mode::Timed if passes.iter().any(instant) => expander.with_distinct_lines(true),
             Mode::Timed => expander.only_distinct_lines(),
-            // Every look-up takes its cycle.
-            Mode::FirstMiss => expander,
         };
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();

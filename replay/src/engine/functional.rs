@@ -37,8 +37,16 @@ impl<C: Cache> Functional<C> {
 
 impl<C: Cache> Consumer for Functional<C> {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
+        let safe_lines = self.levels.l1[core].repeat_safe_lines() as usize;
         for footprint in quad.footprints() {
-            for _ in 0..=footprint.repeats {
+            // Repeats that would find everything there need no simulation.
+            let repeats_are_idle = footprint.lines.len() <= safe_lines;
+            let repeats = if repeats_are_idle {
+                0
+            } else {
+                footprint.repeats
+            };
+            for _ in 0..=repeats {
                 let l1 = &mut self.levels.l1[core];
                 let (mut missing, mut count) = ([0; 4], 0);
                 for &line in footprint.lines {

@@ -6,7 +6,6 @@ mod first_miss;
 mod functional;
 mod one_pass;
 mod summary;
-mod tally;
 #[cfg(test)]
 mod tests;
 mod timed;

@@ -8,7 +8,6 @@
 use super::distinct::Distinct;
 use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
 use super::lines::{QuadEnd, QuadRun, Tag, TileLines};
-use super::strip::Strip;
 use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, feed};
 use crate::config::RunConfig;
 use crate::order::TileRef;
@@ -54,8 +53,6 @@ pub struct Expander<'a> {
     touched: LineSet,
     distinct: bool,
     all: bool,
-    /// Fewest sets of the caches that only what they notice is listed for.
-    sets: Option<u32>,
 }
 
 /// Memory for the expansion of a tile, kept from tile to tile, and what was counted.
@@ -65,7 +62,6 @@ pub(super) struct Work {
     scratch: Scratch,
     counts: TraceCounts,
     distinct: Option<Distinct>,
-    strip: Option<Strip>,
     /// The last tile's lines.
     pub(super) lines: TileLines,
 }
@@ -85,7 +81,6 @@ impl<'a> Expander<'a> {
             source,
             distinct: false,
             all: true,
-            sets: None,
         })
     }
 
@@ -103,13 +98,6 @@ impl<'a> Expander<'a> {
             all: false,
             ..self
         }
-    }
-
-    /// Lists only what caches of at least so many sets, a power of two, may notice if they have no latencies
-    /// (all else hits). Counts are of all accesses as ever.
-    #[must_use]
-    pub fn for_sets(self, sets: Option<u32>) -> Self {
-        Self { sets, ..self }
     }
 
     /// Where accesses count.
@@ -174,7 +162,6 @@ impl<'a> Expander<'a> {
             scratch: self.footprints.scratch(),
             counts: TraceCounts::without_tiles(&self.bins),
             distinct: self.distinct.then(Distinct::default),
-            strip: self.sets.map(Strip::new),
             lines: TileLines::default(),
         }
     }
@@ -187,16 +174,12 @@ impl<'a> Expander<'a> {
             scratch,
             counts,
             distinct,
-            strip,
             lines,
         } = work;
         lines.begin(self.bins.place(at));
         let first_cell = self.bins.first_cell(at);
         let mut sums = TileSums::default();
         for run in &tile.runs {
-            if let Some(strip) = strip {
-                strip.begin();
-            }
             for records in feed::quads(tile, run) {
                 let lanes = feed::lanes(records);
                 counts.quads += 1;
@@ -206,8 +189,9 @@ impl<'a> Expander<'a> {
                 self.footprints
                     .for_quad(run.draw, records, scratch, |sample, bundle| {
                         let cell = self.bins.cell(sample.texture, bundle.level);
-                        let strip = strip.as_mut();
-                        let (hash, lookups) = self.append(cell, sample, bundle, strip, lines);
+                        let before = lines.lines.len();
+                        let (hash, lookups) = self.append(cell, sample, bundle, lines);
+                        debug_assert!(lines.lines.len() > before || bundle.count == 0);
                         counts.hash = counts.hash.wrapping_add(hash);
                         let cell = &mut counts.cells[first_cell + cell as usize];
                         cell.footprints += u64::from(bundle.count);
@@ -247,7 +231,6 @@ impl<'a> Expander<'a> {
         cell: u32,
         sample: SampleRef,
         bundle: &Bundle,
-        mut strip: Option<&mut Strip>,
         out: &mut TileLines,
     ) -> (u64, u32) {
         let (mut hash, mut lookups) = (0_u64, 0);
@@ -259,22 +242,17 @@ impl<'a> Expander<'a> {
                 next += 1;
             }
             let times = (next - index) as u32;
-            let relative = bundle.lines_of(index);
-            let lines = relative.iter().map(|line| sample.base_line + line);
+            let [first, other] = Tag::of_footprint(cell, times - 1);
+            let mut tag = first;
             let mut once = 0_u64;
-            for line in lines.clone() {
+            let relative = bundle.lines_of(index);
+            for relative in relative {
+                let line = sample.base_line + relative;
+                out.lines.push(line);
+                out.tags.push(tag);
+                tag = other;
                 self.touched.insert(line);
                 once = once.wrapping_add(access_hash(line));
-            }
-            if let Some(strip) = &mut strip {
-                strip.list(cell, lines, times, out);
-            } else {
-                let [first, other] = Tag::of_footprint(cell, times - 1);
-                let tags = std::iter::once(first).chain(std::iter::repeat(other));
-                for (line, tag) in lines.zip(tags) {
-                    out.lines.push(line);
-                    out.tags.push(tag);
-                }
             }
             hash = hash.wrapping_add(once.wrapping_mul(times.into()));
             lookups += relative.len() as u32 * times;

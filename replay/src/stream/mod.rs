@@ -18,7 +18,6 @@ mod interleave;
 mod line_set;
 mod lines;
 mod source;
-mod strip;
 pub mod synthetic;
 #[cfg(test)]
 pub mod testing;
