@@ -48,9 +48,9 @@ for target; do
     kernels | paths) length=400 ;;
     *) length=1500 ;;
     esac
-    # A second an input is the target's own check, in processor time; -timeout catches what never ends.
+    # A second an input is the target's own check, in processor time; -timeout, by the clock, catches what never ends.
     # shellcheck disable=SC2086
-    FUZZ_TARGET=$target TMPDIR=$scratch nice -n 19 "$program" $words -max_len=$length -timeout=120 \
+    FUZZ_TARGET=$target TMPDIR=$scratch nice -n 19 "$program" $words -max_len=$length -timeout=1200 \
         -rss_limit_mb=2048 -reload=0 -print_final_stats=1 -max_total_time="$seconds" -runs="$runs" \
         -artifact_prefix="$out/$target-" "$out/$target" "fuzz/corpus/$target" \
         >"$out/$target.log" 2>&1 || {
