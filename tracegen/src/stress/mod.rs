@@ -13,7 +13,7 @@ mod sweeps;
 pub use report::Report;
 pub use sweeps::SWEEPS;
 
-use probe::{Capture, Probe};
+use probe::{Capture, Probe, Ran};
 use serde::Serialize;
 use std::path::Path;
 
@@ -62,6 +62,25 @@ pub enum Outcome {
     Broken,
 }
 
+impl Outcome {
+    /// Of a run, with the error of its capture where it has one.
+    fn of(ran: &Ran, error: Option<&Error>, bounds: &Bounds) -> Self {
+        match (ran.exit_code, error, &ran.said) {
+            (Some(0), Some(error), said) => {
+                let within = error.fragments_pct <= bounds.fragments_pct
+                    && error.uv_texels <= bounds.uv_texels;
+                match (within, said) {
+                    (true, _) => Self::Within,
+                    (false, Some(_)) => Self::Warned,
+                    (false, None) => Self::Broken,
+                }
+            }
+            (Some(2), None, Some(_)) => Self::Refused,
+            _ => Self::Broken,
+        }
+    }
+}
+
 /// A point of a sweep.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
@@ -91,21 +110,9 @@ impl Points<'_> {
         measure: impl FnOnce(&Probe<'_>) -> anyhow::Result<Error>,
     ) -> anyhow::Result<()> {
         let ran = self.probe.capture(capture)?;
-        let (outcome, error) = match ran.exit_code {
-            Some(0) => {
-                let error = measure(self.probe)?;
-                let within = error.fragments_pct <= self.bounds.fragments_pct
-                    && error.uv_texels <= self.bounds.uv_texels;
-                let outcome = match (within, &ran.said) {
-                    (true, _) => Outcome::Within,
-                    (false, Some(_)) => Outcome::Warned,
-                    (false, None) => Outcome::Broken,
-                };
-                (outcome, Some(error))
-            }
-            Some(2) if ran.said.is_some() => (Outcome::Refused, None),
-            _ => (Outcome::Broken, None),
-        };
+        let captured = ran.exit_code == Some(0);
+        let error = captured.then(|| measure(self.probe)).transpose()?;
+        let outcome = Outcome::of(&ran, error.as_ref(), &self.bounds);
         self.points.push(Point {
             at: at.into(),
             outcome,
@@ -151,4 +158,65 @@ pub fn run(
         report.add(sweep, points.points);
     }
     Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_is_broken_unless_it_keeps_its_bounds_or_the_program_says_that_it_does_not() {
+        let bounds = Bounds {
+            fragments_pct: 0.1,
+            uv_texels: 0.5,
+        };
+        let off = |fragments_pct: f64, uv_texels: f64| Error {
+            fragments: 1000,
+            fragments_pct,
+            uv_texels,
+        };
+        let of = |exit_code: Option<i32>, said: &str, error: Option<Error>| {
+            let said = Some(said.to_owned()).filter(|said| !said.is_empty());
+            Outcome::of(&Ran { exit_code, said }, error.as_ref(), &bounds)
+        };
+        assert_eq!(of(Some(0), "", Some(off(0.1, 0.5))), Outcome::Within);
+        assert_eq!(of(Some(0), "warning", Some(off(0.2, 0.0))), Outcome::Warned);
+        assert_eq!(of(Some(2), "error", None), Outcome::Refused);
+        for broken in [
+            of(Some(0), "", Some(off(0.2, 0.0))),
+            of(Some(0), "", Some(off(0.0, 0.6))),
+            of(Some(0), "", Some(off(0.0, f64::NAN))),
+            of(Some(2), "", None),
+            of(Some(101), "error", None),
+            of(None, "error", None),
+        ] {
+            assert_eq!(broken, Outcome::Broken);
+        }
+    }
+
+    #[test]
+    fn names_of_sweeps_are_their_own_and_the_report_counts_what_is_broken() {
+        let mut names = SWEEPS.each_ref().map(|sweep| sweep.name);
+        names.sort_unstable();
+        assert!(names.windows(2).all(|pair| pair[0] != pair[1]));
+        let point = |outcome| Point {
+            at: "a".into(),
+            outcome,
+            error: None,
+            said: Some("a | b".into()),
+        };
+        let mut report = Report::default();
+        let points = [Outcome::Within, Outcome::Broken, Outcome::Refused];
+        report.add(&SWEEPS[0], points.map(point).to_vec());
+        assert_eq!(report.broken(), 1);
+        let text = report.markdown();
+        assert!(
+            text.contains("| translation | 3 | 1 | 0 | 1 | 1 |"),
+            "{text}"
+        );
+        assert!(
+            text.contains("| a | broken | - | - | - | a \\| b |"),
+            "{text}"
+        );
+    }
 }

@@ -6,8 +6,8 @@ use super::super::{Bounds, Points, Sweep};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "slivers",
-    about: "Rows of triangles from 0.3 pixels down to 0.003 pixels high, against the reference. All of their fragments lie at edges, where a vertex that rounds to the next \
-            of 1/256 of a pixel decides.",
+    about: "Rows of triangles of 0.3 and 0.03 pixels high, against the reference. All of their fragments lie at edges, where a vertex that rounds to the next \
+            of 1/256 of a pixel decides; those thinner than that are drawn or not as their rounding falls, and not looked at.",
     bounds: Bounds {
         fragments_pct: 10.0,
         uv_texels: 0.05,
@@ -16,7 +16,7 @@ pub(super) const SWEEP: Sweep = Sweep {
 };
 
 fn run(points: &mut Points<'_>) -> anyhow::Result<()> {
-    for rows in [100, 1000, 10_000] {
+    for rows in [100, 1000] {
         let mut slivers = Shape::default();
         for row in 0..rows {
             let y = 2.0 * f64::from(row) / f64::from(rows) - 1.0;

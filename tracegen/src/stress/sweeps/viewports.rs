@@ -6,9 +6,9 @@ use super::super::{Bounds, Points, Sweep};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "viewport",
-    about: "Clutter in pictures of 1 x 1 to 8192 x 8192 pixels, multiples of a tile or not, against the reference.",
+    about: "Clutter in pictures of 1 x 1 to 8192 x 8192 pixels, multiples of a tile or not, against the reference. In a picture of one column every fragment lies at an edge.",
     bounds: Bounds {
-        fragments_pct: 0.2,
+        fragments_pct: 0.5,
         uv_texels: 0.05,
     },
     run,
@@ -34,7 +34,7 @@ fn run(points: &mut Points<'_>) -> anyhow::Result<()> {
         "8193x1",
     ] {
         let scene = if size == "8192x8192" { &few } else { &clutter };
-        let flags = format!("--size {size} --hfov 90 --eye 0,0,0 --target 1,0.2,-1");
+        let flags = format!("--size {size} --fov-tangents 1,1,1,1 --eye 0,0,0 --target 1,0.2,-1");
         points.add_against_reference(size, &Capture::new(scene.clone(), &flags))?;
     }
     Ok(())
