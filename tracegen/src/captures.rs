@@ -105,6 +105,13 @@ fn crossed(mut options: Table, table: usize) -> anyhow::Result<Vec<Capture>> {
     };
     let command = word("command")?.unwrap_or_else(|| "raster".to_owned());
     let name = word("name")?;
+    if let Some(name) = &name {
+        // It begins a file's name in the sweep's folder, and must not lead out of it.
+        ensure!(
+            !name.contains(['/', '\\', '\0']),
+            "`name`: expected a part of a file's name, found {name:?}"
+        );
+    }
     let extension = match command.as_str() {
         "raster" => "textrace",
         "rays" => "raytrace",
@@ -259,6 +266,10 @@ mod tests {
             (
                 "[[captures]]\nscene = \"a\"\ncommand = \"rm\"\n",
                 "raster or rays, found `rm`",
+            ),
+            (
+                "[[captures]]\nscene = \"a\"\nname = \"../a\"\n",
+                "`name`: expected a part of a file's name, found \"../a\"",
             ),
             (
                 "[[captures]]\nscene = \"a\"\noutput = \"b\"\n",
