@@ -46,6 +46,8 @@ pub enum Fragments {
 pub struct Recording<'s, 't> {
     /// Which fragments.
     pub fragments: Fragments,
+    /// Draws the picture as well, as without recording; else the layer's colour stays as it is.
+    pub picture: bool,
     /// Gets every record of the region (see [`record::Capturer::capture`]).
     pub sink: &'s mut Sink<'t>,
 }
@@ -160,7 +162,8 @@ pub trait CaptureBackend {
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError>;
 
     /// Renders a region of a layer into the layer's target, and records it where that is asked
-    /// for. The picture is the same either way.
+    /// for. Depth is the same either way, and the picture if the recording has one; without a picture
+    /// nothing of [`Fragments::All`] writes depth.
     ///
     /// # Errors
     /// Driver errors, and what the recording's sink returns.
@@ -235,6 +238,12 @@ pub trait CaptureBackend {
     /// # Errors
     /// Driver errors.
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError>;
+
+    /// Reads the depth that rendering left in a layer's target: row by row, 1 where there is nothing.
+    ///
+    /// # Errors
+    /// A layer that has not been rendered, and driver errors.
+    fn layer_depth(&mut self, layer: usize) -> Result<Vec<f32>, RasterError>;
 
     /// Reads one of the frame's pictures, which have been composed: sRGB RGBA8, row by row.
     ///

@@ -34,6 +34,18 @@ pub struct CaptureJob<'a> {
     pub skips: Skips,
     /// Which fragments are recorded.
     pub fragments: Fragments,
+    /// Captured frames have pictures as well.
+    pub shaded: bool,
+}
+
+/// What capturing a frame gives beside its tiles.
+pub struct CapturedFrame {
+    /// Its pictures, if the job is shaded.
+    pub pictures: Option<Pictures>,
+    /// What was recorded.
+    pub counts: CaptureCounts,
+    /// What sorting, encoding and writing took.
+    pub sorting: Duration,
 }
 
 /// The pictures of one frame, one an eye: sRGB RGBA8.
@@ -155,6 +167,7 @@ impl CaptureJob<'_> {
             backend.render(self.draws, &view, tile, None)?;
             let recording = Recording {
                 fragments: self.fragments,
+                picture: self.shaded,
                 sink: &mut |_| Ok(()),
             };
             backend.render(self.draws, &view, tile, Some(recording))?;
@@ -209,8 +222,7 @@ impl CaptureJob<'_> {
     }
 
     /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the
-    /// number of the first layer's pass. The frame's shadow maps have been rendered. The time is
-    /// what sorting, encoding and writing took.
+    /// number of the first layer's pass. The frame's shadow maps have been rendered.
     ///
     /// # Errors
     /// Driver errors, a record budget that one tile overflows, and errors of writing.
@@ -221,7 +233,7 @@ impl CaptureJob<'_> {
         first_pass: usize,
         recorder: &mut Recorder<'_>,
         writer: &mut TextraceWriter<W>,
-    ) -> Result<(Pictures, CaptureCounts, Duration), RasterError> {
+    ) -> Result<CapturedFrame, RasterError> {
         let mut counts = CaptureCounts::default();
         let mut sorting = Duration::ZERO;
         for (pass, view) in (first_pass..).zip(frame.views()) {
@@ -231,12 +243,32 @@ impl CaptureJob<'_> {
                 view,
                 skip_regions: self.skips.regions,
                 fragments: self.fragments,
+                picture: self.shaded,
             };
             let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
             counts += recorded.counts;
             sorting += recorded.sorting;
         }
-        Ok((pictures(backend, frame)?, counts, sorting))
+        let pictures = self.shaded.then(|| pictures(backend, frame));
+        Ok(CapturedFrame {
+            pictures: pictures.transpose()?,
+            counts,
+            sorting,
+        })
+    }
+
+    /// Depth of the frame's layers as they were rendered last.
+    ///
+    /// # Errors
+    /// A layer that has not been rendered, and driver errors.
+    pub fn depths(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<Vec<Vec<f32>>, RasterError> {
+        (0..frame.plan.layers.len())
+            .map(|layer| backend.layer_depth(layer))
+            .collect()
     }
 }
 
@@ -274,6 +306,7 @@ struct ViewCapturer<'a> {
     view: View<'a>,
     skip_regions: bool,
     fragments: Fragments,
+    picture: bool,
 }
 
 impl Capturer for ViewCapturer<'_> {
@@ -296,6 +329,7 @@ impl Capturer for ViewCapturer<'_> {
         };
         let recording = Recording {
             fragments: self.fragments,
+            picture: self.picture,
             sink,
         };
         (self.backend).render(self.draws, &view, region, Some(recording))

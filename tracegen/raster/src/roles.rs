@@ -1,5 +1,7 @@
 //! What a draw does in each pass, and what distinguishes the pipelines that do it.
 
+use crate::backend::Fragments;
+use crate::backend::Recording;
 use crate::draws::{DrawCall, DrawMode};
 use crate::groups::MaterialGroups;
 use scene::Material;
@@ -15,6 +17,10 @@ pub(crate) enum Role {
     Masked,
     /// Records of an alpha-masked draw; writes neither colour nor depth.
     MaskedRecord,
+    /// Late depth of an alpha-masked draw; writes no colour.
+    MaskedDepth,
+    /// Records and early depth of an opaque draw; writes no colour.
+    OpaqueRecord,
     /// Records of what lies before the depth there; writes neither colour nor depth.
     Record,
     /// Depth of a shadow caster.
@@ -46,9 +52,9 @@ impl Role {
             Self::Opaque | Self::Blended => Some("fragment_early"),
             Self::Masked => Some("fragment_masked"),
             Self::MaskedRecord => Some("fragment_masked_record"),
-            Self::Record => Some("fragment_record"),
+            Self::Record | Self::OpaqueRecord => Some("fragment_record"),
             Self::Shadow | Self::Depth => None,
-            Self::ShadowMasked | Self::DepthMasked => Some("fragment_shadow"),
+            Self::ShadowMasked | Self::DepthMasked | Self::MaskedDepth => Some("fragment_shadow"),
             Self::Mark => Some("fragment_mark"),
             Self::MarkMasked => Some("fragment_mark_masked"),
             Self::Count | Self::CountBlended => Some("fragment_count"),
@@ -68,9 +74,12 @@ impl Role {
         self.casts() || alone.contains(&self)
     }
 
-    /// It writes nothing but records.
-    pub fn only_records(self) -> bool {
-        matches!(self, Self::Record | Self::MaskedRecord)
+    /// It leaves the colour as it is.
+    pub fn keeps_color(self) -> bool {
+        matches!(
+            self,
+            Self::Record | Self::MaskedRecord | Self::MaskedDepth | Self::OpaqueRecord
+        )
     }
 
     /// It writes texels and primitives in place of the picture.
@@ -85,7 +94,10 @@ impl Role {
 
     /// Neither texture nor vertex colour changes what it does.
     fn is_plain(self) -> bool {
-        matches!(self, Self::Record | Self::Shadow | Self::Depth | Self::Mark)
+        matches!(
+            self,
+            Self::Record | Self::OpaqueRecord | Self::Shadow | Self::Depth | Self::Mark
+        )
     }
 
     /// Depth is tested and stays.
@@ -109,6 +121,8 @@ pub(crate) enum Purpose {
     Plain,
     /// The picture and the records.
     Capture,
+    /// The records of what passes the depth test when it is drawn, and depth: no picture.
+    Trace,
     /// The records alone, of what lies before the depth that the layer starts with.
     Record,
     /// A shadow map.
@@ -123,6 +137,20 @@ pub(crate) enum Purpose {
     Texel,
 }
 
+impl Purpose {
+    /// What a region is rendered for, one after the other.
+    pub fn of(recording: Option<&Recording<'_, '_>>) -> &'static [Self] {
+        match recording.map(|recording| (recording.fragments, recording.picture)) {
+            None => &[Self::Plain],
+            Some((Fragments::DepthTested, true)) => &[Self::Capture],
+            Some((Fragments::DepthTested, false)) => &[Self::Trace],
+            // All fragments are recorded before any draw writes depth.
+            Some((Fragments::All, true)) => &[Self::Record, Self::Plain],
+            Some((Fragments::All, false)) => &[Self::Record],
+        }
+    }
+}
+
 /// Roles of a draw in the order in which it takes them.
 pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
     match (mode, purpose) {
@@ -130,7 +158,9 @@ pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
         (DrawMode::Blended, Purpose::Plain | Purpose::Capture) => &[Role::Blended],
         (DrawMode::Masked, Purpose::Plain) => &[Role::Masked],
         (DrawMode::Masked, Purpose::Capture) => &[Role::MaskedRecord, Role::Masked],
-        (_, Purpose::Record) => &[Role::Record],
+        (DrawMode::Opaque, Purpose::Trace) => &[Role::OpaqueRecord],
+        (DrawMode::Masked, Purpose::Trace) => &[Role::MaskedRecord, Role::MaskedDepth],
+        (DrawMode::Blended, Purpose::Trace) | (_, Purpose::Record) => &[Role::Record],
         (DrawMode::Opaque, Purpose::Shadow) => &[Role::Shadow],
         (DrawMode::Masked, Purpose::Shadow) => &[Role::ShadowMasked],
         (DrawMode::Opaque, Purpose::Count) => &[Role::Count],
@@ -210,10 +240,10 @@ impl PipelineKey {
         purpose: Purpose,
         cascades: u32,
     ) -> Self {
-        // The colour pass of a masked draw records nothing: its records come from a role of their own.
-        let records = matches!(purpose, Purpose::Capture | Purpose::Record);
-        let capture = records && role != Role::Masked;
-        let lit = records || purpose == Purpose::Plain;
+        // The second role of a masked draw records nothing.
+        let records = matches!(purpose, Purpose::Capture | Purpose::Trace | Purpose::Record);
+        let capture = records && !matches!(role, Role::Masked | Role::MaskedDepth);
+        let lit = capture || role == Role::Masked || purpose == Purpose::Plain;
         Self {
             role,
             capture,

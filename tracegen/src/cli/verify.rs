@@ -129,6 +129,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<()> {
         planner: &planner,
         skips: Skips::default(),
         fragments: Fragments::DepthTested,
+        shaded: false,
     };
     progress.stage("preparing textures", 0, "");
     let finest = job.finest_levels(&setup.frames)?;

@@ -77,6 +77,7 @@ impl World {
             // What is searched for anew in every frame would hide what the techniques find.
             skips: Skips::NONE,
             fragments: Fragments::DepthTested,
+            shaded: false,
         }
     }
 
@@ -195,10 +196,10 @@ impl<'a, W: Write + Seek> Tracer<'a, W> {
         frame: &Frame,
     ) -> Result<CaptureCounts, RasterError> {
         let mut recorder = job.recorder(self.tables);
-        let (_, counts, _) =
+        let captured =
             job.capture_frame(backend, frame, self.pass, &mut recorder, &mut self.writer)?;
         self.pass += frame.plan.layers.len();
-        Ok(counts)
+        Ok(captured.counts)
     }
 
     /// The writer, to be finished.

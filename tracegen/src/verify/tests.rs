@@ -11,7 +11,7 @@ use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
 use formats::view::{Eye, FrameViews, Hmd, Lens, TILE_SIZE_PX};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
 use raster::backend::{CaptureBackend, Fragments, View, Work};
-use raster::capture::CaptureJob;
+use raster::capture::{CaptureJob, CapturedFrame};
 use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
 use raster::lavapipe::{Lavapipe, device};
@@ -83,6 +83,7 @@ fn job<'a>(scene: &'a Scene, draws: &'a DrawList, planner: &'a Planner) -> Captu
         planner,
         skips: Skips::default(),
         fragments: Fragments::DepthTested,
+        shaded: true,
     }
 }
 
@@ -162,13 +163,37 @@ fn capture_skipping(
     let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
+    // Both views at once leave no depth of their own.
+    let compares = matches!(plain, Some(Ok(_))) && !planner.settings().multiview;
+    let depths = compares.then(|| job.depths(&mut backend, &frame).unwrap());
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
     let mut recorder = job.recorder(&tables);
     let before = backend.work();
-    let (pictures, counts, _) =
-        job.capture_frame(&mut backend, &frame, 0, &mut recorder, &mut writer)?;
+    let CapturedFrame {
+        pictures, counts, ..
+    } = job.capture_frame(&mut backend, &frame, 0, &mut recorder, &mut writer)?;
     let after = backend.work();
     let trace = writer.into_bytes().unwrap();
+    if let Some(depths) = &depths {
+        assert!(job.depths(&mut backend, &frame)? == *depths, "shaded");
+    }
+    // Records do not depend on whether a picture is drawn as well, and depth neither.
+    let unshaded = CaptureJob {
+        shaded: false,
+        ..job
+    };
+    let mut writer = TextraceWriter::in_memory(&tables).unwrap();
+    let mut recorder = unshaded.recorder(&tables);
+    unshaded.capture_frame(&mut backend, &frame, 0, &mut recorder, &mut writer)?;
+    assert!(
+        writer.into_bytes().unwrap() == trace,
+        "a trace without shading"
+    );
+    if let Some(depths) = &depths
+        && fragments == Fragments::DepthTested
+    {
+        assert!(job.depths(&mut backend, &frame)? == *depths, "unshaded");
+    }
     let reader = Textrace::from_bytes(trace.clone()).unwrap();
     let tiles = (0..tables.passes.len())
         .map(|pass| {
@@ -186,10 +211,10 @@ fn capture_skipping(
         tables,
         tiles,
         pictures_match: match plain {
-            Some(plain) => plain?.0 == pictures,
+            Some(plain) => Some(plain?.0) == pictures,
             None => true,
         },
-        pictures,
+        pictures: pictures.unwrap_or_default(),
         counts,
         predicted: frame.plan.predicted,
         work: Work {

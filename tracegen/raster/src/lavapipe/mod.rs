@@ -424,14 +424,7 @@ impl CaptureBackend for Lavapipe {
         let Some(region) = self.target(view.target)?.open_part(region) else {
             return Ok(Captured::Complete);
         };
-        // All fragments are recorded before any draw writes depth.
-        let fragments = recording.as_ref().map(|recording| recording.fragments);
-        let purposes: &[Purpose] = match fragments {
-            None => &[Purpose::Plain],
-            Some(Fragments::DepthTested) => &[Purpose::Capture],
-            Some(Fragments::All) => &[Purpose::Record, Purpose::Plain],
-        };
-        let plan = (purposes.iter())
+        let plan = (Purpose::of(recording.as_ref()).iter())
             .map(|purpose| self.plan(draws, view.visible, *purpose))
             .collect::<Result<Vec<_>, _>>()?
             .concat();
@@ -502,7 +495,10 @@ impl CaptureBackend for Lavapipe {
             gpu.queue.submit([encoder.finish()]);
         })?;
         self.work.state_changes += state_changes(draws, &plan);
-        let Some(Recording { fragments, sink }) = recording else {
+        let Some(Recording {
+            fragments, sink, ..
+        }) = recording
+        else {
             let submitted = Instant::now();
             gpu.wait("rendering a layer")?;
             self.work.submitting += submitted - start;
@@ -616,6 +612,11 @@ impl CaptureBackend for Lavapipe {
             self.work.composing += start.elapsed();
         }
         Ok(())
+    }
+
+    fn layer_depth(&mut self, layer: usize) -> Result<Vec<f32>, RasterError> {
+        let depth = self.target(layer)?.depth_view.texture();
+        self.readback.texels(&self.gpu, depth)
     }
 
     fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {

@@ -171,7 +171,7 @@ impl Pipelines {
         let mut targets = vec![Some(wgpu::ColorTargetState {
             format,
             blend,
-            write_mask: if key.role.only_records() {
+            write_mask: if key.role.keeps_color() {
                 wgpu::ColorWrites::empty()
             } else {
                 wgpu::ColorWrites::ALL

@@ -485,6 +485,28 @@ impl Gl {
         pixels
     }
 
+    /// Depth of a framebuffer, row by row.
+    pub fn depths(&self, framebuffer: Framebuffer, [width, height]: [u32; 2]) -> Vec<f32> {
+        let mut depths = vec![0.0_f32; width as usize * height as usize];
+        let into = glow::PixelPackData::Slice(Some(bytemuck::cast_slice_mut(&mut depths)));
+        let (width, height) = (width as i32, height as i32);
+        // SAFETY: see the module; the vector has a float a pixel.
+        unsafe {
+            self.gl
+                .bind_framebuffer(glow::FRAMEBUFFER, Some(framebuffer));
+            (self.gl).read_pixels(
+                0,
+                0,
+                width,
+                height,
+                glow::DEPTH_COMPONENT,
+                glow::FLOAT,
+                into,
+            );
+        }
+        depths
+    }
+
     /// Compiles and links a program; without a fragment shader it writes depth alone.
     ///
     /// # Errors

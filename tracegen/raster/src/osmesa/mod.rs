@@ -204,6 +204,12 @@ impl Osmesa {
         }
     }
 
+    /// What a layer has been rendered into.
+    fn rendered(&self, layer: usize) -> Result<Target, RasterError> {
+        (self.layers.get(layer).copied().flatten())
+            .ok_or_else(|| RasterError::Scene(format!("layer {layer} has not been rendered")))
+    }
+
     /// Hands over what has been recorded.
     fn hand_over(&self, recording: Recording<'_, '_>) -> Result<Captured, RasterError> {
         let mut counted = [0_u32];
@@ -308,14 +314,7 @@ impl CaptureBackend for Osmesa {
         self.gl.target(target.framebuffer, target.size_px, scissor);
         self.programs.background.set(&self.gl);
         self.gl.draw_whole(&self.nothing);
-        // All fragments are recorded before any draw writes depth.
-        let fragments = recording.as_ref().map(|recording| recording.fragments);
-        let purposes: &[Purpose] = match fragments {
-            None => &[Purpose::Plain],
-            Some(Fragments::DepthTested) => &[Purpose::Capture],
-            Some(Fragments::All) => &[Purpose::Record, Purpose::Plain],
-        };
-        for &purpose in purposes {
+        for &purpose in Purpose::of(recording.as_ref()) {
             let plan = self.plan(draws, view.visible, purpose)?;
             self.issue(draws, &plan);
         }
@@ -368,14 +367,18 @@ impl CaptureBackend for Osmesa {
         self.lacks("pictures that are composed of layers")
     }
 
+    fn layer_depth(&mut self, layer: usize) -> Result<Vec<f32>, RasterError> {
+        let target = self.rendered(layer)?;
+        let depth = self.gl.depths(target.framebuffer, target.size_px);
+        self.gl.check("reading depth")?;
+        Ok(depth)
+    }
+
     fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {
         let Picture::Layer(layer) = frame.plan.pictures[number] else {
             return self.lacks("pictures that are composed of layers");
         };
-        let Some(target) = self.layers.get(layer).copied().flatten() else {
-            let what = format!("layer {layer} has not been rendered");
-            return Err(RasterError::Scene(what));
-        };
+        let target = self.rendered(layer)?;
         let pixels = self.gl.pixels(target.framebuffer, target.size_px);
         self.gl.check("reading a picture")?;
         Ok(pixels)
