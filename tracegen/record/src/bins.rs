@@ -49,19 +49,23 @@ impl Bins {
 impl Chunk {
     fn new(records: &[RawRecord], first: u32, rect: &TileRect) -> Self {
         let mut starts = vec![0_u32; rect.count() + 1];
-        let tiles: Vec<Option<usize>> = records.iter().map(|r| rect.index(r)).collect();
-        for &tile in tiles.iter().flatten() {
-            starts[tile + 1] += 1;
+        // Four bytes a record: what lies outside has the number after the last tile's.
+        let outside = rect.count() as u32;
+        let tile = |r: &RawRecord| rect.index(r).map_or(outside, |tile| tile as u32);
+        let tiles: Vec<u32> = records.iter().map(tile).collect();
+        for &tile in tiles.iter().filter(|&&tile| tile < outside) {
+            starts[tile as usize + 1] += 1;
         }
         for tile in 0..rect.count() {
             starts[tile + 1] += starts[tile];
         }
         let mut next = starts.clone();
-        let mut indices = vec![0; tiles.iter().flatten().count()];
+        let mut indices = vec![0; starts.last().map_or(0, |&count| count as usize)];
         for (index, tile) in (first..).zip(tiles) {
-            if let Some(tile) = tile {
-                indices[next[tile] as usize] = index;
-                next[tile] += 1;
+            if tile < outside {
+                let place = &mut next[tile as usize];
+                indices[*place as usize] = index;
+                *place += 1;
             }
         }
         Self { starts, indices }

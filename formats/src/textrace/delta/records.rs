@@ -243,10 +243,28 @@ fn unfold(value: u32) -> Wrapping<i32> {
 }
 
 /// The smallest width code that holds `value`.
+#[inline(always)]
 fn width_code(value: u32) -> u32 {
     let needed = 32 - value.leading_zeros();
-    (0..16).find(|code| width(*code) >= needed).unwrap_or(15)
+    CODES.get(needed as usize).copied().map_or(15, u32::from)
 }
+
+/// The smallest width code of each number of bits.
+const CODES: [u8; 33] = {
+    let mut codes = [0; 33];
+    let (mut bits, mut code) = (0, 0);
+    while bits < codes.len() {
+        #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+        {
+            if WIDTHS[code as usize] < bits as u8 {
+                code += 1;
+            }
+            codes[bits] = code;
+        }
+        bits += 1;
+    }
+    codes
+};
 
 #[inline(always)]
 fn width(code: u32) -> u32 {
