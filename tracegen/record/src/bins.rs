@@ -9,15 +9,18 @@ use formats::textrace::quad_morton;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Indices of a region's records by tile, in no order within a tile.
+/// A record's sort key within its tile, and its index.
+pub(crate) type Entry = (u64, u32);
+
+/// A region's records by tile.
 pub(crate) struct Bins {
     chunks: Vec<Chunk>,
 }
 
 struct Chunk {
-    /// Where each tile's indices start; one more than there are tiles.
+    /// Where each tile's entries start; one more than there are tiles.
     starts: Vec<u32>,
-    indices: Vec<u32>,
+    entries: Vec<Entry>,
 }
 
 impl Bins {
@@ -36,12 +39,21 @@ impl Bins {
         Self { chunks }
     }
 
-    /// Calls `visit` with every record index of a tile.
-    pub fn visit(&self, tile: usize, mut visit: impl FnMut(u32)) {
+    /// Puts the entries of a tile into `order`, sorted.
+    pub fn sorted(&self, tile: usize, order: &mut Vec<Entry>) {
+        order.clear();
         for chunk in &self.chunks {
-            chunk.indices[chunk.range(tile)]
-                .iter()
-                .for_each(|&i| visit(i));
+            order.extend_from_slice(&chunk.entries[chunk.range(tile)]);
+        }
+        // A driver that draws a tile in one thread hands over its primitives in order: then only the quads
+        // of each are left to be sorted.
+        let primitive = |entry: &Entry| entry.0 >> 32;
+        if order.is_sorted_by_key(primitive) {
+            for quads in order.chunk_by_mut(|a, b| primitive(a) == primitive(b)) {
+                quads.sort_unstable();
+            }
+        } else {
+            order.sort_unstable();
         }
     }
 }
@@ -60,15 +72,15 @@ impl Chunk {
             starts[tile + 1] += starts[tile];
         }
         let mut next = starts.clone();
-        let mut indices = vec![0; starts.last().map_or(0, |&count| count as usize)];
-        for (index, tile) in (first..).zip(tiles) {
+        let mut entries = vec![(0, 0); starts.last().map_or(0, |&count| count as usize)];
+        for ((index, tile), record) in (first..).zip(tiles).zip(records) {
             if tile < outside {
                 let place = &mut next[tile as usize];
-                indices[*place as usize] = index;
+                entries[*place as usize] = (sort_key(record), index);
                 *place += 1;
             }
         }
-        Self { starts, indices }
+        Self { starts, entries }
     }
 
     fn range(&self, tile: usize) -> Range<usize> {
@@ -78,7 +90,7 @@ impl Chunk {
 
 /// Sort key within a tile: primitive, Morton position of the quad, group, mask. A primitive that
 /// was clipped into several triangles may cover one quad twice, with disjoint masks.
-pub(crate) fn sort_key(record: &RawRecord) -> u64 {
+fn sort_key(record: &RawRecord) -> u64 {
     let morton = quad_morton((record.qx() & 7) as u8, (record.qy() & 7) as u8);
     u64::from(record.primitive) << 32
         | u64::from(morton) << 8
@@ -113,13 +125,17 @@ mod tests {
         };
         let bins = Bins::new(&records, &rect);
         let mut seen = vec![0; records.len()];
+        let mut order = Vec::new();
         for tile in 0..rect.count() {
             let [column, row] = rect.tile(tile);
-            bins.visit(tile, |i| {
+            bins.sorted(tile, &mut order);
+            assert!(order.is_sorted());
+            for &(key, i) in &order {
                 let r = &records[i as usize];
+                assert_eq!(key, sort_key(r));
                 assert_eq!([r.qx() / 8, r.qy() / 8], [column, row]);
                 seen[i as usize] += 1;
-            });
+            }
         }
         assert!(seen.iter().all(|&n| n == 1));
     }
@@ -132,9 +148,11 @@ mod tests {
             size: [3, 2],
         };
         let bins = Bins::new(&records, &rect);
+        let mut order = Vec::new();
         let mut found = 0;
         for tile in 0..rect.count() {
-            bins.visit(tile, |_| found += 1);
+            bins.sorted(tile, &mut order);
+            found += order.len();
         }
         let inside =
             |r: &&RawRecord| (2..5).contains(&(r.qx() / 8)) && (1..3).contains(&(r.qy() / 8));

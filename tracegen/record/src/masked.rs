@@ -7,21 +7,22 @@
 
 use super::raw::{RawDepth, RawRecord};
 
-/// Pixels along a tile's edge.
-const EDGE: usize = formats::view::TILE_SIZE_PX as usize;
+/// Quads along a tile's edge.
+const EDGE: usize = formats::textrace::TILE_QUADS as usize;
 
 /// Depth that one masked draw has written so far in one tile.
 #[derive(Clone, Debug)]
 pub(crate) struct MaskedDepth {
     draw: Option<u32>,
-    nearest: [f32; EDGE * EDGE],
+    /// Four lanes a quad, quads row by row.
+    nearest: [[f32; 4]; EDGE * EDGE],
 }
 
 impl Default for MaskedDepth {
     fn default() -> Self {
         Self {
             draw: None,
-            nearest: [f32::INFINITY; EDGE * EDGE],
+            nearest: [[f32::INFINITY; 4]; EDGE * EDGE],
         }
     }
 }
@@ -36,20 +37,22 @@ impl MaskedDepth {
     pub fn survivors(&mut self, quad: &RawRecord, depth: &RawDepth) -> u8 {
         let (x, y) = ((quad.qx() & 7) as usize, (quad.qy() & 7) as usize);
         if self.draw.replace(quad.draw) != Some(quad.draw) {
-            self.nearest.fill(f32::INFINITY);
+            self.nearest.fill([f32::INFINITY; 4]);
         }
-        let mut survivors = 0;
-        for (lane, &depth) in depth.depth.iter().enumerate() {
-            let pixel = (2 * y + (lane >> 1)) * EDGE + 2 * x + (lane & 1);
-            let Some(nearest) = self.nearest.get_mut(pixel) else {
-                continue;
+        let nearest = &mut self.nearest[y * EDGE + x];
+        let mut nearer = 0;
+        for lane in 0..4 {
+            nearer |= u8::from(depth.depth[lane] < nearest[lane]) << lane;
+        }
+        let survivors = quad.mask() & nearer;
+        // Without a branch: which lanes pass is as good as random.
+        for lane in 0..4 {
+            let written = u32::from(survivors) & quad.passing & 1 << lane != 0;
+            nearest[lane] = if written {
+                depth.depth[lane]
+            } else {
+                nearest[lane]
             };
-            if quad.mask() >> lane & 1 == 1 && depth < *nearest {
-                survivors |= 1 << lane;
-                if quad.passing >> lane & 1 == 1 {
-                    *nearest = depth;
-                }
-            }
         }
         survivors
     }

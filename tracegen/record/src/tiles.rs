@@ -1,6 +1,6 @@
 //! From a tile's raw records to the trace's `Tile`.
 
-use super::bins::{Bins, sort_key};
+use super::bins::{Bins, Entry};
 use super::error::RecordError;
 use super::masked::MaskedDepth;
 use super::quantise::{GroupScale, Quantiser};
@@ -50,7 +50,7 @@ pub(crate) struct TileRules {
 /// Memory that building a tile reuses.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    order: Vec<(u64, u32)>,
+    order: Vec<Entry>,
     depth: MaskedDepth,
     quantisers: [Quantiser; 16],
     /// The last tile built.
@@ -86,13 +86,7 @@ impl TileRules {
         tile: usize,
         scratch: &mut Scratch,
     ) -> Result<CaptureCounts, RecordError> {
-        scratch.order.clear();
-        bins.visit(tile, |i| {
-            scratch
-                .order
-                .push((sort_key(&records.quads[i as usize]), i))
-        });
-        scratch.order.sort_unstable();
+        bins.sorted(tile, &mut scratch.order);
         scratch.tile.clear();
         scratch.depth.clear();
         let mut counts = CaptureCounts::default();
@@ -113,11 +107,11 @@ impl TileRules {
     fn add_quad(
         &self,
         records: RawRecords<'_>,
-        quad: &[(u64, u32)],
+        quad: &[Entry],
         scratch: &mut Scratch,
         counts: &mut CaptureCounts,
     ) -> Result<(), RecordError> {
-        let of = |entry: &(u64, u32)| &records.quads[entry.1 as usize];
+        let of = |entry: &Entry| &records.quads[entry.1 as usize];
         let Some(first) = quad.first().map(of) else {
             return Ok(());
         };

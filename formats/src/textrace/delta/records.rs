@@ -256,7 +256,7 @@ const CODES: [u8; 33] = {
     while bits < codes.len() {
         #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
         {
-            if WIDTHS[code as usize] < bits as u8 {
+            if (WIDTHS[code as usize] as usize) < bits {
                 code += 1;
             }
             codes[bits] = code;
