@@ -40,18 +40,17 @@ impl MaskedDepth {
             self.nearest.fill([f32::INFINITY; 4]);
         }
         let nearest = &mut self.nearest[y * EDGE + x];
-        let mut nearer = 0;
-        for lane in 0..4 {
-            nearer |= u8::from(depth.depth[lane] < nearest[lane]) << lane;
-        }
+        let nearer = (nearest.iter().zip(&depth.depth).enumerate())
+            .map(|(lane, (nearest, depth))| u8::from(depth < nearest) << lane)
+            .sum::<u8>();
         let survivors = quad.mask() & nearer;
         // Without a branch: which lanes pass is as good as random.
-        for lane in 0..4 {
-            let written = u32::from(survivors) & quad.passing & 1 << lane != 0;
-            nearest[lane] = if written {
-                depth.depth[lane]
+        let written = u32::from(survivors) & quad.passing;
+        for (lane, (nearest, &depth)) in nearest.iter_mut().zip(&depth.depth).enumerate() {
+            *nearest = if written >> lane & 1 == 1 {
+                depth
             } else {
-                nearest[lane]
+                *nearest
             };
         }
         survivors
