@@ -95,6 +95,31 @@ fn lanes_that_one_capture_lacks_are_counted_on_its_side() {
 }
 
 #[test]
+fn two_records_of_a_quad_are_what_one_with_all_their_lanes_is() {
+    let a = small();
+    let mut b = a.clone();
+    let (tile, record) = full_quad(&b);
+    let tile = &mut b.tiles[1][tile];
+    let mut part = tile.records[record];
+    tile.records[record].mask = 0b1011;
+    part.mask = 0b0100;
+    tile.records.insert(record + 1, part);
+    for run in &mut tile.runs {
+        let next = run.first as usize > record;
+        let own = !next && run.first as usize + run.count as usize > record;
+        run.first += u32::from(next);
+        run.count += u32::from(own);
+    }
+    let itself = compared(&a, &a).all;
+    for found in [compared(&a, &b), compared(&b, &a)] {
+        assert_eq!(found.tiles_that_differ, 1);
+        // Levels of detail alone are counted by pairs of records.
+        let lod_levels = itself.lod_levels.clone();
+        assert_eq!(Tally { lod_levels, ..found.all }, itself);
+    }
+}
+
+#[test]
 fn a_primitive_that_one_capture_lacks_takes_its_fragments_along() {
     let a = small();
     let mut b = a.clone();

@@ -6,7 +6,7 @@ use crate::config::SamplingConfig;
 use crate::order::TileRef;
 use crate::stream::{StreamError, TileSource};
 use formats::footprint::{Footprint, LodFormula, footprints, quad_lod};
-use formats::textrace::{PrimitiveRun, QuadRecord, Tile, UvGroup, quad_morton};
+use formats::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, Tile, UvGroup, quad_morton};
 use std::cmp::Ordering;
 
 /// Levels of detail below this differ in nothing: the finest level is magnified.
@@ -34,6 +34,12 @@ fn covered(records: &[QuadRecord]) -> u8 {
     records
         .iter()
         .fold(0, |mask, record| mask | record.mask & 15)
+}
+
+/// Lanes that sample a group.
+fn sampled(records: &[QuadRecord], group: u8) -> u8 {
+    let of_group = records.iter().filter(|record| record.group == group);
+    of_group.fold(0, |mask, record| mask | record.mask)
 }
 
 /// Pairs of what two ascending lists have under the same key, and what only one has.
@@ -135,28 +141,25 @@ impl<'a> Comparer<'a> {
         if both == 0 {
             return;
         }
-        joined(
-            [a, b],
-            |record| record.group.into(),
-            |left, right| {
-                let lanes = |record: Option<&QuadRecord>| record.map_or(0, |r| r.mask & both);
-                let shared = lanes(left) & lanes(right);
-                let other = (lanes(left) | lanes(right)) & !shared;
-                let number = left.or(right).map_or(0, |r| r.group);
-                let group = self.partners.group(draws, number);
-                let tally = &mut self.by_draw[draw];
-                tally.lanes_sampled_differently += u64::from(other.count_ones());
-                match (left, right, group) {
-                    (Some(a), Some(b), Some(group)) if shared != 0 => {
-                        self.records(draw, group, shared, [a, b]);
-                    }
-                    (Some(_), Some(_), None) if number != formats::textrace::NO_GROUP => {
+        // Lane by lane: what one capture has as a record may be two in the other, parts of a clipped primitive.
+        let alone = |of: &[QuadRecord], other: &[QuadRecord]| -> u32 {
+            let lanes = |r: &QuadRecord| r.mask & both & !sampled(other, r.group);
+            of.iter().map(|r| lanes(r).count_ones()).sum()
+        };
+        tally.lanes_sampled_differently += u64::from(alone(a, b) + alone(b, a));
+        for left in a {
+            for right in b.iter().filter(|r| r.group == left.group) {
+                let shared = left.mask & right.mask & both;
+                match self.partners.group(draws, left.group) {
+                    _ if shared == 0 || left.group == NO_GROUP => {}
+                    Some(group) => self.records(draw, group, shared, [left, right]),
+                    None => {
+                        let tally = &mut self.by_draw[draw];
                         tally.lanes_sampled_differently += u64::from(shared.count_ones());
                     }
-                    _ => {}
                 }
-            },
-        );
+            }
+        }
     }
 
     /// Records of the same lanes and the same textures.

@@ -47,20 +47,15 @@ impl Granularity {
         const RECORDING: &str = include_str!("shaders/recording.wgsl");
         const CAPTURING: &str = include_str!("shaders/capturing.wgsl");
         const TEXELS: &str = include_str!("shaders/texels.wgsl");
-        const PRODUCT: &str = include_str!("shaders/product.wgsl");
-        const BY_COLUMNS: &str = include_str!("shaders/product_by_columns.wgsl");
+        const VULKAN: &str = include_str!("shaders/conventions_vulkan.wgsl");
+        const OPENGL: &str = include_str!("shaders/conventions_opengl.wgsl");
         match self {
-            Self::None => &[PRODUCT, include_str!("shaders/plain.wgsl")],
-            Self::Quads => &[PRODUCT, BY_BALLOT, RECORDING, CAPTURING, TEXELS],
-            Self::Fragments => &[PRODUCT, BY_INDEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS],
-            Self::NumberedFragments => &[
-                BY_COLUMNS,
-                BY_VERTEX,
-                BY_FRAGMENT,
-                RECORDING,
-                CAPTURING,
-                TEXELS,
-            ],
+            Self::None => &[VULKAN, include_str!("shaders/plain.wgsl")],
+            Self::Quads => &[VULKAN, BY_BALLOT, RECORDING, CAPTURING, TEXELS],
+            Self::Fragments => &[VULKAN, BY_INDEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS],
+            Self::NumberedFragments => {
+                &[OPENGL, BY_VERTEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS]
+            }
         }
     }
 

@@ -1,5 +1,6 @@
 //! What a comparison counts, and its sums over tiles.
 
+use super::causes::{SampleCause, UvCause};
 use super::classes::Class;
 
 /// Who has a fragment that the other has not.
@@ -26,14 +27,21 @@ pub struct SampleErrors {
     pub other_levels: u64,
     /// Samples that read other texels of the same levels.
     pub other_texels: u64,
+    /// Samples that read other levels or texels, by [`SampleCause::ALL`].
+    pub causes: [u64; SampleCause::ALL.len()],
 }
 
 /// A level and its columns and rows.
-type Read = (u32, [[u32; 2]; 2]);
+pub(super) type Read = (u32, [[u32; 2]; 2]);
 
 impl SampleErrors {
-    /// Adds a sample: clamped levels of detail, and what was read and should have been.
-    pub(super) fn add(&mut self, lod: f64, expected_lod: f64, read: &[Read], expected: &[Read]) {
+    /// Adds a sample: clamped levels of detail, and what was read and should have been; whether that differs.
+    pub(super) fn add(
+        &mut self,
+        [lod, expected_lod]: [f64; 2],
+        read: &[Read],
+        expected: &[Read],
+    ) -> bool {
         let error = (lod - expected_lod).abs();
         self.samples += 1;
         self.lod_sum += error;
@@ -45,6 +53,7 @@ impl SampleErrors {
         } else if read != expected {
             self.other_texels += 1;
         }
+        read != expected
     }
 
     fn merge(&mut self, other: &Self) {
@@ -54,6 +63,9 @@ impl SampleErrors {
         self.levels_differ += other.levels_differ;
         self.other_levels += other.other_levels;
         self.other_texels += other.other_texels;
+        for (sum, count) in self.causes.iter_mut().zip(&other.causes) {
+            *sum += count;
+        }
     }
 }
 
@@ -104,6 +116,8 @@ pub struct Agreement {
     pub recorded_twice: u64,
     /// Distances of coordinates of common fragments and their groups, texels of the group's extent.
     pub uv_errors_texels: Distances,
+    /// They by [`UvCause::ALL`].
+    pub uv_causes: [u64; UvCause::ALL.len()],
     /// Common fragments whose coordinates are no numbers on either side.
     pub not_finite: u64,
     /// Shadow-map look-ups of common fragments: not compared.
@@ -154,6 +168,9 @@ impl Agreement {
         self.uv_errors_texels
             .0
             .extend_from_slice(&other.uv_errors_texels.0);
+        for (sum, count) in self.uv_causes.iter_mut().zip(&other.uv_causes) {
+            *sum += count;
+        }
         self.not_finite += other.not_finite;
         self.shadow_lookups += other.shadow_lookups;
         self.capture.merge(&other.capture);

@@ -1,8 +1,9 @@
 //! How well the tiles of a captured pass agree with the reference.
 
-use super::agreement::{Agreement, Side};
+use super::agreement::{Agreement, Read, Side};
+use super::causes::{Subject, UvCause};
 use super::classes::classify;
-use super::geometry::{Geometry, Sampled};
+use super::geometry::Geometry;
 use super::lod::{clamped, level_of_detail, taps};
 use super::piece::center;
 use super::reference::{AlphaTest, Fragment, origin, render_tile};
@@ -152,18 +153,23 @@ impl Comparison<'_> {
             let record = &tile.records[lane.record as usize];
             let index = (fragment.pixel[0] & 1) | (fragment.pixel[1] & 1) << 1;
             let coordinates = geometry.coordinates(piece, &leader);
-            let (quad, exact) = (
-                coordinates.in_quad(fragment.pixel),
-                coordinates.exact(center(fragment.pixel)),
-            );
+            let subject = Subject {
+                coordinates: &coordinates,
+                pixel: fragment.pixel,
+                extent: extent(group),
+                formula: self.formula,
+            };
             let captured = captured_uv(record, index, group);
-            let error = (period_free(captured - quad.uv) * extent(group)).length();
-            if !error.is_finite() {
+            let error = period_free(captured - coordinates.at(center(fragment.pixel)));
+            let error_texels = (error * extent(group)).length();
+            if !error_texels.is_finite() {
                 result.not_finite += 1;
                 continue;
             }
-            result.uv_errors_texels.0.push(error as f32);
-            self.samples(record, index, group, [quad, exact], result);
+            let cause = subject.of_uv(error);
+            result.uv_errors_texels.0.push(error_texels as f32);
+            result.uv_causes[cause as usize] += 1;
+            self.samples(record, index, group, &subject, cause, result);
         }
     }
 
@@ -173,7 +179,8 @@ impl Comparison<'_> {
         record: &QuadRecord,
         lane: u32,
         group: &UvGroup,
-        [quad, exact]: [Sampled; 2],
+        subject: &Subject<'_>,
+        uv: UvCause,
         result: &mut Agreement,
     ) {
         let only = QuadRecord {
@@ -184,12 +191,14 @@ impl Comparison<'_> {
             lod: self.formula,
             ..SamplingOptions::default()
         };
+        let quad = subject.coordinates.in_quad(subject.pixel, self.formula);
+        let exact = subject.coordinates.exact(center(subject.pixel));
         for sample in &group.samples {
             let texture = &self.tables.textures[sample.texture as usize];
             let sampler = &self.tables.samplers[usize::from(sample.sampler)];
             let lod = f64::from(quad_lod(record, group.extent, texture.size, self.formula));
             let lod = clamped(lod, texture);
-            let mut read = Vec::with_capacity(2);
+            let mut read: Vec<Read> = Vec::with_capacity(2);
             footprints(
                 &only,
                 group.extent,
@@ -201,20 +210,22 @@ impl Comparison<'_> {
                     read.push((u32::from(f.level), [f.i, f.j]));
                 },
             );
+            let reading = |uv, lod| -> Vec<Read> {
+                let taps = taps(uv, lod, texture, sampler);
+                taps.map(|tap| (tap.level, tap.texels)).collect()
+            };
             let references = [
                 (&mut result.capture, quad, self.formula),
                 (&mut result.specification, exact, LodFormula::Exact),
             ];
             for (errors, at, formula) in references {
                 let expected = level_of_detail(&at, texture, formula);
-                let found =
-                    taps(at.uv, expected, texture, sampler).map(|tap| (tap.level, tap.texels));
-                errors.add(
-                    lod,
-                    clamped(expected, texture),
-                    &read,
-                    &found.collect::<Vec<_>>(),
-                );
+                let lods = [lod, clamped(expected, texture)];
+                if errors.add(lods, &read, &reading(at.uv, expected)) {
+                    let cause =
+                        subject.of_sample(texture, uv, lods, |uv, lod| reading(uv, lod) == read);
+                    errors.causes[cause as usize] += 1;
+                }
             }
         }
     }

@@ -1,6 +1,7 @@
 //! The triangles of a view, and which of its tiles they may touch.
 
-use super::piece::{Piece, pieces};
+use super::piece::{Piece, center, pieces, quad_center};
+use formats::footprint::LodFormula;
 use formats::view::{EyeView, TILE_SIZE_PX};
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
 use raster::draws::{DrawCall, DrawList};
@@ -244,15 +245,40 @@ impl Coordinates<'_> {
     }
 
     /// Coordinates at a pixel with the differences in its quad that drivers take for derivatives: those
-    /// of the top row and of the left column.
+    /// of the left column and of the top row, or of the bottom row in softpipe.
     #[must_use]
-    pub fn in_quad(&self, pixel: [u32; 2]) -> Sampled {
-        let quad = super::piece::quad_center(pixel);
-        let top_left = self.at(quad);
+    pub fn in_quad(&self, pixel: [u32; 2], formula: LodFormula) -> Sampled {
+        let quad = quad_center(pixel);
+        let row = match formula {
+            LodFormula::Softpipe => quad + DVec2::Y,
+            LodFormula::Llvmpipe | LodFormula::Exact => quad,
+        };
         Sampled {
-            uv: self.at(super::piece::center(pixel)),
-            dx: self.at(quad + DVec2::X) - top_left,
-            dy: self.at(quad + DVec2::Y) - top_left,
+            uv: self.at(center(pixel)),
+            dx: self.at(row + DVec2::X) - self.at(row),
+            dy: self.at(quad + DVec2::Y) - self.at(quad),
         }
+    }
+
+    /// What a record of a quad says of a pixel where the driver's differences are the same for the whole quad, as
+    /// softpipe's are: on from the `first` lane that it covers.
+    #[must_use]
+    pub fn without_cross(&self, pixel: [u32; 2], first: u32) -> DVec2 {
+        let quad = self.in_quad(pixel, LodFormula::Softpipe);
+        let start = quad_center(pixel) + DVec2::new((first & 1).into(), (first >> 1).into());
+        let steps = center(pixel) - start;
+        self.at(start) + quad.dx * steps.x + quad.dy * steps.y
+    }
+
+    /// What they are over.
+    #[must_use]
+    pub fn piece(&self) -> &Piece {
+        self.piece
+    }
+
+    /// The same coordinates of the vertices over another piece.
+    #[must_use]
+    pub fn on<'p>(&self, piece: &'p Piece) -> Coordinates<'p> {
+        Coordinates { piece, uv: self.uv }
     }
 }

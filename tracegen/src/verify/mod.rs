@@ -8,6 +8,7 @@
 
 pub mod agreement;
 pub mod alpha;
+pub mod causes;
 pub mod classes;
 pub mod colour;
 pub mod compare;

@@ -195,6 +195,21 @@ impl Piece {
         ((b - a).perp_dot(c - a) / longest.max(f64::MIN_POSITIVE)).abs()
     }
 
+    /// Its corners' largest distance from the screen's upper left corner along an axis.
+    #[must_use]
+    pub fn largest_px(&self) -> f64 {
+        let largest = self.corners.map(|c| c.at.abs().max_element());
+        largest.into_iter().fold(0.0, f64::max)
+    }
+
+    /// It with a corner moved, as vertices that are rounded otherwise make it.
+    #[must_use]
+    pub fn moved(&self, corner: usize, by_px: DVec2) -> Self {
+        let mut moved = *self;
+        moved.corners[corner].at += by_px;
+        moved
+    }
+
     /// Weights of the corners at a point of the screen, linear in it.
     fn screen_weights(&self, p: DVec2) -> [f64; 3] {
         let cross = |a: DVec2, b: DVec2| (b - a).perp_dot(p - a);

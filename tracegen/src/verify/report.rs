@@ -1,6 +1,7 @@
 //! What `tracegen verify` prints.
 
 use super::agreement::{Agreement, SampleErrors, Side};
+use super::causes::{SampleCause, UvCause};
 use super::classes::Class;
 use super::colour::ColourErrors;
 use super::frame::Verified;
@@ -68,6 +69,19 @@ struct UvError {
     max: f64,
     not_finite: u64,
     shadow_lookups_not_compared: u64,
+    causes: Vec<Count<UvCause>>,
+}
+
+/// How many differences have a cause.
+#[derive(Serialize)]
+struct Count<C> {
+    cause: C,
+    count: u64,
+}
+
+fn counts<C: Copy>(causes: &[C], counts: &[u64]) -> Vec<Count<C>> {
+    let count = |(&cause, &count): (&C, &u64)| Count { cause, count };
+    causes.iter().zip(counts).map(count).collect()
 }
 
 #[derive(Serialize)]
@@ -79,6 +93,8 @@ struct Samples {
     footprints_differ_share: f64,
     other_levels: u64,
     other_texels: u64,
+    /// Why levels or texels are others.
+    causes: Vec<Count<SampleCause>>,
 }
 
 #[derive(Serialize)]
@@ -153,6 +169,7 @@ impl Report {
                 max,
                 not_finite,
                 shadow_lookups_not_compared: shadow_lookups,
+                causes: counts(&UvCause::ALL, &agreement.uv_causes),
             },
             capture_precision: Samples::new(&agreement.capture),
             specification: Samples::new(&agreement.specification),
@@ -214,6 +231,11 @@ impl Report {
             "error of coordinates, texels: mean, 99 %, max",
             format!("{mean:.5}, {p99:.5}, {max:.4}"),
         );
+        for Count { cause, count } in &self.uv_error_texels.causes {
+            if *count > 0 {
+                line(&format!("  {}", cause.told()), count.to_string());
+            }
+        }
         for (name, samples) in [
             ("same LOD formula", &self.capture_precision),
             ("specification", &self.specification),
@@ -233,6 +255,11 @@ impl Report {
                 &format!("{name}: footprints that differ"),
                 percent(samples.footprints_differ_share),
             );
+            for Count { cause, count } in &samples.causes {
+                if *count > 0 {
+                    line(&format!("  {}", cause.told()), count.to_string());
+                }
+            }
         }
         for colour in &self.colour {
             line(
@@ -272,6 +299,7 @@ impl Samples {
             ),
             other_levels: errors.other_levels,
             other_texels: errors.other_texels,
+            causes: counts(&SampleCause::ALL, &errors.causes),
         }
     }
 }

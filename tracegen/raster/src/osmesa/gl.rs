@@ -26,6 +26,7 @@ type MakeCurrent = unsafe extern "C" fn(*mut c_void, *mut c_void, c_uint, c_int,
 type GetProcAddress = unsafe extern "C" fn(*const c_char) -> *const c_void;
 type DestroyContext = unsafe extern "C" fn(*mut c_void);
 type ClipControl = unsafe extern "C" fn(c_uint, c_uint);
+type ProvokingVertex = unsafe extern "C" fn(c_uint);
 
 /// What is asked of a context, as pairs of `osmesa.h`: RGBA, no depth of its own, core profile, OpenGL 4.5.
 const CONTEXT: [c_int; 13] = [
@@ -98,7 +99,7 @@ pub struct State {
     pub blends: bool,
     /// Back faces are left out.
     pub culls: bool,
-    /// Front faces wind clockwise.
+    /// Front faces wind clockwise on a screen with y up.
     pub clockwise: bool,
     /// Slope and constant added to depth.
     pub offset: [f32; 2],
@@ -170,17 +171,27 @@ impl Gl {
             _surface: surface,
             _library: library,
         };
-        let name: &CStr = c"glClipControl";
-        // SAFETY: as above; a function of OpenGL 4.5, which the context has.
-        unsafe {
-            let clip_control = find(name.as_ptr());
-            if clip_control.is_null() {
-                return Err(lacks("glClipControl"));
+        let function = |name: &CStr| {
+            // SAFETY: the context is current.
+            let found = unsafe { find(name.as_ptr()) };
+            if found.is_null() {
+                return Err(lacks(&name.to_string_lossy()));
             }
-            // As the other APIs have it: rows from the top, depth from 0 to 1.
+            Ok(found)
+        };
+        let clip_control = function(c"glClipControl")?;
+        let provoking_vertex = function(c"glProvokingVertex")?;
+        // SAFETY: as above; functions of OpenGL 4.5, which the context has, with the types of its specification.
+        unsafe {
+            // Depth from 0 to 1, as the other APIs have it. The shader turns the rows (conventions_opengl.wgsl).
             std::mem::transmute::<*const c_void, ClipControl>(clip_control)(
-                glow::UPPER_LEFT,
+                glow::LOWER_LEFT,
                 glow::ZERO_TO_ONE,
+            );
+            // The first vertex, as the other APIs have it: llvmpipe interpolates from it on, so that another one
+            // changes the last bits of coordinates and depths.
+            std::mem::transmute::<*const c_void, ProvokingVertex>(provoking_vertex)(
+                glow::FIRST_VERTEX_CONVENTION,
             );
             gl.gl.enable(glow::FRAMEBUFFER_SRGB);
             gl.gl.enable(glow::DEPTH_TEST);
@@ -611,8 +622,9 @@ impl Gl {
             self.gl.depth_func(state.depth);
             self.gl.depth_mask(state.writes_depth);
             self.gl.color_mask(color, color, color, color);
+            // The other way round, since rows are turned.
             self.gl
-                .front_face(if state.clockwise { glow::CW } else { glow::CCW });
+                .front_face(if state.clockwise { glow::CCW } else { glow::CW });
             self.gl.polygon_offset(state.offset[0], state.offset[1]);
         }
     }

@@ -114,11 +114,10 @@ fn transform(in: Vertex, color: vec4<f32>) -> Fragment {
     let world = product(instance.world_from_object, vec4(in.position, 1.0));
     let n = instance.normal_from_object;
     var out: Fragment;
-    out.position = product(view.clip_from_world, world);
+    out.position = placed(product(view.clip_from_world, world));
     out.world = world.xyz;
-    out.normal = mat3x3(n[0].xyz, n[1].xyz, n[2].xyz) * in.normal;
-    let w = instance.world_from_object;
-    out.tangent = vec4(mat3x3(w[0].xyz, w[1].xyz, w[2].xyz) * in.tangent.xyz, in.tangent.w);
+    out.normal = turned(n, in.normal);
+    out.tangent = vec4(turned(instance.world_from_object, in.tangent.xyz), in.tangent.w);
     out.uv = in.uv;
     out.ids = bitcast<vec2<u32>>(n[3].xy);
     out.color = color;

@@ -4,7 +4,7 @@ fn texture_uv(slot: u32, uv: vec4<f32>) -> vec2<f32> {
     let row0 = material.uv_rows[2u * slot];
     let row1 = material.uv_rows[2u * slot + 1u];
     let chosen = select(uv.xy, uv.zw, row0.w > 0.5);
-    return vec2(dot(row0.xyz, vec3(chosen, 1.0)), dot(row1.xyz, vec3(chosen, 1.0)));
+    return vec2(inner(row0.xyz, vec3(chosen, 1.0)), inner(row1.xyz, vec3(chosen, 1.0)));
 }
 
 fn base_color(in: Fragment) -> vec4<f32> {
@@ -33,7 +33,7 @@ fn surface_normal(in: Fragment, front: bool) -> vec3<f32> {
 }
 
 fn safe_normalize(v: vec3<f32>) -> vec3<f32> {
-    return v * inverseSqrt(max(dot(v, v), 1e-12));
+    return v * inverseSqrt(max(inner(v, v), 1e-12));
 }
 
 // Shadow uv and depth of a world position in one cascade.

@@ -1,0 +1,187 @@
+//! Why the coordinates or footprints of a fragment that both sides have differ.
+
+use super::geometry::{Coordinates, Sampled};
+use super::lod::{clamped, level_of_detail};
+use formats::footprint::LodFormula;
+use formats::texture::Texture;
+use glam::DVec2;
+use serde::Serialize;
+
+/// Distance of coordinates, and of levels of detail, that needs no cause but the rounding of a trace and of
+/// single precision.
+const SMALL: f64 = 1.0 / 64.0;
+
+/// By how much single precision moves a vertex on the screen: units in the last place of the largest
+/// coordinate there.
+const VERTEX_ULPS: f64 = 8.0;
+
+/// A cause of an error of coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum UvCause {
+    /// At most 1/64 texel.
+    Small,
+    /// The driver's derivatives are the same for the whole quad: the far lane lacks the cross term.
+    NoCross,
+    /// Vertices in single precision: near the horizon and on slivers, coordinates change fast with them.
+    SinglePrecision,
+    /// None of these.
+    Unexplained,
+}
+
+/// A cause of other levels or texels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SampleCause {
+    /// The driver's formula of the level of detail.
+    Formula,
+    /// One derivative a quad in place of the fragment's own.
+    Quad,
+    /// Both together.
+    FormulaAndQuad,
+    /// Rounding, where a level or texel ends.
+    Rounding,
+    /// Coordinates that differ for a cause of their own.
+    Coordinates,
+    /// None of these.
+    Unexplained,
+}
+
+impl UvCause {
+    /// Every cause.
+    pub const ALL: [Self; 4] = [
+        Self::Small,
+        Self::NoCross,
+        Self::SinglePrecision,
+        Self::Unexplained,
+    ];
+
+    /// It in a few words.
+    #[must_use]
+    pub fn told(self) -> &'static str {
+        match self {
+            Self::Small => "within 1/64 texel",
+            Self::NoCross => "quads without a cross term",
+            Self::SinglePrecision => "vertices in single precision",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+impl SampleCause {
+    /// Every cause.
+    pub const ALL: [Self; 6] = [
+        Self::Formula,
+        Self::Quad,
+        Self::FormulaAndQuad,
+        Self::Rounding,
+        Self::Coordinates,
+        Self::Unexplained,
+    ];
+
+    /// It in a few words.
+    #[must_use]
+    pub fn told(self) -> &'static str {
+        match self {
+            Self::Formula => "the LOD formula",
+            Self::Quad => "one derivative a quad",
+            Self::FormulaAndQuad => "the LOD formula and one derivative a quad",
+            Self::Rounding => "rounding at the end of a level or texel",
+            Self::Coordinates => "coordinates that differ (above)",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+/// A fragment's coordinates in one group, captured and as they should be.
+pub struct Subject<'a> {
+    /// The primitive's coordinates.
+    pub coordinates: &'a Coordinates<'a>,
+    /// The fragment's pixel.
+    pub pixel: [u32; 2],
+    /// Texels of the group.
+    pub extent: DVec2,
+    /// How the driver makes levels of detail, and which derivatives it takes.
+    pub formula: LodFormula,
+}
+
+impl Subject<'_> {
+    /// The cause of an error of coordinates, `error` being the captured ones less the true ones, in repeats.
+    #[must_use]
+    pub fn of_uv(&self, error: DVec2) -> UvCause {
+        let texels = |uv: DVec2| (uv * self.extent).length();
+        if texels(error) <= SMALL {
+            return UvCause::Small;
+        }
+        let single = texels(self.by_single_precision(|s| s.uv));
+        if self.formula == LodFormula::Softpipe {
+            // From whichever lane the quad's coordinates come.
+            let found = self.coordinates.at(super::piece::center(self.pixel)) + error;
+            let near = |lane| texels(found - self.coordinates.without_cross(self.pixel, lane));
+            if (0..4).any(|lane| near(lane) <= SMALL + single) {
+                return UvCause::NoCross;
+            }
+        }
+        if texels(error) <= SMALL + single {
+            return UvCause::SinglePrecision;
+        }
+        UvCause::Unexplained
+    }
+
+    /// The cause of other levels or texels than expected. `reads` tells whether given coordinates and a level of
+    /// detail would read what was captured; `lods` are the captured and the expected level. Against the
+    /// specification, the driver's formula and derivatives are causes.
+    #[must_use]
+    pub fn of_sample(
+        &self,
+        texture: &Texture,
+        uv: UvCause,
+        lods: [f64; 2],
+        reads: impl Fn(DVec2, f64) -> bool,
+    ) -> SampleCause {
+        let quad = self.coordinates.in_quad(self.pixel, self.formula);
+        let own = self.coordinates.exact(super::piece::center(self.pixel));
+        let lod = |at: &Sampled, formula| level_of_detail(at, texture, formula);
+        let alone = [
+            (SampleCause::Formula, lod(&own, self.formula)),
+            (SampleCause::Quad, lod(&quad, LodFormula::Exact)),
+            (SampleCause::FormulaAndQuad, lod(&quad, self.formula)),
+        ];
+        let [captured, expected] = lods;
+        let of_driver = clamped(lod(&quad, self.formula), texture);
+        if expected != of_driver {
+            let found = alone.into_iter().find(|(_, lod)| reads(own.uv, *lod));
+            if let Some((cause, _)) = found {
+                return cause;
+            }
+        }
+        if uv == UvCause::Unexplained {
+            return SampleCause::Unexplained;
+        }
+        let level = |at: &Sampled| DVec2::X * clamped(lod(at, self.formula), texture);
+        let allowed = || SMALL + self.by_single_precision(level).x;
+        if (captured - of_driver).abs() > SMALL && (captured - of_driver).abs() > allowed() {
+            return SampleCause::Unexplained;
+        }
+        match uv {
+            UvCause::Small => SampleCause::Rounding,
+            _ => SampleCause::Coordinates,
+        }
+    }
+
+    /// By how much something changes when the vertices move by what single precision makes of them.
+    fn by_single_precision(&self, of: impl Fn(&Sampled) -> DVec2) -> DVec2 {
+        let piece = self.coordinates.piece();
+        let here = of(&self.coordinates.in_quad(self.pixel, self.formula));
+        let step = VERTEX_ULPS * f64::from(f32::EPSILON) * piece.largest_px();
+        let mut sum = DVec2::ZERO;
+        for corner in 0..3 {
+            for by in [DVec2::X, DVec2::Y] {
+                let moved = piece.moved(corner, by * step);
+                let there = of(&(self.coordinates.on(&moved)).in_quad(self.pixel, self.formula));
+                sum += (there - here).abs();
+            }
+        }
+        sum
+    }
+}
