@@ -24,6 +24,9 @@ pub struct Use {
 impl Use {
     const LAST: u32 = 1 << 31;
 
+    /// First lines are below this.
+    pub const FIRST_LINES: usize = 1 << (31 - FOOTPRINTS);
+
     fn new(footprints: u32, first_line: usize, cell: u32) -> Self {
         Self {
             bits: footprints | (first_line as u32) << FOOTPRINTS,

@@ -177,9 +177,9 @@ impl Pipeline {
     }
 
     /// A new thread enters now. `pending` are those of its `footprints` that miss, the latest
-    /// first.
+    /// first; the list is taken, and another one is left for it.
     #[inline(always)]
-    pub fn start(&mut self, footprints: u32, pending: &[Pending]) {
+    pub fn start(&mut self, footprints: u32, pending: &mut Vec<Pending>) {
         self.stats.threads += 1;
         if pending.is_empty() {
             self.stats.useful += u64::from(footprints);
@@ -189,20 +189,18 @@ impl Pipeline {
         }
     }
 
-    fn start_looping(&mut self, footprints: u32, pending: &[Pending]) {
+    fn start_looping(&mut self, footprints: u32, pending: &mut Vec<Pending>) {
         let list = self.spare.pop().unwrap_or_else(|| {
             self.pending.push(Vec::new());
             self.pending.len() as u32 - 1
         });
-        let own = &mut self.pending[list as usize];
-        own.clear();
-        own.extend_from_slice(pending);
         let thread = Looping {
             back: 0,
             earliest: pending.last().map_or(u64::MAX, |first| first.ready),
             waiting: pending.iter().map(|p| p.footprints).sum(),
             list,
         };
+        std::mem::swap(&mut self.pending[list as usize], pending);
         self.trip((footprints - thread.waiting).into(), thread);
     }
 
@@ -257,7 +255,7 @@ mod tests {
                         });
                         let mut pending: Vec<Pending> = pending.collect();
                         pending.sort_by_key(|p| std::cmp::Reverse(p.ready));
-                        pipeline.start(hits + pending.len() as u32, &pending);
+                        pipeline.start(hits + pending.len() as u32, &mut pending);
                     }
                     None => pipeline.drain(),
                 },
