@@ -91,8 +91,15 @@ impl SetOrder {
         if set.later == 0 {
             return NOT_ASKED;
         }
-        let later = self.later[index].iter().find(|other| other.line == line);
-        later.map_or(NOT_ASKED, |found| found.cycle)
+        // No early end: where in the list it is, the processor cannot guess.
+        let later = self.later[index].iter();
+        later.fold(NOT_ASKED, |found, other| {
+            if other.line == line {
+                other.cycle
+            } else {
+                found
+            }
+        })
     }
 }
 
@@ -148,8 +155,8 @@ impl DelayedFill for SetOrder {
             (set.due, set.first) = (arrival, line);
             return;
         }
-        let later = &mut self.later[index];
         set.later += 1;
+        let later = &mut self.later[index];
         if arrival < set.due {
             later.push(Arrival {
                 cycle: set.due,
@@ -162,8 +169,13 @@ impl DelayedFill for SetOrder {
             cycle: arrival,
             line,
         };
-        let at = later.iter().position(|other| other.cycle <= arrival);
-        later.insert(at.unwrap_or(later.len()), new);
+        let mut at = later.len();
+        later.push(new);
+        while at > 0 && later[at - 1].cycle <= arrival {
+            later[at] = later[at - 1];
+            at -= 1;
+        }
+        later[at] = new;
     }
 
     fn clear(&mut self) {

@@ -11,7 +11,6 @@ use crate::cache::{Delay, DelayedFill, Levels, Missing, NOT_ASKED};
 use crate::config::TmuConfig;
 use crate::stream::{QuadLines, Use};
 use crate::tmu::Pending;
-use std::cmp::Reverse;
 
 /// A core's L1, and the thread that was looked up last.
 struct First<D> {
@@ -37,13 +36,10 @@ pub struct Memory<D> {
     l2: D,
     tmu: TmuConfig,
     counts: CacheCounts,
-    /// What the current thread waits for, the latest first.
+    /// What the current thread waits for.
     pending: Vec<Pending>,
-    trips: Trips,
     /// Of a segment the lines that nobody has asked for: index by first use.
     absent: [u32; Use::FIRST_LINES],
-    /// Of a segment the footprints that wait, by cycle, the latest last.
-    waiting: Vec<(u64, u32)>,
 }
 
 /// Lines that a thread asked for: so many in each of its trips.
@@ -74,9 +70,7 @@ impl<D: DelayedFill> Memory<D> {
             tmu,
             counts,
             pending: Vec::new(),
-            trips: Trips::default(),
             absent: [0; Use::FIRST_LINES],
-            waiting: Vec::new(),
         }
     }
 
@@ -107,29 +101,25 @@ impl<D: DelayedFill> Memory<D> {
         }
     }
 
-    /// Asks for the lines that are missing, once it is the core's turn at the L2: the footprints
-    /// that have to wait, the latest first.
+    /// Asks for the lines that are missing, once it is the core's turn at the L2: what the thread's
+    /// footprints wait for.
     #[inline(never)]
     pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Vec<Pending> {
         self.pending.clear();
-        self.trips = Trips::default();
+        let mut trips = Trips::default();
         let missing = std::mem::take(&mut self.l1[core].missing);
         if missing.is_empty() {
-            self.one_by_one(core, now, quad);
+            self.one_by_one(core, now, quad, &mut trips);
         }
-        let (mut rest, mut segments) = (&*missing, 0);
-        for end in quad.segments() {
+        let mut rest = &*missing;
+        for (segment, end) in (0..).zip(quad.segments()) {
             if rest.is_empty() {
                 break;
             }
             let inside = |missing: &&Missing| (missing.index as usize) < end;
             let (own, others) = rest.split_at(rest.iter().take_while(inside).count());
-            self.segment(core, now, quad, own);
+            self.segment(core, now, quad, own, segment, &mut trips);
             rest = others;
-            segments += 1;
-        }
-        if segments != 1 {
-            self.pending.sort_unstable_by_key(|p| Reverse(p.ready));
         }
         self.l1[core].missing = missing;
         &mut self.pending
@@ -138,8 +128,15 @@ impl<D: DelayedFill> Memory<D> {
     /// Lines of a segment are not there: asks for those that nobody has asked for, and says who
     /// waits for them.
     #[inline(always)]
-    fn segment(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, missing: &[Missing]) {
-        self.waiting.clear();
+    fn segment(
+        &mut self,
+        core: usize,
+        now: u64,
+        quad: &QuadLines<'_>,
+        missing: &[Missing],
+        segment: u32,
+        trips: &mut Trips,
+    ) {
         let mut absent = 0_u128;
         for &Missing { index, arrival } in missing {
             let of = quad.uses[index as usize];
@@ -149,34 +146,38 @@ impl<D: DelayedFill> Memory<D> {
             } else {
                 let cell = quad.distinct_cell(index as usize);
                 self.counts.secondary(cell, of.footprints().count_ones());
-                wait(&mut self.waiting, arrival, of.footprints());
+                self.pending.push(Pending {
+                    ready: arrival,
+                    footprints: of.footprints(),
+                    segment,
+                });
             }
         }
         if absent != 0 {
-            self.fetch_absent(core, now, quad, absent);
-        }
-        // A footprint waits for the last of its lines.
-        let mut counted = 0;
-        for &(ready, users) in self.waiting.iter().rev() {
-            let footprints = (users & !counted).count_ones();
-            counted |= users;
-            if footprints > 0 {
-                self.pending.push(Pending { ready, footprints });
-            }
+            self.fetch_absent(core, now, quad, absent, segment, trips);
         }
     }
 
     /// Asks for the absent lines of a segment, a bit for the first use of each, in the order in which
     /// the footprints do.
     #[inline(always)]
-    fn fetch_absent(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, mut absent: u128) {
+    fn fetch_absent(
+        &mut self,
+        core: usize,
+        now: u64,
+        quad: &QuadLines<'_>,
+        mut absent: u128,
+        segment: u32,
+        trips: &mut Trips,
+    ) {
         let mut asking = 0;
         let mut misses = FootprintMisses::default();
         let mut cell = 0;
         while absent != 0 {
             let index = self.absent[absent.trailing_zeros() as usize] as usize;
             absent &= absent - 1;
-            let (line, users) = (quad.distinct[index], quad.uses[index].footprints());
+            let (line, of) = (quad.distinct[index], quad.uses[index]);
+            let users = of.footprints();
             let first_user = users & users.wrapping_neg();
             if first_user != asking {
                 if asking != 0 {
@@ -187,19 +188,23 @@ impl<D: DelayedFill> Memory<D> {
                 cell = quad.distinct_cell(index);
             }
             // Another segment, or another cell of this one, may have asked for it just now.
-            let known = match self.trips.is_first() {
-                true => NOT_ASKED,
-                false => self.l1[core].cache.arrival(line, now),
+            let known = match of.may_be_listed() {
+                true => self.l1[core].cache.arrival(line, now),
+                false => NOT_ASKED,
             };
             let ready = if known == NOT_ASKED {
                 misses.l1_lines += 1;
                 misses.l1_secondary += users.count_ones() - 1;
-                self.fetch(core, now, line, &mut misses)
+                self.fetch(core, now, line, &mut misses, trips)
             } else {
                 misses.l1_secondary += users.count_ones();
                 known
             };
-            wait(&mut self.waiting, ready, users);
+            self.pending.push(Pending {
+                ready,
+                footprints: users,
+                segment,
+            });
         }
         self.counts.footprint(cell, quad.tile(), &misses);
     }
@@ -207,7 +212,8 @@ impl<D: DelayedFill> Memory<D> {
     /// Looks up footprint after footprint: where a miss may fill at once, and where distinct lines
     /// are not listed.
     #[inline(never)]
-    fn one_by_one(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) {
+    fn one_by_one(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, trips: &mut Trips) {
+        let mut number = 0;
         for footprint in quad.footprints() {
             for _ in 0..=footprint.repeats {
                 let mut misses = FootprintMisses::default();
@@ -216,7 +222,7 @@ impl<D: DelayedFill> Memory<D> {
                     let ready = match self.l1[core].cache.look_up(line, now) {
                         NOT_ASKED => {
                             misses.l1_lines += 1;
-                            self.fetch(core, now, line, &mut misses)
+                            self.fetch(core, now, line, &mut misses, trips)
                         }
                         arrival => {
                             misses.l1_secondary += u32::from(arrival > 0);
@@ -226,26 +232,30 @@ impl<D: DelayedFill> Memory<D> {
                     latest = latest.max(ready);
                 }
                 if latest > now {
-                    self.wait(latest, 1);
+                    self.pending.push(Pending {
+                        ready: latest,
+                        footprints: 1 << (number % 32),
+                        segment: number / 32,
+                    });
                 }
+                number += 1;
                 self.counts.footprint(footprint.cell, quad.tile(), &misses);
             }
         }
     }
 
-    /// Footprints of the current thread wait until a cycle.
-    fn wait(&mut self, ready: u64, footprints: u32) {
-        match self.pending.last_mut() {
-            Some(last) if last.ready == ready => last.footprints += footprints,
-            _ => self.pending.push(Pending { ready, footprints }),
-        }
-    }
-
     /// Asks the L2 for a line that is not on its way into the L1; says when it arrives there.
     #[inline(always)]
-    fn fetch(&mut self, core: usize, now: u64, line: u32, misses: &mut FootprintMisses) -> u64 {
+    fn fetch(
+        &mut self,
+        core: usize,
+        now: u64,
+        line: u32,
+        misses: &mut FootprintMisses,
+        trips: &mut Trips,
+    ) -> u64 {
         let tmu = &self.tmu;
-        let trip = self.trips.next(tmu.fetches_per_trip);
+        let trip = trips.next(tmu.fetches_per_trip);
         // Without penalties nothing loops, so there is no later trip to wait for.
         let instant = tmu.l1_penalty_cycles == 0 && tmu.l2_penalty_cycles == 0;
         let wait = if instant {
@@ -273,11 +283,6 @@ impl<D: DelayedFill> Memory<D> {
 }
 
 impl Trips {
-    /// True until something is fetched.
-    fn is_first(self) -> bool {
-        self.fetches == 0 && self.full_trips == 0
-    }
-
     /// The trip in which the next line is asked for.
     #[inline(always)]
     fn next(&mut self, fetches_per_trip: u32) -> u32 {
@@ -288,18 +293,5 @@ impl Trips {
             self.full_trips += 1;
         }
         trip
-    }
-}
-
-/// Footprints wait until a cycle; the list has the latest last.
-#[inline(always)]
-fn wait(waiting: &mut Vec<(u64, u32)>, ready: u64, footprints: u32) {
-    let mut at = waiting.len();
-    while at > 0 && waiting[at - 1].0 > ready {
-        at -= 1;
-    }
-    match at.checked_sub(1).and_then(|before| waiting.get_mut(before)) {
-        Some((cycle, others)) if *cycle == ready => *others |= footprints,
-        _ => waiting.insert(at, (ready, footprints)),
     }
 }
