@@ -1,6 +1,6 @@
 //! The caches of one machine, and the choice of the type that its replay is compiled for.
 
-use super::{AnyCache, Cache, FourWayLru};
+use super::{AnyCache, Cache, Delay, FourWayLru};
 use crate::config::{CacheConfig, ConfigError, RunConfig};
 
 /// First-level caches, one a core, and the shared second level.
@@ -9,6 +9,18 @@ pub struct Levels<C> {
     pub l1: Vec<C>,
     /// Shared.
     pub l2: C,
+}
+
+impl<C: Delay> Levels<C> {
+    /// The caches as ones that fill later; most lines arrive within so many cycles.
+    #[must_use]
+    pub fn delayed(self, l1_cycles: u64, l2_cycles: u64) -> Levels<C::Delayed> {
+        let l1 = self.l1.into_iter().map(|cache| cache.delayed(l1_cycles));
+        Levels {
+            l1: l1.collect(),
+            l2: self.l2.delayed(l2_cycles),
+        }
+    }
 }
 
 impl Levels<AnyCache> {

@@ -94,6 +94,11 @@ impl<W: Ways, L: Line> Lru<W, L> {
         }
     }
 
+    /// Number of sets.
+    pub(super) fn sets(&self) -> u32 {
+        self.set_mask + 1
+    }
+
     #[inline(always)]
     fn set(&mut self, line: L) -> &mut [L] {
         let ways = self.ways.ways();
@@ -141,7 +146,7 @@ pub(super) fn to_front<L: Line>(set: &mut [L], line: L) -> usize {
 
 /// Moves the line to the front if it is there.
 #[inline(always)]
-fn look_up(set: &mut [u32], line: u32) -> bool {
+pub(super) fn look_up(set: &mut [u32], line: u32) -> bool {
     if let Ok(four) = <&mut [u32; 4]>::try_from(&mut *set) {
         let [first, second, third, fourth] = *four;
         if first == line {

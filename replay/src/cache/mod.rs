@@ -4,16 +4,18 @@
 //! missing line arrives only after the miss penalty: [`Cache::lookup`] when it is wanted,
 //! [`Cache::fill`] when it is there.
 
+mod delayed;
 mod fifo;
 mod forest;
 mod in_flight;
 mod levels;
 mod lru;
 mod random;
+mod set_order;
 mod tree_plru;
 
+pub use delayed::{Delay, DelayedFill, Missing, NOT_ASKED};
 pub use forest::Forest;
-pub use in_flight::InFlight;
 pub use levels::Levels;
 #[cfg(test)]
 pub(crate) use lru::WaysOf;

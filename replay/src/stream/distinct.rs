@@ -17,18 +17,37 @@ const BUCKETS: usize = 512;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Use {
     bits: u32,
-    /// Its cell within the view.
-    pub(super) cell: u32,
+    /// Its cell within the view, and a bit.
+    cell: u32,
 }
 
 impl Use {
     const LAST: u32 = 1 << 31;
+
+    /// First lines are below this.
+    pub const FIRST_LINES: usize = 1 << (31 - FOOTPRINTS);
+
+    /// Bits of `cell` that name none.
+    const LISTED: u32 = Tag::CELLS as u32;
 
     fn new(footprints: u32, first_line: usize, cell: u32) -> Self {
         Self {
             bits: footprints | (first_line as u32) << FOOTPRINTS,
             cell,
         }
+    }
+
+    /// Its cell within the view.
+    #[inline(always)]
+    pub(super) fn cell(self) -> u32 {
+        self.cell & (Self::LISTED - 1)
+    }
+
+    /// True if the quad may have listed the line already: for another cell, or in another segment.
+    #[inline(always)]
+    #[must_use]
+    pub fn may_be_listed(self) -> bool {
+        self.cell & Self::LISTED != 0
     }
 
     /// A bit for each footprint of the segment, repeats counted.
@@ -85,6 +104,8 @@ pub(super) struct Distinct {
     /// wrote is empty.
     buckets: Vec<(u32, u32)>,
     segment: u32,
+    /// [`Use::LISTED`] for all but a quad's first segment.
+    listed: u32,
     seen: Vec<Seen>,
     /// Cell of each.
     cells: Vec<u32>,
@@ -97,6 +118,7 @@ impl Default for Distinct {
         Self {
             buckets: vec![(0, 0); BUCKETS],
             segment: 0,
+            listed: 0,
             seen: Vec::new(),
             cells: Vec::new(),
             indexes: Vec::new(),
@@ -115,7 +137,7 @@ impl Distinct {
     ) {
         let mut line = 0;
         while line < lines.len() {
-            self.begin();
+            self.begin(line > 0);
             let start = line;
             let mut footprints = 0;
             while line < lines.len() {
@@ -137,7 +159,8 @@ impl Distinct {
         }
     }
 
-    fn begin(&mut self) {
+    fn begin(&mut self, again: bool) {
+        self.listed = if again { Use::LISTED } else { 0 };
         self.segment = self.segment.wrapping_add(1);
         if self.segment == 0 {
             // Numbers start again: what was written with them is forgotten.
@@ -153,12 +176,13 @@ impl Distinct {
     #[inline(always)]
     fn add(&mut self, line: u32, cell: u32, footprints: u32, at: usize) {
         let mut bucket = line.wrapping_mul(0x9e37_79b1) as usize >> (32 - BUCKETS.ilog2());
+        let mut listed = self.listed;
         let index = loop {
             let (segment, index) = self.buckets[bucket];
             if segment != self.segment {
                 let index = self.seen.len() as u32;
                 self.buckets[bucket] = (self.segment, index);
-                self.cells.push(cell);
+                self.cells.push(cell | listed);
                 self.seen.push(Seen {
                     line,
                     footprints: 0,
@@ -166,8 +190,11 @@ impl Distinct {
                 });
                 break index;
             }
-            if self.seen[index as usize].line == line && self.cells[index as usize] == cell {
-                break index;
+            if self.seen[index as usize].line == line {
+                if self.cells[index as usize] & !Use::LISTED == cell {
+                    break index;
+                }
+                listed = Use::LISTED;
             }
             bucket = (bucket + 1) % BUCKETS;
         };
@@ -266,10 +293,18 @@ mod tests {
                     prop_assert!(bit <= FOOTPRINTS);
                     begin = segment_end;
                     prop_assert_eq!(listed.len(), plain.len());
+                    let other_cell = |line, cell, first| {
+                        let earlier = |(key, of): (&(u32, u32), &(u32, usize, usize))| {
+                            key.0 == line && key.1 != cell && of.1 < first
+                        };
+                        plain.iter().any(earlier)
+                    };
                     let mut before = 0;
                     for (line, of) in quad.distinct[listed.clone()].iter().zip(&quad.uses[listed]) {
-                        let (footprints, first, last) = plain[&(*line, of.cell)];
+                        let (footprints, first, last) = plain[&(*line, of.cell())];
                         prop_assert_eq!((of.footprints(), of.first_line()), (footprints, first));
+                        let listed = first_line > 0 || other_cell(*line, of.cell(), first);
+                        prop_assert_eq!(of.may_be_listed(), listed);
                         prop_assert!(before <= last);
                         before = last;
                     }

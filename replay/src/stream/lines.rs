@@ -222,7 +222,7 @@ impl<'a> QuadLines<'a> {
     #[inline(always)]
     #[must_use]
     pub fn distinct_cell(&self, index: usize) -> usize {
-        self.place.first_cell as usize + self.uses[index].cell as usize
+        self.place.first_cell as usize + self.uses[index].cell() as usize
     }
 
     /// Where the footprint that holds line `index` ends.

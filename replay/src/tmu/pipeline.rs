@@ -56,7 +56,7 @@ impl PipelineStats {
 struct Looping {
     /// When it is there.
     back: u64,
-    /// When the first of the footprints that it waits for is ready: the last of its list.
+    /// When the first of what it waits for is there.
     earliest: u64,
     /// Footprints that it waits for.
     waiting: u32,
@@ -64,13 +64,39 @@ struct Looping {
     list: u32,
 }
 
-/// Footprints of a thread that are not filtered yet and wait for the same cycle.
+/// Footprints of a thread that wait until a cycle. One may wait for several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pending {
-    /// When the last of their lines arrives.
+    /// When a line of theirs arrives.
     pub ready: u64,
-    /// How many they are.
+    /// A bit for each of them within their segment.
     pub footprints: u32,
+    /// Footprints of a thread are counted in segments of up to 32. In a list, a segment's follow each
+    /// other.
+    pub segment: u32,
+}
+
+/// How many footprints wait after `now`, and when the first of what they wait for is there. What is
+/// there leaves the list.
+#[inline]
+fn waiting(pending: &mut Vec<Pending>, now: u64) -> (u32, u64) {
+    let (mut waiting, mut earliest, mut left) = (0, u64::MAX, 0);
+    let (mut segment, mut footprints) = (0, 0_u32);
+    for index in 0..pending.len() {
+        let one = pending[index];
+        if one.segment != segment {
+            waiting += footprints.count_ones();
+            (segment, footprints) = (one.segment, 0);
+        }
+        // No branches: which lines are there is a coin toss to the processor.
+        let late = one.ready > now;
+        footprints |= if late { one.footprints } else { 0 };
+        earliest = earliest.min(if late { one.ready } else { u64::MAX });
+        pending[left] = one;
+        left += usize::from(late);
+    }
+    pending.truncate(left);
+    (waiting + footprints.count_ones(), earliest)
 }
 
 /// The pipeline of one core.
@@ -86,7 +112,7 @@ pub struct Pipeline {
     clock: u64,
     /// In order of return, since every loop is equally long.
     looping: VecDeque<Looping>,
-    /// What they wait for, the latest first.
+    /// What they wait for.
     pending: Vec<Vec<Pending>>,
     /// Lists that no thread has.
     spare: Vec<u32>,
@@ -166,20 +192,17 @@ impl Pipeline {
         }
         let list = &mut self.pending[thread.list as usize];
         let waited = thread.waiting;
-        while thread.earliest <= self.clock {
-            thread.waiting -= list.pop().map_or(0, |ready| ready.footprints);
-            thread.earliest = list.last().map_or(u64::MAX, |next| next.ready);
-        }
+        (thread.waiting, thread.earliest) = waiting(list, self.clock);
         if thread.waiting == 0 {
             self.spare.push(thread.list);
         }
         self.trip((waited - thread.waiting).into(), thread);
     }
 
-    /// A new thread enters now. `pending` are those of its `footprints` that miss, the latest
-    /// first.
+    /// A new thread enters now. `pending` is what those of its `footprints` that miss wait for; the list
+    /// is taken, and another one is left for it.
     #[inline(always)]
-    pub fn start(&mut self, footprints: u32, pending: &[Pending]) {
+    pub fn start(&mut self, footprints: u32, pending: &mut Vec<Pending>) {
         self.stats.threads += 1;
         if pending.is_empty() {
             self.stats.useful += u64::from(footprints);
@@ -189,20 +212,19 @@ impl Pipeline {
         }
     }
 
-    fn start_looping(&mut self, footprints: u32, pending: &[Pending]) {
+    fn start_looping(&mut self, footprints: u32, pending: &mut Vec<Pending>) {
         let list = self.spare.pop().unwrap_or_else(|| {
             self.pending.push(Vec::new());
             self.pending.len() as u32 - 1
         });
-        let own = &mut self.pending[list as usize];
-        own.clear();
-        own.extend_from_slice(pending);
+        let (waiting, earliest) = waiting(pending, self.clock);
         let thread = Looping {
             back: 0,
-            earliest: pending.last().map_or(u64::MAX, |first| first.ready),
-            waiting: pending.iter().map(|p| p.footprints).sum(),
+            earliest,
+            waiting,
             list,
         };
+        std::mem::swap(&mut self.pending[list as usize], pending);
         self.trip((footprints - thread.waiting).into(), thread);
     }
 
@@ -251,13 +273,13 @@ mod tests {
                 Turn::Free => match threads.next() {
                     Some((hits, latencies)) => {
                         let now = pipeline.clock();
-                        let pending = latencies.iter().map(|l| Pending {
-                            ready: now + l,
-                            footprints: 1,
+                        let pending = (0..).zip(*latencies).map(|(number, latency)| Pending {
+                            ready: now + latency,
+                            footprints: 1 << (number % 32),
+                            segment: number / 32,
                         });
                         let mut pending: Vec<Pending> = pending.collect();
-                        pending.sort_by_key(|p| std::cmp::Reverse(p.ready));
-                        pipeline.start(hits + pending.len() as u32, &pending);
+                        pipeline.start(hits + pending.len() as u32, &mut pending);
                     }
                     None => pipeline.drain(),
                 },
@@ -300,6 +322,21 @@ mod tests {
     fn single_misses_of_several_threads_share_a_retry_slot() {
         let (_, stats) = run(CONFIG, &[(1, &[20]), (1, &[20]), (1, &[20]), (1, &[20])]);
         assert_eq!((stats.loops, stats.wasted), (4, 1));
+    }
+
+    #[test]
+    fn a_footprint_waits_for_the_last_of_its_lines() {
+        let one = |ready, footprints, segment| Pending {
+            ready,
+            footprints,
+            segment,
+        };
+        let mut list = vec![one(9, 0b11, 0), one(5, 0b110, 0), one(7, 0b1, 3)];
+        assert_eq!(waiting(&mut list, 4), (4, 5));
+        assert_eq!(waiting(&mut list, 6), (3, 7));
+        assert_eq!(waiting(&mut list, 7), (2, 9));
+        assert_eq!(list, [one(9, 0b11, 0)]);
+        assert_eq!(waiting(&mut list, 9), (0, u64::MAX));
     }
 
     #[test]

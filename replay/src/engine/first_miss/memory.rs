@@ -3,42 +3,9 @@
 
 use super::super::counts::{CacheCounts, CellMisses};
 use super::thread::{FETCHES_UNTIL_KEPT, Thread};
-use crate::cache::{Cache, InFlight, Levels};
+use crate::cache::{Delay, DelayedFill, Levels, Missing, NOT_ASKED};
 use crate::config::TmuConfig;
 use crate::result::FirstLookups;
-
-/// A cache and what is on its way into it.
-struct Level<C> {
-    cache: C,
-    in_flight: InFlight,
-}
-
-impl<C: Cache> Level<C> {
-    fn new(cache: C, usual_cycles: u64) -> Self {
-        Self {
-            cache,
-            in_flight: InFlight::new(usual_cycles),
-        }
-    }
-
-    fn clear(&mut self) {
-        self.cache.clear();
-        self.in_flight.clear();
-    }
-
-    #[inline(always)]
-    fn arrive(&mut self, now: u64) {
-        self.in_flight.arrive(now, &mut self.cache);
-    }
-
-    fn enter(&mut self, line: u32, now: u64, arrival: u64) {
-        if arrival <= now {
-            self.cache.fill(line);
-        } else {
-            self.in_flight.request(line, now, arrival);
-        }
-    }
-}
 
 /// What a footprint finds in its core's own cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,29 +17,34 @@ pub enum Seen {
 }
 
 /// L1 caches over a shared L2.
-pub struct Memory<C> {
-    l1: Vec<Level<C>>,
-    l2: Level<C>,
+pub struct Memory<D> {
+    l1: Vec<D>,
+    l2: D,
     l1_penalty_cycles: u64,
     l2_penalty_cycles: u64,
     counts: CacheCounts,
-    /// Lines that the footprint looked up last did not find, by core.
-    absent: Vec<Vec<u32>>,
+    /// Lines of the footprint looked up last that were not there, by core.
+    missing: Vec<Vec<Missing>>,
     first: FirstLookups,
     /// Look-ups that found their data with the thread, not in the cache.
     pub forwarded: u64,
 }
 
-impl<C: Cache> Memory<C> {
+impl<D: DelayedFill> Memory<D> {
     /// Empty caches.
-    pub fn new(levels: Levels<C>, tmu: &TmuConfig, counts: CacheCounts) -> Self {
+    pub fn new<C: Delay<Delayed = D>>(
+        levels: Levels<C>,
+        tmu: &TmuConfig,
+        counts: CacheCounts,
+    ) -> Self {
         let [l1_penalty_cycles, l2_penalty_cycles] =
             [tmu.l1_penalty_cycles, tmu.l2_penalty_cycles].map(u64::from);
-        let first = |cache| Level::new(cache, l1_penalty_cycles + l2_penalty_cycles);
+        let memory_cycles = l1_penalty_cycles + l2_penalty_cycles;
+        let Levels { l1, l2 } = levels.delayed(memory_cycles, l2_penalty_cycles);
         Self {
-            absent: vec![Vec::with_capacity(4); levels.l1.len()],
-            l1: levels.l1.into_iter().map(first).collect(),
-            l2: Level::new(levels.l2, l2_penalty_cycles),
+            missing: vec![Vec::with_capacity(4); l1.len()],
+            l1,
+            l2,
             l1_penalty_cycles,
             l2_penalty_cycles,
             counts,
@@ -97,7 +69,7 @@ impl<C: Cache> Memory<C> {
 
     /// Empties all caches. Nobody waits for what is on its way.
     pub fn flush(&mut self) {
-        self.l1.iter_mut().for_each(Level::clear);
+        self.l1.iter_mut().for_each(D::clear);
         self.l2.clear();
     }
 
@@ -105,18 +77,11 @@ impl<C: Cache> Memory<C> {
     /// cycle changes nothing.
     #[inline(always)]
     pub fn look_up(&mut self, core: usize, now: u64, lines: &[u32]) -> Seen {
-        let level = &mut self.l1[core];
-        level.arrive(now);
-        match level.cache.lookup_all(lines) {
-            None => Seen::All,
-            Some(first) => {
-                let (absent, cache) = (&mut self.absent[core], &mut level.cache);
-                absent.clear();
-                absent.push(lines[first]);
-                let rest = lines[first + 1..].iter();
-                absent.extend(rest.filter(|&&line| !cache.lookup(line)));
-                Seen::NotAll
-            }
+        let missing = &mut self.missing[core];
+        missing.clear();
+        match self.l1[core].look_up_all(lines, now, missing) {
+            0 => Seen::All,
+            _ => Seen::NotAll,
         }
     }
 
@@ -134,39 +99,44 @@ impl<C: Cache> Memory<C> {
             return;
         }
         self.first.l1_misses += u64::from(first);
-        self.l2.arrive(now);
         let CellMisses { l1, l2 } = &mut self.counts.cells[cell];
         let (mut fetched, mut from_memory, mut latest) = (0_u32, 0_u32, now);
-        for &line in &self.absent[core] {
-            let l1_level = &mut self.l1[core];
-            let known = l1_level.in_flight.arrival(line);
+        for &Missing { index, arrival } in &self.missing[core] {
+            let line = footprint.lines[index as usize];
+            let known = arrival != NOT_ASKED;
             // A line on its way into the L1 is a miss of the L2 until memory has sent it.
             let in_l2 = match known {
-                Some(_) => self.l2.in_flight.arrival(line).is_none(),
-                None => self.l2.cache.lookup(line),
+                true => match self.l2.arrival(line, now) {
+                    NOT_ASKED => 0,
+                    arrival => arrival,
+                },
+                false => self.l2.look_up(line, now),
             };
             if first {
                 self.first.l2_lookups += 1;
-                self.first.l2_misses += u64::from(!in_l2);
-                l1.secondary += u64::from(known.is_some());
+                self.first.l2_misses += u64::from(in_l2 > 0);
+                l1.secondary += u64::from(known);
             }
-            let arrival = known.unwrap_or_else(|| {
-                fetched += 1;
-                let there = if in_l2 {
-                    now
-                } else if let Some(arrival) = self.l2.in_flight.arrival(line) {
-                    l2.secondary += 1;
-                    arrival
-                } else {
+            if known {
+                latest = latest.max(arrival);
+                continue;
+            }
+            fetched += 1;
+            let there = match in_l2 {
+                0 => now,
+                NOT_ASKED => {
                     from_memory += 1;
                     let arrival = now + self.l2_penalty_cycles;
                     self.l2.enter(line, now, arrival);
                     arrival
-                };
-                let arrival = there + self.l1_penalty_cycles;
-                l1_level.enter(line, now, arrival);
-                arrival
-            });
+                }
+                arrival => {
+                    l2.secondary += 1;
+                    arrival
+                }
+            };
+            let arrival = there + self.l1_penalty_cycles;
+            self.l1[core].enter(line, now, arrival);
             latest = latest.max(arrival);
         }
         l1.lines += u64::from(fetched);

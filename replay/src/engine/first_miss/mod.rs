@@ -12,7 +12,7 @@ mod thread;
 use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
-use crate::cache::{Cache, Levels};
+use crate::cache::{Delay, DelayedFill, Levels};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
 use crate::result::{FirstLookups, TmuResult};
@@ -23,8 +23,8 @@ use std::collections::VecDeque;
 use thread::Thread;
 
 /// Cores whose threads stop at their first miss, over caches with delayed fill.
-pub struct FirstMiss<C> {
-    memory: Memory<C>,
+pub struct FirstMiss<D> {
+    memory: Memory<D>,
     units: Vec<Unit>,
     tmu: TmuConfig,
     /// Cycles until the last core was done.
@@ -78,9 +78,13 @@ impl Unit {
     }
 }
 
-impl<C: Cache> FirstMiss<C> {
+impl<D: DelayedFill> FirstMiss<D> {
     /// Empty caches, a texture unit for each L1.
-    pub fn new(levels: Levels<C>, tmu: TmuConfig, counts: CacheCounts) -> Self {
+    pub fn new<C: Delay<Delayed = D>>(
+        levels: Levels<C>,
+        tmu: TmuConfig,
+        counts: CacheCounts,
+    ) -> Self {
         let cores = levels.l1.len();
         Self {
             memory: Memory::new(levels, &tmu, counts),
@@ -187,7 +191,7 @@ impl<C: Cache> FirstMiss<C> {
     }
 }
 
-impl<C: Cache> Machine for FirstMiss<C> {
+impl<D: DelayedFill> Machine for FirstMiss<D> {
     /// A phase starts when the last core is done with the one before.
     fn run(
         &mut self,

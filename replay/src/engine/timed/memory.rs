@@ -7,55 +7,16 @@
 //! footprints only where one of them was not there.
 
 use super::super::counts::{CacheCounts, FootprintMisses};
-use crate::cache::{Cache, InFlight, Levels};
+use crate::cache::{Delay, DelayedFill, Levels, Missing, NOT_ASKED};
 use crate::config::TmuConfig;
-use crate::stream::QuadLines;
+use crate::stream::{QuadLines, Use};
 use crate::tmu::Pending;
-use std::cmp::Reverse;
-
-/// A cache and what is on its way into it.
-struct Level<C> {
-    cache: C,
-    in_flight: InFlight,
-}
-
-impl<C: Cache> Level<C> {
-    fn new(cache: C, usual_cycles: u64) -> Self {
-        Self {
-            cache,
-            in_flight: InFlight::new(usual_cycles),
-        }
-    }
-
-    fn clear(&mut self) {
-        self.cache.clear();
-        self.in_flight.clear();
-    }
-
-    #[inline(always)]
-    fn arrive(&mut self, now: u64) {
-        self.in_flight.arrive(now, &mut self.cache);
-    }
-
-    /// Fills a line at once, or when it arrives.
-    #[inline]
-    fn enter(&mut self, line: u32, now: u64, arrival: u64) {
-        if arrival <= now {
-            self.cache.fill(line);
-        } else {
-            self.in_flight.request(line, now, arrival);
-        }
-    }
-}
-
-/// When a line arrives that nobody has asked for.
-const UNKNOWN: u64 = u64::MAX;
 
 /// A core's L1, and the thread that was looked up last.
-struct First<C> {
-    level: Level<C>,
-    /// Its distinct lines that are not there: index and arrival.
-    missing: Vec<(u32, u64)>,
+struct First<D> {
+    cache: D,
+    /// Its distinct lines that are not there.
+    missing: Vec<Missing>,
 }
 
 /// What a thread finds in its core's own cache.
@@ -70,40 +31,46 @@ pub enum Found {
 }
 
 /// L1 caches over a shared L2.
-pub struct Memory<C> {
-    l1: Vec<First<C>>,
-    l2: Level<C>,
+pub struct Memory<D> {
+    l1: Vec<First<D>>,
+    l2: D,
     tmu: TmuConfig,
     counts: CacheCounts,
-    /// What the current thread waits for, the latest first.
+    /// What the current thread waits for.
     pending: Vec<Pending>,
-    /// Lines that it had to ask for.
-    fetches: u32,
-    /// Of a segment the lines that nobody has asked for: first use and index.
-    absent: Vec<(u32, u32)>,
-    /// Of a segment the footprints that wait, by cycle, the latest first.
-    waiting: Vec<(u64, u32)>,
+    /// Of a segment the lines that nobody has asked for: index by first use.
+    absent: [u32; Use::FIRST_LINES],
 }
 
-impl<C: Cache> Memory<C> {
+/// Lines that a thread asked for: so many in each of its trips.
+#[derive(Clone, Copy, Debug, Default)]
+struct Trips {
+    fetches: u32,
+    full_trips: u32,
+}
+
+impl<D: DelayedFill> Memory<D> {
     /// Empty caches.
-    pub fn new(levels: Levels<C>, tmu: TmuConfig, counts: CacheCounts) -> Self {
+    pub fn new<C: Delay<Delayed = D>>(
+        levels: Levels<C>,
+        tmu: TmuConfig,
+        counts: CacheCounts,
+    ) -> Self {
         let memory_cycles = u64::from(tmu.l1_penalty_cycles) + u64::from(tmu.l2_penalty_cycles);
         // Later trips of threads that miss many lines included.
-        let usual_cycles = memory_cycles + 8 * u64::from(tmu.loop_cycles);
+        let l1_cycles = memory_cycles + 8 * u64::from(tmu.loop_cycles);
+        let Levels { l1, l2 } = levels.delayed(l1_cycles, memory_cycles);
         let first = |cache| First {
-            level: Level::new(cache, usual_cycles),
+            cache,
             missing: Vec::new(),
         };
         Self {
-            l1: levels.l1.into_iter().map(first).collect(),
-            l2: Level::new(levels.l2, memory_cycles),
+            l1: l1.into_iter().map(first).collect(),
+            l2,
             tmu,
             counts,
             pending: Vec::new(),
-            fetches: 0,
-            absent: Vec::new(),
-            waiting: Vec::new(),
+            absent: [0; Use::FIRST_LINES],
         }
     }
 
@@ -114,7 +81,7 @@ impl<C: Cache> Memory<C> {
 
     /// Empties all caches. Nobody waits for what is on its way.
     pub fn flush(&mut self) {
-        self.l1.iter_mut().for_each(|first| first.level.clear());
+        self.l1.iter_mut().for_each(|first| first.cache.clear());
         self.l2.clear();
     }
 
@@ -122,113 +89,95 @@ impl<C: Cache> Memory<C> {
     /// there, [`Self::ask`] says what it waits for.
     #[inline(always)]
     pub fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> Found {
-        let First { level, missing } = &mut self.l1[core];
-        level.arrive(now);
+        let First { cache, missing } = &mut self.l1[core];
+        missing.clear();
         if self.tmu.l1_penalty_cycles == 0 || quad.distinct.is_empty() {
-            missing.clear();
             return Found::NotAll;
         }
-        match level.cache.lookup_all(quad.distinct) {
-            None => Found::All,
-            Some(index) => Self::others(level, missing, quad, index),
+        match cache.look_up_all(quad.distinct, now, missing) {
+            0 => Found::All,
+            NOT_ASKED => Found::NotAll,
+            _ => Found::OnTheirWay,
         }
     }
 
-    /// The distinct line at `index` is not there: looks up the rest of them.
+    /// Asks for the lines that are missing, once it is the core's turn at the L2: what the thread's
+    /// footprints wait for.
     #[inline(never)]
-    fn others(
-        level: &mut Level<C>,
-        missing: &mut Vec<(u32, u64)>,
-        quad: &QuadLines<'_>,
-        mut index: usize,
-    ) -> Found {
-        missing.clear();
-        let mut latest = 0;
-        loop {
-            let arrival = level.in_flight.arrival(quad.distinct[index]);
-            let arrival = arrival.unwrap_or(UNKNOWN);
-            latest = latest.max(arrival);
-            missing.push((index as u32, arrival));
-            let rest = index + 1;
-            match level.cache.lookup_all(&quad.distinct[rest..]) {
-                Some(next) => index = rest + next,
-                None if latest == UNKNOWN => return Found::NotAll,
-                None => return Found::OnTheirWay,
-            }
-        }
-    }
-
-    /// Asks for the lines that are missing, once it is the core's turn at the L2: the footprints
-    /// that have to wait, the latest first.
-    #[inline(never)]
-    pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &[Pending] {
+    pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Vec<Pending> {
         self.pending.clear();
-        self.fetches = 0;
-        let mut missing = std::mem::take(&mut self.l1[core].missing);
+        let mut trips = Trips::default();
+        let missing = std::mem::take(&mut self.l1[core].missing);
         if missing.is_empty() {
-            self.one_by_one(core, now, quad);
+            self.one_by_one(core, now, quad, &mut trips);
         }
-        let (mut rest, mut segments) = (&*missing, 0);
-        for end in quad.segments() {
+        let mut rest = &*missing;
+        for (segment, end) in (0..).zip(quad.segments()) {
             if rest.is_empty() {
                 break;
             }
-            let inside = |(index, _): &&(u32, u64)| (*index as usize) < end;
+            let inside = |missing: &&Missing| (missing.index as usize) < end;
             let (own, others) = rest.split_at(rest.iter().take_while(inside).count());
-            self.segment(core, now, quad, own);
+            self.segment(core, now, quad, own, segment, &mut trips);
             rest = others;
-            segments += 1;
         }
-        if segments != 1 {
-            self.pending.sort_unstable_by_key(|p| Reverse(p.ready));
-        }
-        missing.clear();
         self.l1[core].missing = missing;
-        &self.pending
+        &mut self.pending
     }
 
     /// Lines of a segment are not there: asks for those that nobody has asked for, and says who
     /// waits for them.
     #[inline(always)]
-    fn segment(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, missing: &[(u32, u64)]) {
-        self.waiting.clear();
-        self.absent.clear();
-        for &(index, arrival) in missing {
+    fn segment(
+        &mut self,
+        core: usize,
+        now: u64,
+        quad: &QuadLines<'_>,
+        missing: &[Missing],
+        segment: u32,
+        trips: &mut Trips,
+    ) {
+        let mut absent = 0_u128;
+        for &Missing { index, arrival } in missing {
             let of = quad.uses[index as usize];
-            if arrival == UNKNOWN {
-                self.absent.push((of.first_line() as u32, index));
+            if arrival == NOT_ASKED {
+                absent |= 1 << of.first_line();
+                self.absent[of.first_line()] = index;
             } else {
                 let cell = quad.distinct_cell(index as usize);
                 self.counts.secondary(cell, of.footprints().count_ones());
-                wait(&mut self.waiting, arrival, of.footprints());
+                self.pending.push(Pending {
+                    ready: arrival,
+                    footprints: of.footprints(),
+                    segment,
+                });
             }
         }
-        if !self.absent.is_empty() {
-            self.fetch_absent(core, now, quad);
-        }
-        // A footprint waits for the last of its lines.
-        let mut counted = 0;
-        for &(ready, users) in &self.waiting {
-            let footprints = (users & !counted).count_ones();
-            counted |= users;
-            if footprints > 0 {
-                self.pending.push(Pending { ready, footprints });
-            }
+        if absent != 0 {
+            self.fetch_absent(core, now, quad, absent, segment, trips);
         }
     }
 
-    /// Asks for the absent lines of a segment, in the order in which the footprints do.
-    fn fetch_absent(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) {
-        self.absent.sort_unstable();
+    /// Asks for the absent lines of a segment, a bit for the first use of each, in the order in which
+    /// the footprints do.
+    #[inline(always)]
+    fn fetch_absent(
+        &mut self,
+        core: usize,
+        now: u64,
+        quad: &QuadLines<'_>,
+        mut absent: u128,
+        segment: u32,
+        trips: &mut Trips,
+    ) {
         let mut asking = 0;
         let mut misses = FootprintMisses::default();
         let mut cell = 0;
-        for at in 0..self.absent.len() {
-            let (_, index) = self.absent[at];
-            let (line, users) = (
-                quad.distinct[index as usize],
-                quad.uses[index as usize].footprints(),
-            );
+        while absent != 0 {
+            let index = self.absent[absent.trailing_zeros() as usize] as usize;
+            absent &= absent - 1;
+            let (line, of) = (quad.distinct[index], quad.uses[index]);
+            let users = of.footprints();
             let first_user = users & users.wrapping_neg();
             if first_user != asking {
                 if asking != 0 {
@@ -236,22 +185,26 @@ impl<C: Cache> Memory<C> {
                 }
                 misses = FootprintMisses::default();
                 asking = first_user;
-                cell = quad.distinct_cell(index as usize);
+                cell = quad.distinct_cell(index);
             }
             // Another segment, or another cell of this one, may have asked for it just now.
-            let known = match self.fetches {
-                0 => None,
-                _ => self.l1[core].level.in_flight.arrival(line),
+            let known = match of.may_be_listed() {
+                true => self.l1[core].cache.arrival(line, now),
+                false => NOT_ASKED,
             };
-            let ready = if let Some(ready) = known {
-                misses.l1_secondary += users.count_ones();
-                ready
-            } else {
+            let ready = if known == NOT_ASKED {
                 misses.l1_lines += 1;
                 misses.l1_secondary += users.count_ones() - 1;
-                self.fetch(core, now, line, &mut misses)
+                self.fetch(core, now, line, &mut misses, trips)
+            } else {
+                misses.l1_secondary += users.count_ones();
+                known
             };
-            wait(&mut self.waiting, ready, users);
+            self.pending.push(Pending {
+                ready,
+                footprints: users,
+                segment,
+            });
         }
         self.counts.footprint(cell, quad.tile(), &misses);
     }
@@ -259,81 +212,86 @@ impl<C: Cache> Memory<C> {
     /// Looks up footprint after footprint: where a miss may fill at once, and where distinct lines
     /// are not listed.
     #[inline(never)]
-    fn one_by_one(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) {
+    fn one_by_one(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, trips: &mut Trips) {
+        let mut number = 0;
         for footprint in quad.footprints() {
             for _ in 0..=footprint.repeats {
                 let mut misses = FootprintMisses::default();
                 let mut latest = now;
                 for &line in footprint.lines {
-                    if self.l1[core].level.cache.lookup(line) {
-                        continue;
-                    }
-                    let ready = match self.l1[core].level.in_flight.arrival(line) {
-                        Some(arrival) => {
-                            misses.l1_secondary += 1;
-                            arrival
-                        }
-                        None => {
+                    let ready = match self.l1[core].cache.look_up(line, now) {
+                        NOT_ASKED => {
                             misses.l1_lines += 1;
-                            self.fetch(core, now, line, &mut misses)
+                            self.fetch(core, now, line, &mut misses, trips)
+                        }
+                        arrival => {
+                            misses.l1_secondary += u32::from(arrival > 0);
+                            arrival
                         }
                     };
                     latest = latest.max(ready);
                 }
                 if latest > now {
-                    self.wait(latest, 1);
+                    self.pending.push(Pending {
+                        ready: latest,
+                        footprints: 1 << (number % 32),
+                        segment: number / 32,
+                    });
                 }
+                number += 1;
                 self.counts.footprint(footprint.cell, quad.tile(), &misses);
             }
         }
     }
 
-    /// Footprints of the current thread wait until a cycle.
-    fn wait(&mut self, ready: u64, footprints: u32) {
-        match self.pending.last_mut() {
-            Some(last) if last.ready == ready => last.footprints += footprints,
-            _ => self.pending.push(Pending { ready, footprints }),
-        }
-    }
-
     /// Asks the L2 for a line that is not on its way into the L1; says when it arrives there.
-    #[inline(never)]
-    fn fetch(&mut self, core: usize, now: u64, line: u32, misses: &mut FootprintMisses) -> u64 {
+    #[inline(always)]
+    fn fetch(
+        &mut self,
+        core: usize,
+        now: u64,
+        line: u32,
+        misses: &mut FootprintMisses,
+        trips: &mut Trips,
+    ) -> u64 {
         let tmu = &self.tmu;
-        let trip = u64::from(self.fetches / tmu.fetches_per_trip);
-        self.fetches += 1;
+        let trip = trips.next(tmu.fetches_per_trip);
         // Without penalties nothing loops, so there is no later trip to wait for.
         let instant = tmu.l1_penalty_cycles == 0 && tmu.l2_penalty_cycles == 0;
         let wait = if instant {
             0
         } else {
-            trip * u64::from(tmu.loop_cycles)
+            u64::from(trip) * u64::from(tmu.loop_cycles)
         };
-        self.l2.arrive(now);
-        let in_l2 = if self.l2.cache.lookup(line) {
-            now
-        } else if let Some(arrival) = self.l2.in_flight.arrival(line) {
-            misses.l2_secondary += 1;
-            arrival
-        } else {
-            misses.l2_lines += 1;
-            let arrival = now + u64::from(tmu.l2_penalty_cycles);
-            self.l2.enter(line, now, arrival);
-            arrival
+        let in_l2 = match self.l2.look_up(line, now) {
+            0 => now,
+            NOT_ASKED => {
+                misses.l2_lines += 1;
+                let arrival = now + u64::from(tmu.l2_penalty_cycles);
+                self.l2.enter(line, now, arrival);
+                arrival
+            }
+            arrival => {
+                misses.l2_secondary += 1;
+                arrival
+            }
         };
         let in_l1 = in_l2 + u64::from(tmu.l1_penalty_cycles) + wait;
-        self.l1[core].level.enter(line, now, in_l1);
+        self.l1[core].cache.enter(line, now, in_l1);
         in_l1
     }
 }
 
-/// Footprints wait until a cycle; the list has the latest first.
-#[inline(always)]
-fn wait(waiting: &mut Vec<(u64, u32)>, ready: u64, footprints: u32) {
-    let later = waiting.iter().take_while(|(cycle, _)| *cycle > ready);
-    let at = later.count();
-    match waiting.get_mut(at) {
-        Some((cycle, others)) if *cycle == ready => *others |= footprints,
-        _ => waiting.insert(at, (ready, footprints)),
+impl Trips {
+    /// The trip in which the next line is asked for.
+    #[inline(always)]
+    fn next(&mut self, fetches_per_trip: u32) -> u32 {
+        let trip = self.full_trips;
+        self.fetches += 1;
+        if self.fetches == fetches_per_trip {
+            self.fetches = 0;
+            self.full_trips += 1;
+        }
+        trip
     }
 }

@@ -6,7 +6,7 @@ mod memory;
 use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
-use crate::cache::{Cache, Levels};
+use crate::cache::{Delay, DelayedFill, Levels};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
 use crate::result::TmuResult;
@@ -15,16 +15,20 @@ use crate::tmu::{Pipeline, PipelineStats, Turn};
 use memory::{Found, Memory};
 
 /// Texture units, and the caches that they share.
-pub struct Timed<C> {
-    memory: Memory<C>,
+pub struct Timed<D> {
+    memory: Memory<D>,
     units: Vec<Pipeline>,
     /// Cycles until the last core was done.
     cycles: u64,
 }
 
-impl<C: Cache> Timed<C> {
+impl<D: DelayedFill> Timed<D> {
     /// Empty caches, a texture unit for each L1.
-    pub fn new(levels: Levels<C>, tmu: TmuConfig, counts: CacheCounts) -> Self {
+    pub fn new<C: Delay<Delayed = D>>(
+        levels: Levels<C>,
+        tmu: TmuConfig,
+        counts: CacheCounts,
+    ) -> Self {
         let cores = levels.l1.len();
         Self {
             memory: Memory::new(levels, tmu, counts),
@@ -66,7 +70,7 @@ impl<C: Cache> Timed<C> {
                                 continue;
                             }
                             match self.memory.look_up(core, now, &quad) {
-                                Found::All => unit.start(quad.footprints, &[]),
+                                Found::All => unit.start(quad.footprints, &mut Vec::new()),
                                 Found::NotAll if now > until => {
                                     asking[core] = true;
                                     break now;
@@ -125,7 +129,7 @@ impl<'a> Items<'a> {
     }
 }
 
-impl<C: Cache> Machine for Timed<C> {
+impl<D: DelayedFill> Machine for Timed<D> {
     /// A phase starts when the last core is done with the one before.
     fn run(
         &mut self,

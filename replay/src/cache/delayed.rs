@@ -1,0 +1,123 @@
+//! Caches whose misses arrive later. A line that was asked for and is not there yet is *on its way*
+//! (an entry of a miss status holding register file, without a limit): whoever asks again meanwhile
+//! waits for the same fetch.
+//!
+//! What arrives is filled in the order of arrivals, those of one cycle in the order of their requests.
+//! Cycles never go back from call to call.
+
+use super::in_flight::InFlight;
+use super::set_order::SetOrder;
+use super::{Cache, FourWayLru};
+
+/// When a line arrives that nobody has asked for.
+pub const NOT_ASKED: u64 = u64::MAX;
+
+/// A line that is not there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Missing {
+    /// Its index among those that were looked up.
+    pub index: u32,
+    /// When it arrives, or [`NOT_ASKED`].
+    pub arrival: u64,
+}
+
+/// A cache and what is on its way into it.
+pub trait DelayedFill: Send {
+    /// Looks up lines, which marks those that are there as used, and lists the others. When the last of
+    /// these arrives: 0 if all are there, [`NOT_ASKED`] if nobody has asked for one of them.
+    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: &mut Vec<Missing>) -> u64;
+
+    /// Looks up a line, which marks it used. When it arrives: 0 if it is there, [`NOT_ASKED`] if nobody
+    /// has asked for it.
+    fn look_up(&mut self, line: u32, now: u64) -> u64;
+
+    /// When a line arrives that is on its way; [`NOT_ASKED`] if it is not.
+    fn arrival(&mut self, line: u32, now: u64) -> u64;
+
+    /// Fills a line that is neither there nor on its way: at once, or when it arrives.
+    fn enter(&mut self, line: u32, now: u64, arrival: u64);
+
+    /// Takes all lines out, and forgets those on their way.
+    fn clear(&mut self);
+}
+
+/// A cache that can fill later.
+pub trait Delay: Cache {
+    /// It and what is on its way.
+    type Delayed: DelayedFill;
+
+    /// An empty cache, into which most lines arrive within `usual_cycles`.
+    fn delayed(self, usual_cycles: u64) -> Self::Delayed;
+}
+
+/// Of any policy: filled in the order of time.
+impl Delay for Box<dyn Cache> {
+    type Delayed = TimeOrder<Self>;
+
+    fn delayed(self, usual_cycles: u64) -> Self::Delayed {
+        TimeOrder {
+            cache: self,
+            in_flight: InFlight::new(usual_cycles),
+        }
+    }
+}
+
+/// No set knows of another, so each is filled when somebody comes to it.
+impl Delay for FourWayLru {
+    type Delayed = SetOrder;
+
+    fn delayed(self, _usual_cycles: u64) -> SetOrder {
+        SetOrder::new(self.sets())
+    }
+}
+
+/// A cache that is filled before each look-up, line after line in the order of time.
+#[derive(Debug)]
+pub struct TimeOrder<C> {
+    cache: C,
+    in_flight: InFlight,
+}
+
+impl<C: Cache> DelayedFill for TimeOrder<C> {
+    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: &mut Vec<Missing>) -> u64 {
+        self.in_flight.arrive(now, &mut self.cache);
+        let (mut latest, mut start) = (0, 0);
+        while let Some(index) = self.cache.lookup_all(&lines[start..]) {
+            let index = start + index;
+            let arrival = self.in_flight.arrival(lines[index]).unwrap_or(NOT_ASKED);
+            missing.push(Missing {
+                index: index as u32,
+                arrival,
+            });
+            latest = latest.max(arrival);
+            start = index + 1;
+        }
+        latest
+    }
+
+    fn look_up(&mut self, line: u32, now: u64) -> u64 {
+        self.in_flight.arrive(now, &mut self.cache);
+        if self.cache.lookup(line) {
+            return 0;
+        }
+        self.in_flight.arrival(line).unwrap_or(NOT_ASKED)
+    }
+
+    fn arrival(&mut self, line: u32, now: u64) -> u64 {
+        self.in_flight.arrive(now, &mut self.cache);
+        self.in_flight.arrival(line).unwrap_or(NOT_ASKED)
+    }
+
+    fn enter(&mut self, line: u32, now: u64, arrival: u64) {
+        if arrival <= now {
+            self.cache.fill(line);
+        } else {
+            self.in_flight.request(line, now, arrival);
+        }
+    }
+
+    fn clear(&mut self) {
+        self.cache.clear();
+        self.in_flight.clear();
+    }
+}
