@@ -102,13 +102,7 @@ pub fn text(report: &PaperReport) -> String {
             fit.mean_absolute_points, fit.largest_points, fit.rows
         );
     }
-    if let Some(source) = errors::source() {
-        let _ = write!(
-            text,
-            "\nHow far the figures are off ({source})\n{}",
-            errors::table().text()
-        );
-    }
+    text += &errors::text();
     for c in report
         .conservation
         .iter()
