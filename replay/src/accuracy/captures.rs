@@ -1,7 +1,7 @@
 //! What the precision of a capture does: each capture against what `tracegen verify --write-reference`
 //! says that it should have been.
 
-use super::headline::{Replayed, TEXTURE_FIGURES};
+use super::headline::TEXTURE_FIGURES;
 use super::inputs::Inputs;
 use super::study::{Choice, Contribution, Study, StudyError};
 use crate::compare::comparable;
@@ -36,10 +36,10 @@ fn captures(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
         if captures.peek().is_none() {
             return Err(format!("{}: no capture of its views", truth.label).into());
         }
-        let expected = Replayed::new(truth.source, config)?;
+        let expected = inputs.replays.of(truth, config)?;
         for capture in captures {
             let name = driver(&capture.source.tables().meta.driver);
-            let found = Replayed::new(capture.source, config)?;
+            let found = inputs.replays.of(capture, config)?;
             let seconds = |label: &str| {
                 let mut times = inputs.seconds.iter();
                 times.find(|(name, _)| name == label).map(|(_, s)| *s)

@@ -1,6 +1,5 @@
 //! Utilisation by a formula in place of a cycle model.
 
-use super::headline::Replayed;
 use super::inputs::{Inputs, time_ratio};
 use super::study::{Choice, Figure, Study, StudyError, figure};
 use crate::config::{Mode, RunConfig};
@@ -29,8 +28,10 @@ fn forms(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
                 mode,
                 ..inputs.config
             };
-            config.tmu.loop_cycles = 24;
-            Replayed::new(subject.source, config)
+            if mode == Mode::FirstMiss {
+                config.tmu.loop_cycles = 24;
+            }
+            inputs.replays.of(subject, config)
         };
         let (model, functional) = (of(Mode::FirstMiss)?, of(Mode::Functional)?);
         let first = |r: &RunResult| r.first_lookups.map(|f| (f.l1_miss_rate, f.l2_miss_rate));

@@ -3,8 +3,10 @@
 use super::study::{Figure, figure};
 use crate::config::{Order, RunConfig};
 use crate::engine::{ReplayError, replay};
+use crate::experiment::Subject;
 use crate::result::RunResult;
 use crate::stream::TileSource;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Headline figures of texture traces.
@@ -23,6 +25,33 @@ pub const REUSE: Figure = figure("reuse_pct", "right pixels reused", "points");
 /// All figures that the table of errors is about.
 pub fn headline_figures() -> impl Iterator<Item = Figure> {
     TEXTURE_FIGURES.into_iter().chain([REUSE])
+}
+
+/// Replays that were made, so that studies which share a configuration share its time, too.
+#[derive(Default)]
+pub struct Replays(Mutex<Vec<(String, RunConfig, Arc<Replayed>)>>);
+
+impl Replays {
+    /// A trace under a configuration in both orders; replayed only the first time.
+    ///
+    /// # Errors
+    /// See [`replay`].
+    pub fn of(
+        &self,
+        subject: &Subject<'_>,
+        config: RunConfig,
+    ) -> Result<Arc<Replayed>, ReplayError> {
+        let mut made = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |(label, of, _): &&(String, RunConfig, Arc<Replayed>)| {
+            *label == subject.label && *of == config
+        };
+        if let Some((.., replayed)) = made.iter().find(same) {
+            return Ok(Arc::clone(replayed));
+        }
+        let replayed = Arc::new(Replayed::new(subject.source, config)?);
+        made.push((subject.label.clone(), config, Arc::clone(&replayed)));
+        Ok(replayed)
+    }
 }
 
 /// A trace in Morton order and in Z2 STA.

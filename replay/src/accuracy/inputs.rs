@@ -1,5 +1,6 @@
 //! What is measured.
 
+use super::headline::Replays;
 use crate::config::RunConfig;
 use crate::experiment::{Subject, frame_count};
 use crate::sgrt::frame::RaySource;
@@ -48,6 +49,8 @@ pub struct Inputs<'a> {
     pub techniques: &'a [Folder],
     /// Precision of the ray traversal.
     pub traversal: Vec<TraversalRow>,
+    /// What was replayed so far.
+    pub replays: Replays,
 }
 
 impl<'a> Inputs<'a> {

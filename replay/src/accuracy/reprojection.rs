@@ -28,7 +28,7 @@ pub const RULES: Study = Study {
     time: "modelled frame, over both eyes traced in full",
     reference: "trace everything",
     recommended: DEFAULT_RULE,
-    reason: "the least image error of rules that reuse most pixels; each test rejects what the others let pass",
+    reason: "next to the front of both costs: rules that err less trace more pixels again",
     figures: &RULE_FIGURES,
     measure: rules,
 };

@@ -48,7 +48,7 @@ pub const FRAMES: Study = Study {
     time: TIME,
     reference: "all frames",
     recommended: "1/4 of the frames, warmed",
-    reason: "no bias, and an interval that holds what it promises; frames from empty caches fetch again what they should have found",
+    reason: "no bias, and an interval that nearly holds what it promises; frames from empty caches fetch again what they should have found, and their interval lies",
     figures: &FIGURES,
     measure: |inputs| each(inputs.moving(), inputs, sampled_frames),
 };

@@ -1,5 +1,6 @@
 //! Small inputs for tests.
 
+use super::headline::Replays;
 use super::inputs::Inputs;
 use crate::config::{CacheConfig, RunConfig};
 use crate::experiment::Subject;
@@ -37,5 +38,6 @@ pub fn inputs(trace: &dyn TileSource) -> Inputs<'_> {
         rays: Vec::new(),
         techniques: &[],
         traversal: Vec::new(),
+        replays: Replays::default(),
     }
 }

@@ -3,7 +3,7 @@
 use super::ConfigArgs;
 use super::ray_files::TraceFile;
 use super::subjects::Traces;
-use crate::accuracy::{Inputs, Rays, STUDIES, TraversalRow};
+use crate::accuracy::{Inputs, Rays, Replays, STUDIES, TraversalRow};
 use crate::config::{Mode, RunConfig};
 use crate::files::{check_outputs, write_atomically};
 use crate::report::accuracy::{AccuracyReport, Measured};
@@ -115,6 +115,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .collect(),
         techniques: &folders,
         traversal: traversal.unwrap_or_default(),
+        replays: Replays::default(),
     };
     let report = measured(&inputs)?;
     let size = |scene: &str| {

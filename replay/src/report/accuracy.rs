@@ -46,8 +46,8 @@ impl Measured {
     /// Columns of its choices; times only where they are asked for, since they are no result.
     fn columns(&self, times: bool) -> Vec<Column<'static, Choice>> {
         let mut columns = vec![
-            Column::text("choice", "choice", |c: &Choice| c.name.clone()),
             Column::text("scene", "on", |c: &Choice| c.scene.clone()),
+            Column::text("choice", "choice", |c: &Choice| c.name.clone()),
         ];
         if times {
             columns.push(Column::real(
@@ -105,10 +105,15 @@ impl Measured {
     /// Time against error; none where no choice has both.
     #[must_use]
     pub fn chart(&self) -> Option<ScatterChart> {
-        let mut named: Vec<(&str, (f64, f64))> = vec![(self.study.reference, (1.0, 0.0))];
-        let names = self.names().into_iter();
+        let names = self.names();
+        let mut named: Vec<(&str, (f64, f64))> = Vec::new();
+        // A study may have measured its reference, too.
+        if !names.contains(&self.study.reference) {
+            named.push((self.study.reference, (1.0, 0.0)));
+        }
+        let names = names.into_iter();
         named.extend(names.filter_map(|name| Some((name, self.time_and_error(name)?))));
-        if named.len() == 1 {
+        if named.len() < 2 {
             return None;
         }
         let at: Vec<(f64, f64)> = named.iter().map(|(_, at)| *at).collect();
@@ -342,7 +347,10 @@ impl AccuracyReport {
             "What to choose",
             html! {
                 p { "The recommended choice of each study, its time over that of the study's reference, and the error that it brings: mean and largest over the scenes. Times differ from run to run." }
-                (self.advice(true).markup())
+                // The reasons stand with the studies.
+                @let advice = self.advice(true);
+                @let keys = advice.headings.iter().map(|h| h.key.as_ref()).filter(|key| *key != "reason");
+                (advice.picked(keys).markup())
             },
         )];
         for measured in &self.studies {

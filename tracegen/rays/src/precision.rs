@@ -240,7 +240,7 @@ pub const ARITHMETICS: [&str; 4] = [
     "double precision",
     "single precision",
     "single, recentred",
-    "tracegen rays",
+    "tracegen rays (single, recentred)",
 ];
 
 /// Traces `count` rays at a mesh whose centre is at `(at_m, 0.7 at_m, -0.9 at_m)`.

@@ -4,6 +4,7 @@ use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
 use super::technique_args::TechniqueArgs;
+use crate::doubtful::Doubtful;
 use crate::picture;
 use crate::study::auto::Budget;
 use crate::study::{memory, processor};
@@ -309,6 +310,12 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let time_s = setup.moments.time_s(views.frame);
         draws.pose(&setup.scene, time_s);
         backend.pose(&draws);
+        if summary.doubtful.is_none() {
+            let doubtful = summary.doubtful.insert(Doubtful::default());
+            for eye in planner.eyes() {
+                doubtful.look(&setup.scene, &draws, &views.eyes[*eye as usize], size_px);
+            }
+        }
         let job = self::job(args, &setup, &draws, &planner, bounds);
         let frame = match first.take() {
             Some(first) => first,
@@ -364,6 +371,11 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     }
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds, setup.scene.origin);
+    }
+    let of_a_frame = summary.counts.fragments / setup.frames.len().max(1) as u64;
+    let doubtful = summary.doubtful.unwrap_or_default();
+    for warning in doubtful.warnings(&setup.scene, of_a_frame) {
+        shell::warn(&warning);
     }
     let views = [setup.frames.len(), planner.eyes().len()];
     note(&texels);
@@ -456,6 +468,8 @@ struct Summary {
     sorting: Duration,
     counts: CaptureCounts,
     predicted: Vec<Predicted>,
+    /// Of the first frame.
+    doubtful: Option<Doubtful>,
     identical: Option<bool>,
     looking: Duration,
     culling: Duration,
