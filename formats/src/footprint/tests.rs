@@ -138,12 +138,24 @@ fn lanes_with_levels_of_their_own_read_these_level_by_level() {
         cross: [quad.dx[0], quad.dy[1]],
         ..quad
     };
-    let expected = [(1, 0), (2, 0), (2, 1), (2, 2), (2, 3), (3, 1), (3, 2), (3, 3)];
+    let expected = [
+        (1, 0),
+        (2, 0),
+        (2, 1),
+        (2, 2),
+        (2, 3),
+        (3, 1),
+        (3, 2),
+        (3, 3),
+    ];
     assert_eq!(read(&quad, &per_lane), expected);
     assert_eq!(lane_lod(&quad, 0, [256; 2], [256; 2]), 2.5_f32.log2());
     // One row on and one column on: (5, 2.5) and (2.5, 5).
     let corner = lane_lod(&quad, 3, [256; 2], [256; 2]);
-    assert!((corner - 0.5 * (25.0_f32 + 6.25).log2()).abs() < 1e-6, "{corner}");
+    assert!(
+        (corner - 0.5 * (25.0_f32 + 6.25).log2()).abs() < 1e-6,
+        "{corner}"
+    );
 }
 
 #[test]

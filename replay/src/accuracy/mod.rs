@@ -19,7 +19,7 @@ mod techniques;
 mod testing;
 mod traversal;
 
-pub use headline::{Replays, headline_figures};
+pub use headline::{REUSE, Replays, headline_figures};
 pub use inputs::{Inputs, Rays, TraversalRow};
 pub use study::{Choice, Contribution, Figure, Study, StudyError};
 

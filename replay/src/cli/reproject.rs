@@ -108,10 +108,8 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     args.parquet.write(|| report::rows(&entries))?;
     let reports = entries.iter().map(|e| &e.report);
     let text = if args.json {
-        let lines: Result<Vec<String>, _> = match entries.len() {
-            1 => reports.map(serde_json::to_string_pretty).collect(),
-            _ => reports.map(serde_json::to_string).collect(),
-        };
+        let pretty = entries.len() == 1;
+        let lines: Result<Vec<String>, _> = reports.map(|r| report::json(r, pretty)).collect();
         lines?.join("\n") + "\n"
     } else if args.csv {
         report::csv(&entries)

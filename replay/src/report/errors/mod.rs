@@ -2,8 +2,10 @@
 //! that the table names. What nobody has measured is not in the table.
 
 use super::columns::Column;
+use super::html::Section;
 use super::table::Table;
-use crate::accuracy::Contribution;
+use crate::accuracy::{Contribution, REUSE};
+use maud::html;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
@@ -36,32 +38,44 @@ fn parse(text: &str) -> Vec<KnownError> {
     lines.deserialize().filter_map(Result::ok).collect()
 }
 
-/// All that was measured.
+/// What figures are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// A texture trace.
+    Textures,
+    /// A ray trace.
+    Rays,
+}
+
+/// What was measured of these figures.
 #[must_use]
-pub fn known() -> &'static [KnownError] {
-    &ERRORS
+pub fn known(of: Of) -> Vec<&'static KnownError> {
+    let rays = |error: &&KnownError| error.figure == REUSE.key;
+    let wanted = ERRORS
+        .iter()
+        .filter(|error| rays(error) == (of == Of::Rays));
+    wanted.collect()
 }
 
 /// A figure with what is known of its error.
-struct Figure<'a> {
-    first: &'a KnownError,
+struct Figure {
+    first: &'static KnownError,
     /// By [`Contribution::ALL`].
-    errors: [Option<&'a KnownError>; 5],
+    errors: [Option<&'static KnownError>; 5],
 }
 
 /// The figures that anything is known of, in the table's order.
-fn by_figure() -> Vec<Figure<'static>> {
-    let mut figures: Vec<Figure<'_>> = Vec::new();
-    for error in known() {
+fn by_figure(of: Of) -> Vec<Figure> {
+    let mut figures: Vec<Figure> = Vec::new();
+    for error in known(of) {
         if !figures.iter().any(|f| f.first.figure == error.figure) {
             figures.push(Figure {
                 first: error,
                 errors: [None; 5],
             });
         }
-        let at = Contribution::ALL
-            .iter()
-            .position(|c| c.name() == error.contribution);
+        let mut contributions = Contribution::ALL.iter();
+        let at = contributions.position(|c| c.name() == error.contribution);
         let figure = figures.iter_mut().find(|f| f.first.figure == error.figure);
         if let Some((figure, at)) = figure.zip(at) {
             figure.errors[at] = Some(error);
@@ -72,35 +86,48 @@ fn by_figure() -> Vec<Figure<'static>> {
 
 /// The table for a terminal and for the page: a row a figure, the largest error of each source.
 #[must_use]
-pub fn table() -> Table {
+pub fn table(of: Of) -> Table {
     let mut columns = vec![
-        Column::text("name", "largest error of", |f: &Figure<'_>| {
+        Column::text("name", "largest error of", |f: &Figure| {
             f.first.name.clone()
         }),
-        Column::text("unit", "", |f: &Figure<'_>| f.first.unit.clone()),
+        Column::text("unit", "", |f: &Figure| f.first.unit.clone()),
     ];
     for (index, contribution) in Contribution::ALL.into_iter().enumerate() {
         let (key, name) = (contribution.name(), contribution.title());
-        let largest = move |f: &Figure<'_>| Some(f.errors[index]?.largest);
+        let largest = move |f: &Figure| Some(f.errors[index]?.largest);
         columns.push(Column::real(key, name, "", 3, largest));
     }
-    Table::new(&columns, &by_figure())
+    Table::new(&columns, &by_figure(of)).without_empty_columns()
 }
 
 /// The table under its heading, for a terminal; empty where nothing was measured.
 #[must_use]
-pub fn text() -> String {
-    source().map_or_else(String::new, |source| {
-        format!("\nHow far figures are off ({source})\n{}", table().text())
+pub fn text(of: Of) -> String {
+    source(of).map_or_else(String::new, |source| {
+        format!("\nHow far figures are off ({source})\n{}", table(of).text())
     })
 }
 
-/// How and on what the errors were measured; none where nothing was.
+/// The table as a section of a page; none where nothing was measured.
 #[must_use]
-pub fn source() -> Option<String> {
-    let command = &known().first()?.command;
+pub fn section(of: Of) -> Option<Section> {
+    let source = source(of)?;
+    Some(Section::new(
+        "How far the figures are off",
+        html! {
+            p { "The largest error of each figure by its source, measured by " (source) "; on other scenes it may be another. What is empty was not measured." }
+            (table(of).markup())
+        },
+    ))
+}
+
+/// How and on what the errors were measured; none where nothing was.
+fn source(of: Of) -> Option<String> {
+    let known = known(of);
+    let command = &known.first()?.command;
     let mut scenes: Vec<&str> = Vec::new();
-    for scene in known().iter().flat_map(|e| e.scenes.split(", ")) {
+    for scene in known.iter().flat_map(|e| e.scenes.split(", ")) {
         if !scenes.contains(&scene) {
             scenes.push(scene);
         }
@@ -112,12 +139,13 @@ pub fn source() -> Option<String> {
 mod tests {
     use super::*;
     use crate::accuracy::headline_figures;
+    use crate::report::columns::Value;
 
     #[test]
     fn every_line_reads_and_names_a_figure_its_source_and_a_unit() {
         let lines = include_str!("measured.csv").lines().count();
-        assert_eq!(known().len(), lines - 1);
-        for error in known() {
+        assert_eq!(ERRORS.len(), lines - 1);
+        for error in ERRORS.iter() {
             let figure = headline_figures().find(|figure| figure.key == error.figure);
             let figure = figure.expect("a headline figure");
             let found = (error.name.as_str(), error.unit.as_str());
@@ -131,10 +159,11 @@ mod tests {
 
     #[test]
     fn every_headline_figure_has_an_error_of_its_own_and_the_table_all_of_them() {
-        let table = table();
-        assert_eq!(table.rows.len(), headline_figures().count());
-        let cells = table.rows.iter().flat_map(|row| &row[2..]);
-        let filled = cells.filter(|cell| **cell != super::super::columns::Value::None);
-        assert_eq!(filled.count(), known().len());
+        let tables = [Of::Textures, Of::Rays].map(table);
+        let rows = || tables.iter().flat_map(|table| &table.rows);
+        assert_eq!(rows().count(), headline_figures().count());
+        let cells = rows().flat_map(|row| &row[2..]);
+        let filled = cells.filter(|cell| **cell != Value::None);
+        assert_eq!(filled.count(), ERRORS.len());
     }
 }

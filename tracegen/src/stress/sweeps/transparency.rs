@@ -6,9 +6,9 @@ use super::super::{Bounds, Points, Sweep};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "transparency",
-    about: "Clutter that is masked by a texture's alpha or blended, alone and before an opaque wall, from near and far, against the reference. At the border of a hole, alpha within rounding of the cutoff decides.",
+    about: "Clutter that is masked by a texture's alpha or blended, against the reference. At the border of a hole, alpha within rounding of the cutoff decides.",
     bounds: Bounds {
-        fragments_pct: 2.0,
+        fragments_pct: 0.2,
         uv_texels: 0.05,
     },
     warning: None,
