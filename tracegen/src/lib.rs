@@ -3,6 +3,7 @@
 
 pub mod captures;
 pub mod cli;
+mod doubtful;
 mod picture;
 pub mod stress;
 pub mod study;

@@ -83,7 +83,9 @@ impl Reach {
                 };
                 let lod = match options.lod {
                     LodFormula::Llvmpipe => 0.5 * fast_log2(longer / square(count)),
-                    LodFormula::Exact => 0.5 * (longer / square(count)).log2(),
+                    LodFormula::Exact | LodFormula::PerLane => {
+                        0.5 * (longer / square(count)).log2()
+                    }
                     LodFormula::Softpipe => (d[0].abs().max(d[1].abs()) / count as f32).log2(),
                 };
                 Self::Probes(Probes {

@@ -29,10 +29,25 @@ pub fn quad_lod(record: &QuadRecord, extent: [u32; 2], size: [u32; 2], formula: 
     let squared = |d: [f32; 2]| d[0] * d[0] + d[1] * d[1];
     match formula {
         LodFormula::Llvmpipe => 0.5 * fast_log2(squared(dx).max(squared(dy))),
-        LodFormula::Exact => 0.5 * squared(dx).max(squared(dy)).log2(),
+        LodFormula::Exact | LodFormula::PerLane => 0.5 * squared(dx).max(squared(dy)).log2(),
         LodFormula::Softpipe => {
             let largest = |d: [f32; 2]| d[0].abs().max(d[1].abs());
             largest(dx).max(largest(dy)).log2()
         }
     }
+}
+
+/// Level of detail of one lane by [`LodFormula::PerLane`]: from the differences along its own row and
+/// its own column of the quad.
+#[must_use]
+pub fn lane_lod(record: &QuadRecord, lane: u32, extent: [u32; 2], size: [u32; 2]) -> f32 {
+    let own = |derivative: [i32; 2], other: bool| {
+        [0, 1].map(|a| derivative[a].wrapping_add(if other { record.cross[a] } else { 0 }))
+    };
+    let of_lane = QuadRecord {
+        dx: own(record.dx, lane >> 1 & 1 == 1),
+        dy: own(record.dy, lane & 1 == 1),
+        ..*record
+    };
+    quad_lod(&of_lane, extent, size, LodFormula::PerLane)
 }

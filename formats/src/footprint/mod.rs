@@ -3,7 +3,8 @@
 //!
 //! Footprints come in a fixed order: record by record, sample by sample in shader order, the
 //! finer mip level before the coarser one, probe by probe where there are several, then lane by lane;
-//! those of an ellipse lane by lane, then row by row. Everything that counts or writes
+//! those of an ellipse lane by lane, then row by row. Where each lane has levels of its own, a level's footprints
+//! are those of the lanes that read it. Everything that counts or writes
 //! accesses follows it.
 
 mod aniso;
@@ -11,7 +12,7 @@ mod lod;
 mod options;
 
 pub use aniso::{AnisotropyModel, Ellipse, MOST_ANISOTROPY, Probes, Reach};
-pub use lod::{fast_log2, quad_lod};
+pub use lod::{fast_log2, lane_lod, quad_lod};
 pub use options::{FilterOverride, LodFormula, SamplingOptions};
 
 use crate::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Sample, Tables, UvGroup};
@@ -95,6 +96,15 @@ pub fn texel_before_wrap(coordinate: i32, size: u32, extent: u32, filter: Filter
     }
 }
 
+/// Both texels of a fetch along one axis, before wrapping.
+fn fetch(coordinate: i32, size: u32, extent: u32, filter: Filter) -> [i64; 2] {
+    let low = texel_before_wrap(coordinate, size, extent, filter);
+    match filter {
+        Filter::Nearest => [low; 2],
+        Filter::Linear => [low, low + 1],
+    }
+}
+
 /// Brings a texel coordinate into `0..size`.
 #[must_use]
 pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> u32 {
@@ -149,6 +159,23 @@ pub fn footprints(
         options,
     );
     let (lod, probes) = match reach {
+        Reach::Isotropic if options.lod == LodFormula::PerLane => {
+            let chosen = lanes.map(|lane| {
+                let lod = lane_lod(record, lane, extent, texture.size) + options.lod_bias;
+                (lane, select_levels(lod, &sampler, texture.levels))
+            });
+            let chosen: Vec<(u32, LevelSelection)> = chosen.collect();
+            for level in 0..texture.levels {
+                let size = texture.level_size(level);
+                let reads = |of: &LevelSelection| (of.first..of.first + of.count).contains(&level);
+                for (lane, of) in chosen.iter().filter(|(_, of)| reads(of)) {
+                    let uv = record.lane_uv(*lane);
+                    let texels = [0, 1].map(|a| fetch(uv[a], size[a], extent[a], of.filter));
+                    visit(footprint(*lane, level, texels));
+                }
+            }
+            return;
+        }
         Reach::Isotropic => {
             let lod = quad_lod(record, extent, texture.size, options.lod);
             (lod + options.lod_bias, None)
@@ -173,11 +200,7 @@ pub fn footprints(
                 let uv = record.lane_uv(lane);
                 let axis = |a: usize| {
                     let at = uv[a].wrapping_add(from_middle[a]);
-                    let low = texel_before_wrap(at, size[a], extent[a], selection.filter);
-                    match selection.filter {
-                        Filter::Nearest => [low; 2],
-                        Filter::Linear => [low, low + 1],
-                    }
+                    fetch(at, size[a], extent[a], selection.filter)
                 };
                 visit(footprint(lane, level, [axis(0), axis(1)]));
             }

@@ -49,6 +49,8 @@ pub enum LodFormula {
     Softpipe,
     /// As llvmpipe with the exact logarithm.
     Exact,
+    /// The exact logarithm of each lane's own derivatives: no level is shared by a quad.
+    PerLane,
 }
 
 /// Everything about sampling that is not in the trace.

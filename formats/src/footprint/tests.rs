@@ -117,6 +117,48 @@ fn a_texel_centre_reads_the_texel_and_its_right_and_lower_neighbours() {
 }
 
 #[test]
+fn lanes_with_levels_of_their_own_read_these_level_by_level() {
+    let per_lane = SamplingOptions {
+        lod: LodFormula::PerLane,
+        ..SamplingOptions::default()
+    };
+    let exact = SamplingOptions {
+        lod: LodFormula::Exact,
+        ..SamplingOptions::default()
+    };
+    let read = |quad: &QuadRecord, options: &SamplingOptions| -> Vec<_> {
+        let found = all(quad, &SAMPLE, &Sampler::TRILINEAR_REPEAT, options);
+        found.iter().map(|f| (f.level, f.lane)).collect()
+    };
+    // An affine mapping has the same derivatives in every lane.
+    let quad = record([10.5, 20.5], 2.5);
+    assert_eq!(read(&quad, &per_lane), read(&quad, &exact));
+    // Twice the step in the lower row and in the right column.
+    let quad = QuadRecord {
+        cross: [quad.dx[0], quad.dy[1]],
+        ..quad
+    };
+    let expected = [
+        (1, 0),
+        (2, 0),
+        (2, 1),
+        (2, 2),
+        (2, 3),
+        (3, 1),
+        (3, 2),
+        (3, 3),
+    ];
+    assert_eq!(read(&quad, &per_lane), expected);
+    assert_eq!(lane_lod(&quad, 0, [256; 2], [256; 2]), 2.5_f32.log2());
+    // One row on and one column on: (5, 2.5) and (2.5, 5).
+    let corner = lane_lod(&quad, 3, [256; 2], [256; 2]);
+    assert!(
+        (corner - 0.5 * (25.0_f32 + 6.25).log2()).abs() < 1e-6,
+        "{corner}"
+    );
+}
+
+#[test]
 fn levels_come_before_lanes() {
     let quad = QuadRecord {
         mask: 0b1010,

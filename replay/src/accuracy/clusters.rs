@@ -1,5 +1,5 @@
-//! A functional replay that counts by set: all lines of an L1 set, of the L2 sets that hold them,
-//! and of no others, are a *cluster*, which can be replayed alone and exactly.
+//! A functional replay of a part, counted by set, by tile and by frame: all lines of an L1 set, of the
+//! L2 sets that hold them, and of no others, are a *cluster*, which can be replayed alone and exactly.
 
 use crate::cache::{AnyCache, Cache, Levels};
 use crate::config::{Assign, ConfigError, Order, RunConfig};
@@ -9,29 +9,57 @@ use crate::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave,
 };
 
-/// Lines fetched from memory, by cluster, and by work item's first tile.
+/// What is replayed.
+pub struct Part<'a> {
+    /// Frames by number, in this order; caches stay as they are between them.
+    pub frames: &'a [u32],
+    /// Work items of the order, by their number since the start.
+    pub item: &'a dyn Fn(usize) -> bool,
+    /// Clusters; all of them where there is no list.
+    pub clusters: Option<&'a [bool]>,
+}
+
+impl<'a> Part<'a> {
+    /// All of these frames.
+    pub fn frames(frames: &'a [u32]) -> Self {
+        Self {
+            frames,
+            item: &|_| true,
+            clusters: None,
+        }
+    }
+}
+
+/// Lines fetched from memory.
 pub struct Counts {
     /// L2 misses by cluster.
     pub by_cluster: Vec<u64>,
-    /// L2 misses and footprints by tile.
+    /// L2 misses and footprints by tile, all frames together.
     pub by_tile: Vec<(u64, u64)>,
+    /// L2 misses by frame, in the order of [`Part::frames`].
+    pub by_frame: Vec<u64>,
 }
 
-struct Counting {
+struct Counting<'a> {
     l1: Vec<Box<dyn Cache>>,
     l2: Box<dyn Cache>,
     mask: u32,
+    chosen: Option<&'a [bool]>,
     counts: Counts,
 }
 
-impl Consumer for Counting {
+impl Consumer for Counting<'_> {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
         let tile = quad.tile();
         for footprint in quad.footprints() {
             for _ in 0..=footprint.repeats {
                 for &line in footprint.lines {
+                    let cluster = (line & self.mask) as usize;
+                    if self.chosen.is_some_and(|chosen| !chosen[cluster]) {
+                        continue;
+                    }
                     if !self.l1[core].access(line) && !self.l2.access(line) {
-                        self.counts.by_cluster[(line & self.mask) as usize] += 1;
+                        self.counts.by_cluster[cluster] += 1;
                         self.counts.by_tile[tile].0 += 1;
                     }
                 }
@@ -41,7 +69,7 @@ impl Consumer for Counting {
     }
 }
 
-/// Replays a trace's first frame, of each phase the items that `chosen` keeps.
+/// Replays a part of a trace with caches that are empty at first.
 ///
 /// # Errors
 /// An impossible configuration, a trace that cannot be read.
@@ -49,46 +77,61 @@ pub fn counts(
     trace: &dyn TileSource,
     config: &RunConfig,
     order: Order,
-    chosen: &dyn Fn(usize) -> bool,
+    part: &Part<'_>,
 ) -> Result<Counts, ReplayError> {
     config.validate()?;
-    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
     let expander = Expander::new(trace, config)?;
     let mut accesses = TraceCounts::new(expander.bins());
-    let passes = &trace.tables().passes;
-    let number = passes.iter().map(|pass| pass.frame).min().unwrap_or(0);
-    let frame = expander.frame(number, &memory, &mut accesses)?;
-    let clusters = clusters(config)?;
+    let clusters = cluster_count(config)?;
     let Levels { l1, l2 } = Levels::build(config)?;
     let mut counting = Counting {
         l1: l1.into_iter().map(AnyCache::into_box).collect(),
         l2: l2.into_box(),
         mask: clusters - 1,
+        chosen: part.clusters,
         counts: Counts {
             by_cluster: vec![0; clusters as usize],
             by_tile: vec![(0, 0); expander.bins().tiles()],
+            by_frame: Vec::new(),
         },
     };
+    let passes = &trace.tables().passes;
+    let order = order.build(config.seed);
     let mut index = 0;
-    let mut keep = |phase: Phase| -> Phase {
-        let kept = phase.into_iter().filter(|_| {
-            index += 1;
-            chosen(index - 1)
-        });
-        kept.collect()
-    };
-    let plan = order::plan_frame(&*order.build(config.seed), passes, number);
-    let phases: Vec<Phase> = plan.into_iter().map(&mut keep).collect();
-    let mut cores = Cores::new(&frame, config.cores as usize);
-    interleave(&mut cores, &phases, Assign::FirstIdle, &mut counting)?;
+    for &number in part.frames {
+        let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+        let frame = expander.frame(number, &memory, &mut accesses)?;
+        let mut keep = |phase: Phase| -> Phase {
+            let kept = phase.into_iter().filter(|_| {
+                index += 1;
+                (part.item)(index - 1)
+            });
+            kept.collect()
+        };
+        let plan = order::plan_frame(&*order, passes, number);
+        let phases: Vec<Phase> = plan.into_iter().map(&mut keep).collect();
+        let before: u64 = counting.counts.by_cluster.iter().sum();
+        let mut cores = Cores::new(&frame, config.cores as usize);
+        interleave(&mut cores, &phases, Assign::FirstIdle, &mut counting)?;
+        let after: u64 = counting.counts.by_cluster.iter().sum();
+        counting.counts.by_frame.push(after - before);
+    }
     Ok(counting.counts)
 }
 
 /// The clusters of a configuration: sets of the smaller level.
-fn clusters(config: &RunConfig) -> Result<u32, ConfigError> {
+pub fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
     let l1 = config.l1.sets("L1", config.line_bytes)?;
     let l2 = config.l2.sets("L2", config.line_bytes)?;
     Ok(l1.min(l2))
+}
+
+/// The frames of a trace by number, ascending.
+pub fn frames(trace: &dyn TileSource) -> Vec<u32> {
+    let mut frames: Vec<u32> = trace.tables().passes.iter().map(|p| p.frame).collect();
+    frames.sort_unstable();
+    frames.dedup();
+    frames
 }
 
 #[cfg(test)]
@@ -114,10 +157,23 @@ mod tests {
             ..RunConfig::default()
         };
         for order in [Order::MORTON, Order::Z2_STA] {
-            let found = counts(&trace, &config, order, &|_| true).unwrap();
+            let frames = frames(&trace);
+            let found = counts(&trace, &config, order, &Part::frames(&frames)).unwrap();
             let expected = replay(&trace, &RunConfig { order, ..config }).unwrap();
             assert_eq!(found.by_cluster.iter().sum::<u64>(), expected.l2.misses);
             assert_eq!(found.by_cluster.len(), 16);
+            assert_eq!(found.by_frame, [expected.l2.misses]);
+            // Clusters alone count what they count among all.
+            let chosen: Vec<bool> = (0..16).map(|cluster| cluster % 5 == 1).collect();
+            let part = Part {
+                clusters: Some(&chosen),
+                ..Part::frames(&frames)
+            };
+            let alone = counts(&trace, &config, order, &part).unwrap();
+            for (cluster, chosen) in chosen.into_iter().enumerate() {
+                let expected = if chosen { found.by_cluster[cluster] } else { 0 };
+                assert_eq!(alone.by_cluster[cluster], expected);
+            }
             let tiles = found.by_tile.iter();
             let (misses, footprints) = tiles.fold((0, 0), |(m, f), t| (m + t.0, f + t.1));
             assert_eq!(

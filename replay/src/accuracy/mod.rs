@@ -1,12 +1,72 @@
 //! What a quicker or another way of counting costs in accuracy, and what it spares in time.
 //!
-//! A *variant* is a configuration that stands for another one, its reference; both are replayed in
-//! Morton order and Z2 STA. Sampling replays a part and estimates the whole, with an interval that
-//! may lie.
+//! A *study* is about one choice and holds each possibility against a reference; it is a file here
+//! and a line of [`STUDIES`].
 
+mod captures;
+mod closed_form;
 mod clusters;
-mod sampling;
-mod variants;
+mod configurations;
+mod encodings;
+mod headline;
+mod inputs;
+mod interval;
+mod reprojection;
+mod samples;
+mod study;
+mod techniques;
+#[cfg(test)]
+mod testing;
+mod traversal;
 
-pub use sampling::{Estimate, Sampled, sampled};
-pub use variants::{Contribution, ERROR_FIGURES, Measured, VARIANTS, Variant, measure};
+pub use headline::{REUSE, Replays, headline_figures};
+pub use inputs::{Inputs, Rays, TraversalRow};
+pub use study::{Choice, Contribution, Figure, Study, StudyError};
+
+/// Every study, in the order of the page.
+pub static STUDIES: [Study; 15] = [
+    captures::CAPTURE,
+    encodings::ENCODING,
+    configurations::MODE,
+    configurations::LOD,
+    configurations::LOOP,
+    configurations::MODEL,
+    configurations::FIRST_MISS_LOOP,
+    closed_form::CLOSED_FORM,
+    samples::SETS,
+    samples::TILES,
+    samples::FRAMES,
+    reprojection::RULES,
+    reprojection::REUSED,
+    traversal::TRAVERSAL,
+    techniques::TECHNIQUES,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::testing::{inputs, small_trace};
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_study_of_a_texture_trace_yields_its_figures_and_what_it_recommends() {
+        let trace = small_trace();
+        let inputs = inputs(&trace);
+        for study in &STUDIES {
+            let choices = (study.measure)(&inputs).unwrap();
+            let names: BTreeSet<&str> = choices.iter().map(|c| c.name.as_str()).collect();
+            for choice in &choices {
+                assert_eq!(choice.values.len(), study.figures.len(), "{}", study.key);
+                assert!(!names.contains(study.reference), "{}", study.key);
+            }
+            let known = study.recommended == study.reference || names.contains(study.recommended);
+            assert!(known || choices.is_empty(), "{}", study.key);
+        }
+    }
+
+    #[test]
+    fn keys_of_studies_are_their_own() {
+        let keys: BTreeSet<&str> = STUDIES.iter().map(|study| study.key).collect();
+        assert_eq!(keys.len(), STUDIES.len());
+    }
+}

@@ -1,22 +1,27 @@
 //! `replay accuracy`: run time against error, measured.
 
 use super::ConfigArgs;
+use super::ray_files::TraceFile;
 use super::subjects::Traces;
-use crate::accuracy::{VARIANTS, measure, sampled};
-use crate::config::{Mode, Order, RunConfig};
+use crate::accuracy::{Inputs, Rays, Replays, STUDIES, TraversalRow};
+use crate::config::{Mode, RunConfig};
 use crate::files::{check_outputs, write_atomically};
-use crate::report::accuracy::{AccuracyReport, SampleRow, VariantRow};
-use anyhow::{Context, Result, ensure};
+use crate::report::accuracy::{AccuracyReport, Measured};
+use crate::result::scene_name;
+use crate::sgrt::frame::RaySource;
+use crate::techniques::Folder;
+use anyhow::{Context, Result, anyhow, ensure};
+use formats::raytrace::Raytrace;
+use serde::Deserialize;
 use shell::{Output, Progress};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Files that are written into the folder.
-const FILES: [&str; 6] = [
+const FILES: [&str; 5] = [
     "accuracy.html",
     "accuracy.json",
-    "variants.csv",
-    "samples.csv",
+    "choices.csv",
     "errors.csv",
     "times.csv",
 ];
@@ -27,12 +32,33 @@ const FILES: [&str; 6] = [
     after_help = "Everything runs one after another on one thread, so that times can be compared; they are in
 times.csv and on the page, and nowhere else. errors.csv has the form of the table that reports show.
 
-Example: replay accuracy crytek.textrace atrium.textrace -o out/accuracy"
+Examples:
+  replay accuracy crytek.textrace atrium.textrace -o out/accuracy
+  replay accuracy crytek.textrace --truth crytek-reference.textrace --rays crytek.raytrace -o out/accuracy"
 )]
 pub struct Args {
-    /// Texture traces
+    /// Texture traces; those of several frames are for samples of frames alone
     #[arg(required = true, value_name = "TRACE")]
     traces: Vec<PathBuf>,
+    /// What a capture of a TRACE's views should have been (`tracegen verify --write-reference`)
+    #[arg(long, value_name = "TRACE")]
+    truth: Vec<PathBuf>,
+    /// Another driver's capture of a TRACE's views, to be held against --truth
+    #[arg(long, value_name = "TRACE")]
+    capture: Vec<PathBuf>,
+    /// Seconds that it took to make the traces: a CSV file with the columns `trace` (a file's name without
+    /// extension) and `seconds`
+    #[arg(long, value_name = "CSV")]
+    seconds: Option<PathBuf>,
+    /// Ray traces, for rules of reprojection
+    #[arg(long, value_name = "RAYTRACE")]
+    rays: Vec<PathBuf>,
+    /// Folders of `tracegen techniques`
+    #[arg(long, value_name = "DIR")]
+    techniques: Vec<PathBuf>,
+    /// Precision of the ray traversal (`tracegen precision`)
+    #[arg(long, value_name = "JSON")]
+    traversal: Option<PathBuf>,
     /// Folder for tables, charts and page
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
@@ -56,83 +82,139 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .iter()
         .map(|path| Output::text("--output", path))
         .collect();
-    check_outputs(
-        &outputs,
-        args.traces
-            .iter()
-            .map(PathBuf::as_path)
-            .chain(args.machine.file()),
-    )?;
-    let traces = Traces::open(&args.traces)?;
-    let subjects = traces.subjects();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let steps = (subjects.len() * (VARIANTS.len() + 1)) as u64;
-    let progress = Progress::new("measuring", steps, "variants");
-    let (mut variants, mut samples) = (Vec::new(), Vec::new());
-    for variant in &VARIANTS {
-        for subject in &subjects {
-            let measured = pool.install(|| measure(subject.source, config, variant));
-            variants.push(VariantRow {
-                scene: subject.label.clone(),
-                variant,
-                measured: measured.with_context(|| subject.label.clone())?,
-            });
-            progress.advance(1);
-        }
-    }
-    let functional = RunConfig {
-        mode: Mode::Functional,
-        ..config
-    };
-    for subject in &subjects {
-        let found = pool.install(|| sampled(subject.source, &functional, Order::MORTON));
-        let found = found.with_context(|| subject.label.clone())?;
-        samples.extend(found.into_iter().map(|estimate| SampleRow {
-            scene: subject.label.clone(),
-            estimate,
-        }));
-        progress.advance(1);
-    }
-    drop(progress);
-    let report = AccuracyReport {
+    let traces = args.traces.iter().chain(&args.truth).chain(&args.capture);
+    let files = traces.chain(&args.rays).chain(&args.seconds);
+    let files = files.chain(&args.traversal).map(PathBuf::as_path);
+    check_outputs(&outputs, files.chain(args.machine.file()))?;
+
+    let [traces, truths, captures] =
+        [&args.traces, &args.truth, &args.capture].map(|paths| Traces::open(paths));
+    let (traces, truths, captures) = (traces?, truths?, captures?);
+    let rays = args
+        .rays
+        .iter()
+        .map(|path| Ok(TraceFile(Raytrace::open(path)?)));
+    let rays = rays.collect::<Result<Vec<TraceFile>>>()?;
+    let folders = args.techniques.iter().map(|path| Folder::open(path));
+    let folders = folders.collect::<Result<Vec<_>, _>>()?;
+    let traversal = args.traversal.as_deref().map(read_traversal).transpose()?;
+    let seconds = args.seconds.as_deref().map(read_seconds).transpose()?;
+    let named = |source: &dyn RaySource| scene_name(&source.tables().meta.trace.scene).to_owned();
+    let inputs = Inputs {
         config,
-        variants,
-        samples,
+        subjects: traces.subjects_by_file(),
+        truths: truths.subjects_by_file(),
+        captures: captures.subjects_by_file(),
+        seconds: seconds.unwrap_or_default(),
+        rays: rays
+            .iter()
+            .map(|source| Rays {
+                label: named(source),
+                source,
+            })
+            .collect(),
+        techniques: &folders,
+        traversal: traversal.unwrap_or_default(),
+        replays: Replays::default(),
     };
-    let scenes = subjects.iter().map(|subject| {
-        let [width, height] = subject.source.tables().meta.hmd.eye_size_px;
-        format!("{} {width}x{height}", subject.label)
-    });
-    let scenes = scenes.collect::<Vec<_>>().join(", ");
-    write(&report, &scenes, &args.output)?;
-    super::print(&format!(
-        "{}\n{}\n{}",
-        report.variants().text(),
-        report.samples().text(),
-        report.times().text()
-    ))?;
+    let report = measured(&inputs)?;
+    let size = |scene: &str| {
+        let subject = inputs.subjects.iter().chain(&inputs.truths);
+        let of = |hmd: &formats::view::Hmd| hmd.eye_size_px;
+        let texture = subject
+            .filter(|s| s.label == scene || scene_name(&s.source.tables().meta.scene) == scene)
+            .map(|s| of(&s.source.tables().meta.hmd));
+        let ray = inputs.rays.iter().filter(|r| r.label == scene);
+        let ray = ray.map(|r| of(&r.source.tables().meta.trace.hmd));
+        match texture.chain(ray).next() {
+            Some([width, height]) => format!("{scene} {width}x{height}"),
+            None => scene.to_owned(),
+        }
+    };
+    write(&report, &size, &args.output)?;
+    let mut text = report.advice(true).text();
+    for measured in &report.studies {
+        text += &format!(
+            "\n{}: {}\n{}",
+            measured.study.title,
+            measured.study.about,
+            measured.table().text()
+        );
+    }
+    super::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn write(report: &AccuracyReport, scenes: &str, folder: &Path) -> Result<()> {
+/// Every study that has something to measure.
+fn measured(inputs: &Inputs<'_>) -> Result<AccuracyReport> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let progress = Progress::new("measuring", STUDIES.len() as u64, "studies");
+    let mut studies = Vec::new();
+    for study in &STUDIES {
+        let choices = pool.install(|| (study.measure)(inputs));
+        let choices = choices.map_err(|error| anyhow!(error).context(study.title))?;
+        progress.advance(1);
+        if !choices.is_empty() {
+            studies.push(Measured { study, choices });
+        }
+    }
+    Ok(AccuracyReport {
+        config: inputs.config,
+        studies,
+    })
+}
+
+/// What `tracegen precision` writes.
+#[derive(Deserialize)]
+struct TraversalFile {
+    schema: String,
+    rows: Vec<TraversalRow>,
+}
+
+const TRAVERSAL_SCHEMA: &str = "tracegen.precision/1";
+
+fn read_traversal(path: &Path) -> Result<Vec<TraversalRow>> {
+    let name = || path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(name)?;
+    let file: TraversalFile = serde_json::from_str(&text).with_context(name)?;
+    ensure!(
+        file.schema == TRAVERSAL_SCHEMA,
+        "{}: schema: expected {TRAVERSAL_SCHEMA}, found {}",
+        name(),
+        file.schema
+    );
+    Ok(file.rows)
+}
+
+fn read_seconds(path: &Path) -> Result<Vec<(String, f64)>> {
+    let name = || path.display().to_string();
+    let mut lines = csv::Reader::from_path(path).with_context(name)?;
+    lines
+        .deserialize()
+        .map(|line| line.with_context(name))
+        .collect()
+}
+
+fn write(report: &AccuracyReport, size: &dyn Fn(&str) -> String, folder: &Path) -> Result<()> {
     let mut errors = csv::Writer::from_writer(Vec::new());
-    for error in report.errors("replay accuracy", scenes) {
+    for error in report.errors("replay accuracy", size) {
         errors.serialize(error)?;
     }
     let texts = [
         report.page()?,
         report.json()? + "\n",
-        report.variants().csv(),
-        report.samples().csv(),
+        report.choices_csv(),
         String::from_utf8(errors.into_inner()?)?,
-        report.times().csv(),
+        report.times_csv(),
     ];
     for (file, text) in FILES.iter().zip(texts) {
         write_atomically(&folder.join(file), text.as_bytes())?;
     }
-    for (study, chart) in report.charts() {
-        let path = folder.join(format!("pareto-{study}.svg"));
-        write_atomically(&path, chart.svg()?.as_bytes())?;
+    for measured in &report.studies {
+        if let Some(chart) = measured.chart() {
+            let path = folder.join(format!("pareto-{}.svg", measured.study.key));
+            write_atomically(&path, chart.svg()?.as_bytes())?;
+        }
     }
     Ok(())
 }

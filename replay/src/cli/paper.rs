@@ -3,7 +3,7 @@
 use super::experiment_args::{ExperimentArgs, page_outputs};
 use super::parquet_arg::ParquetArg;
 use crate::files::write_atomically;
-use crate::report::errors;
+use crate::report::errors::{self, Of};
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::tables;
 use anyhow::{Result, ensure};
@@ -102,13 +102,7 @@ pub fn text(report: &PaperReport) -> String {
             fit.mean_absolute_points, fit.largest_points, fit.rows
         );
     }
-    if let Some(source) = errors::source() {
-        let _ = write!(
-            text,
-            "\nHow far the figures are off ({source})\n{}",
-            errors::table().text()
-        );
-    }
+    text += &errors::text(Of::Textures);
     for c in report
         .conservation
         .iter()

@@ -2,13 +2,13 @@
 //! image for the right one.
 
 use super::parquet_arg::ParquetArg;
+use super::ray_files::TraceFile;
 use crate::files::{self, write_atomically};
 use crate::paper::sgrt as paper;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
 use crate::result::{TOOL, TraceId, scene_name};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
-use crate::sgrt::frame::RaySource;
 use crate::sgrt::loaded::{LoadedTrace, RuleRun};
 use crate::sgrt::result::{Config, Report, SCHEMA};
 use crate::sgrt::rules::{self, Rule};
@@ -16,11 +16,9 @@ use crate::sgrt::variations::curve_rules;
 use crate::sgrt::{DEFAULT_RULE, picture};
 use anyhow::{Context, ensure};
 use clap::Args;
-use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
-use formats::view::Eye;
+use formats::raytrace::Raytrace;
 use image_error::{Picture, png};
 use shell::{Output, Progress};
-use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -74,24 +72,6 @@ pub struct ReprojectArgs {
     threads: shell::Threads,
 }
 
-/// A ray trace file as the model reads it.
-struct TraceFile(Raytrace);
-
-impl RaySource for TraceFile {
-    fn tables(&self) -> &RaytraceTables {
-        self.0.tables()
-    }
-
-    fn tile(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        Ok(self.0.decode_tile(eye, index, tile)?)
-    }
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -128,10 +108,8 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     args.parquet.write(|| report::rows(&entries))?;
     let reports = entries.iter().map(|e| &e.report);
     let text = if args.json {
-        let lines: Result<Vec<String>, _> = match entries.len() {
-            1 => reports.map(serde_json::to_string_pretty).collect(),
-            _ => reports.map(serde_json::to_string).collect(),
-        };
+        let pretty = entries.len() == 1;
+        let lines: Result<Vec<String>, _> = reports.map(|r| report::json(r, pretty)).collect();
         lines?.join("\n") + "\n"
     } else if args.csv {
         report::csv(&entries)
@@ -202,7 +180,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         },
         paper: paper::values(scene, scene_name(scene), &args.paper_scenes)?,
         curve: if args.curve {
-            loaded.curve(&curve_rules(), config)
+            loaded.curve(&curve_rules(), &Reuse::ALL, config)
         } else {
             Vec::new()
         },

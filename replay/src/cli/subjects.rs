@@ -44,6 +44,15 @@ impl Traces {
         self.0.iter().map(|(trace, ..)| of_trace(trace)).collect()
     }
 
+    /// The traces under the names of their files.
+    #[must_use]
+    pub fn subjects_by_file(&self) -> Vec<Subject<'_>> {
+        let opened = self.0.iter();
+        opened
+            .map(|(trace, id, stem)| Subject::new(trace, id.clone(), stem.clone()))
+            .collect()
+    }
+
     /// The traces under names of their own.
     #[must_use]
     pub fn subjects(&self) -> Vec<Subject<'_>> {

@@ -19,6 +19,7 @@ pub use tally::Tally;
 use crate::config::SamplingConfig;
 use crate::order::TileRef;
 use crate::stream::{StreamError, TileSource};
+use formats::textrace::Tables;
 use partners::Partners;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -58,6 +59,14 @@ pub struct Comparison {
     pub tiles_that_differ: u64,
     /// Tiles of the views.
     pub tiles: u64,
+}
+
+/// Whether two captures show the same views of the same textured triangles.
+///
+/// # Errors
+/// What they do not have in common.
+pub fn comparable(tables: [&Tables; 2]) -> Result<(), NotComparable> {
+    Partners::new(tables).map(drop)
 }
 
 /// Holds two captures against each other under one sampling.

@@ -131,3 +131,54 @@ fn pixels(pass: &Pass, tile: u32) -> u32 {
     };
     (side(0) * side(1)).max(1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::counts::FootprintMisses;
+    use super::*;
+    use crate::stream::Expander;
+    use crate::stream::synthetic::Synthetic;
+
+    /// As after a trace of many hours.
+    #[test]
+    fn counters_beyond_32_bits_keep_every_digit_in_sums_rates_bytes_and_json() {
+        const MANY: u64 = 1 << 40;
+        let trace = Synthetic {
+            size_px: [32, 32],
+            ..Synthetic::default()
+        }
+        .generate();
+        let config = RunConfig::default();
+        let expander = Expander::new(&trace, &config).unwrap();
+        let bins = expander.bins();
+        let mut accesses = TraceCounts::new(bins);
+        let mut caches = CacheCounts::new(bins, false);
+        for (cell, misses) in accesses.cells.iter_mut().zip(&mut caches.cells) {
+            (cell.footprints, cell.line_lookups) = (8 * MANY, 9 * MANY);
+            let level = |lines| Misses {
+                footprints: 2 * MANY,
+                lines,
+                secondary: 0,
+            };
+            (misses.l1, misses.l2) = (level(4 * MANY), level(MANY));
+        }
+        let miss = FootprintMisses {
+            l1_lines: 3,
+            l2_lines: 1,
+            ..FootprintMisses::default()
+        };
+        caches.footprint(0, 0, &miss);
+        let cells = bins.cells() as u64;
+        let result = summary(&trace.tables, bins, &accesses, &caches, &config);
+        assert_eq!(result.footprints, 8 * MANY * cells);
+        assert_eq!(result.l1.misses, 4 * MANY * cells + 3);
+        assert_eq!(result.l2.counters.line_lookups, 4 * MANY * cells + 3);
+        assert_eq!(result.external_bytes, (MANY * cells + 1) * 16);
+        assert!((result.l1.miss_rate - 0.25).abs() < 1e-12);
+        assert!((result.l2.miss_rate - 0.25).abs() < 1e-12);
+        let of_parts: u64 = result.by_level.iter().map(|p| p.l2.line_misses).sum();
+        assert_eq!(of_parts, MANY * cells + 1);
+        let json = serde_json::to_string(&result).unwrap();
+        assert_eq!(serde_json::from_str::<RunResult>(&json).unwrap(), result);
+    }
+}

@@ -1,7 +1,7 @@
-//! Run time against error (`replay.accuracy/1`): tables, a chart a study, and the report's table of
-//! errors.
+//! Run time against error (`replay.accuracy/2`): a table and a chart a study, what to choose, and the
+//! report's table of errors.
 
-use super::columns::{Column, Records, Row};
+use super::columns::{Column, Record};
 use super::errors::KnownError;
 use super::html::{self, Section};
 use super::plots::lines::Axis;
@@ -9,215 +9,121 @@ use super::plots::scatter::{NamedPoint, ScatterChart};
 use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
 use super::theme;
-use crate::accuracy::{ERROR_FIGURES, Estimate, Measured, VARIANTS, Variant};
+use crate::accuracy::{Choice, Contribution, Study, headline_figures};
 use crate::config::RunConfig;
 use crate::result::TOOL;
 use crate::techniques::dominated;
-use maud::html;
+use maud::{Markup, html};
 use serde::Serialize;
 
 /// Schema of `accuracy.json`.
-pub const ACCURACY_SCHEMA: &str = "replay.accuracy/1";
+pub const ACCURACY_SCHEMA: &str = "replay.accuracy/2";
 
-/// A variant on a trace.
-pub struct VariantRow {
-    /// The trace's label.
-    pub scene: String,
-    /// The variant.
-    pub variant: &'static Variant,
-    /// How far it is off.
-    pub measured: Measured,
-}
-
-/// A kind of sample on a trace.
-pub struct SampleRow {
-    /// The trace's label.
-    pub scene: String,
-    /// How it does.
-    pub estimate: Estimate,
+/// A study with what it measured.
+pub struct Measured {
+    /// The study.
+    pub study: &'static Study,
+    /// Its choices on each scene; at least one.
+    pub choices: Vec<Choice>,
 }
 
 /// All that was measured.
 pub struct AccuracyReport {
     /// The machine.
     pub config: RunConfig,
-    /// Variants by trace.
-    pub variants: Vec<VariantRow>,
-    /// Samples by trace.
-    pub samples: Vec<SampleRow>,
+    /// Studies that had something to measure.
+    pub studies: Vec<Measured>,
 }
 
-impl Row for VariantRow {
-    fn columns() -> Vec<Column<'static, Self>> {
+/// Mean and largest of absolute values; none of none.
+fn mean_and_largest(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let values: Vec<f64> = values.map(f64::abs).collect();
+    let largest = values.iter().copied().reduce(f64::max)?;
+    Some((values.iter().sum::<f64>() / values.len() as f64, largest))
+}
+
+impl Measured {
+    /// Columns of its choices; times only where they are asked for, since they are no result.
+    fn columns(&self, times: bool) -> Vec<Column<'static, Choice>> {
         let mut columns = vec![
-            Column::text("study", "study", |r: &Self| r.variant.study),
-            Column::text("variant", "variant", |r: &Self| r.variant.name),
-            Column::text("scene", "scene", |r: &Self| r.scene.clone()),
+            Column::text("scene", "on", |c: &Choice| c.scene.clone()),
+            Column::text("choice", "choice", |c: &Choice| c.name.clone()),
         ];
-        for (index, (key, name, unit)) in ERROR_FIGURES.into_iter().enumerate() {
-            let value = move |r: &Self| r.measured.errors[index];
-            columns.push(Column::real(key, name, unit, 3, value));
+        if times {
+            columns.push(Column::real(
+                "time_ratio",
+                "time",
+                "\u{d7}",
+                3,
+                |c: &Choice| c.time_ratio,
+            ));
         }
-        let form = |r: &Self| r.measured.closed_form_points;
-        columns.push(Column::real(
-            "closed_form",
-            "closed form \u{2212} model",
-            "points",
-            2,
-            form,
-        ));
+        for (index, figure) in self.study.figures.iter().enumerate() {
+            let decimals = if figure.unit.is_empty() { 4 } else { 3 };
+            let value = move |c: &Choice| c.values[index];
+            columns.push(Column::real(
+                figure.key,
+                figure.name,
+                figure.unit,
+                decimals,
+                value,
+            ));
+        }
         columns
     }
-}
 
-impl Row for SampleRow {
-    #[rustfmt::skip]
-    fn columns() -> Vec<Column<'static, Self>> {
-        vec![
-            Column::text("scene", "scene", |r: &Self| r.scene.clone()),
-            Column::text("of", "sampled", |r: &Self| format!("{:?}", r.estimate.of).to_lowercase()),
-            Column::real("one_in", "one in", "", 0, |r: &Self| r.estimate.one_in),
-            Column::real("error_pct", "error", "%", 2, |r: &Self| r.estimate.error_pct),
-            Column::real("bias_pct", "bias", "%", 2, |r: &Self| r.estimate.bias_pct),
-            Column::real("interval_pct", "95 % interval", "\u{b1} %", 2, |r: &Self| r.estimate.interval_pct),
-            Column::real("holds_pct", "holds the truth", "%", 1, |r: &Self| r.estimate.holds_pct),
-        ]
-    }
-}
-
-/// A time: what was run, on what, and its ratio.
-type Time = (String, String, f64);
-
-/// The JSON object: nothing of it depends on the machine that ran it.
-#[derive(Serialize)]
-struct Document<'a> {
-    schema: &'a str,
-    tool: &'a str,
-    config: &'a RunConfig,
-    variants: Records<'a, 'static, VariantRow>,
-    samples: Records<'a, 'static, SampleRow>,
-}
-
-impl AccuracyReport {
-    /// Errors of the variants.
+    /// A row a choice and scene, with times.
     #[must_use]
-    pub fn variants(&self) -> Table {
-        let table = Table::new(&VariantRow::columns(), &self.variants);
-        table.grouped_by(2).without_empty_columns()
+    pub fn table(&self) -> Table {
+        Table::new(&self.columns(true), &self.choices)
+            .grouped_by(1)
+            .without_empty_columns()
     }
 
-    /// Errors of the samples.
-    #[must_use]
-    pub fn samples(&self) -> Table {
-        Table::new(&SampleRow::columns(), &self.samples).grouped_by(2)
-    }
-
-    /// Times over the reference's; they differ from run to run.
-    #[must_use]
-    pub fn times(&self) -> Table {
-        let variants = self.variants.iter().map(|row| {
-            let name = row.variant.name.to_owned();
-            (name, row.scene.clone(), row.measured.time_ratio)
-        });
-        let samples = self.samples.iter().filter_map(|row| {
-            let Estimate { of, one_in, .. } = row.estimate;
-            let name = format!("one in {one_in} {of:?}").to_lowercase();
-            Some((name, row.scene.clone(), row.estimate.time_ratio?))
-        });
-        let times: Vec<Time> = variants.chain(samples).collect();
-        let columns = [
-            Column::text("variant", "variant", |t: &Time| t.0.clone()),
-            Column::text("scene", "scene", |t: &Time| t.1.clone()),
-            Column::real("time_ratio", "time", "\u{d7} reference", 3, |t: &Time| t.2),
-        ];
-        Table::new(&columns, &times).grouped_by(1)
-    }
-
-    /// As one JSON object, without times.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        serde_json::to_string_pretty(&Document {
-            schema: ACCURACY_SCHEMA,
-            tool: TOOL,
-            config: &self.config,
-            variants: Records {
-                columns: &VariantRow::columns(),
-                rows: &self.variants,
-            },
-            samples: Records {
-                columns: &SampleRow::columns(),
-                rows: &self.samples,
-            },
-        })
-    }
-
-    /// The rows of the report's table of errors: mean and largest of each contribution; `scenes` says
-    /// what they were measured on.
-    #[must_use]
-    pub fn errors(&self, command: &str, scenes: &str) -> Vec<KnownError> {
-        let mut contributions: Vec<_> = VARIANTS.iter().filter_map(|v| v.contribution).collect();
-        contributions.dedup();
-        let mut errors = Vec::new();
-        for (index, (figure, name, unit)) in ERROR_FIGURES.into_iter().enumerate() {
-            for contribution in &contributions {
-                let rows = self.variants.iter();
-                let of = rows.filter(|row| row.variant.contribution == Some(*contribution));
-                let found: Vec<f64> = of
-                    .filter_map(|row| Some(row.measured.errors[index]?.abs()))
-                    .collect();
-                if found.is_empty() {
-                    continue;
-                }
-                let round = |value: f64| (value * 1e3).round() / 1e3;
-                errors.push(KnownError {
-                    figure: figure.to_owned(),
-                    name: name.to_owned(),
-                    contribution: format!("{contribution:?}").to_lowercase(),
-                    mean: round(found.iter().sum::<f64>() / found.len() as f64),
-                    largest: round(found.iter().copied().fold(0.0, f64::max)),
-                    unit: unit.to_owned(),
-                    scenes: scenes.to_owned(),
-                    command: command.to_owned(),
-                });
+    /// The names of its choices, in the order in which they came up.
+    fn names(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = Vec::new();
+        for choice in &self.choices {
+            if !names.contains(&choice.name.as_str()) {
+                names.push(&choice.name);
             }
         }
-        errors
+        names
     }
 
-    /// A chart a study: time against the mean absolute error of external bytes.
+    fn of<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Choice> {
+        self.choices.iter().filter(move |c| c.name == name)
+    }
+
+    /// Mean time of a choice and the mean of its absolute error.
+    fn time_and_error(&self, name: &str) -> Option<(f64, f64)> {
+        let (time, _) = mean_and_largest(self.of(name).filter_map(|c| c.time_ratio))?;
+        let (error, _) = mean_and_largest(self.of(name).filter_map(|c| c.values[0]))?;
+        Some((time, error))
+    }
+
+    /// Time against error; none where no choice has both.
     #[must_use]
-    pub fn charts(&self) -> Vec<(&'static str, ScatterChart)> {
-        let mut studies: Vec<&'static str> = VARIANTS.iter().map(|v| v.study).collect();
-        studies.dedup();
-        studies
-            .into_iter()
-            .map(|study| (study, self.chart(study)))
-            .collect()
-    }
-
-    fn chart(&self, study: &'static str) -> ScatterChart {
-        let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let mut named: Vec<(String, (f64, f64))> = vec![("reference".to_owned(), (1.0, 0.0))];
-        for variant in VARIANTS.iter().filter(|variant| variant.study == study) {
-            let rows = || {
-                self.variants
-                    .iter()
-                    .filter(|row| row.variant.name == variant.name)
-            };
-            let errors = rows()
-                .filter_map(|row| Some(row.measured.errors[0]?.abs()))
-                .collect();
-            let times = rows().map(|row| row.measured.time_ratio).collect();
-            named.push((variant.name.to_owned(), (mean(times), mean(errors))));
+    pub fn chart(&self) -> Option<ScatterChart> {
+        let names = self.names();
+        let mut named: Vec<(&str, (f64, f64))> = Vec::new();
+        // A study may have measured its reference, too.
+        if !names.contains(&self.study.reference) {
+            named.push((self.study.reference, (1.0, 0.0)));
+        }
+        let names = names.into_iter();
+        named.extend(names.filter_map(|name| Some((name, self.time_and_error(name)?))));
+        if named.len() < 2 {
+            return None;
         }
         let at: Vec<(f64, f64)> = named.iter().map(|(_, at)| *at).collect();
         let points = named.into_iter().zip(dominated(&at));
-        ScatterChart {
-            title: format!("{study}: time and error of external bytes"),
-            x: Axis::linear("time, \u{d7} reference"),
-            y: Axis::linear("mean absolute error of external bytes, %"),
+        let error = self.study.figures[0];
+        let unit = if error.unit.is_empty() { "" } else { ", " };
+        Some(ScatterChart {
+            title: self.study.title.to_owned(),
+            x: Axis::linear(&format!("time of {}, \u{d7}", self.study.time)),
+            y: Axis::linear(&format!("{}{unit}{}, mean", error.name, error.unit)),
             kinds: [
                 "no other beats it".to_owned(),
                 "another is as good in both".to_owned(),
@@ -225,54 +131,311 @@ impl AccuracyReport {
             points: points
                 .map(|((name, at), dominated)| NamedPoint {
                     style: SeriesStyle {
-                        name,
+                        name: name.to_owned(),
                         color: theme::INK,
                     },
                     at,
                     dominated,
                 })
                 .collect(),
+        })
+    }
+}
+
+/// What to choose, a row a study.
+struct Advice<'a> {
+    study: &'a Study,
+    /// Mean time; the reference's is 1.
+    time: Option<f64>,
+    /// Mean and largest absolute error; none where it is the reference.
+    error: Option<(f64, f64)>,
+}
+
+/// The JSON object: nothing of it depends on the machine that ran it.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'a str,
+    tool: &'a str,
+    config: &'a RunConfig,
+    studies: Vec<StudyDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct StudyDocument<'a> {
+    key: &'a str,
+    title: &'a str,
+    about: &'a str,
+    reference: &'a str,
+    recommended: &'a str,
+    reason: &'a str,
+    choices: Vec<serde_json::Value>,
+}
+
+impl AccuracyReport {
+    /// What to choose in each study, and what it costs; times only where they are asked for.
+    #[must_use]
+    pub fn advice(&self, times: bool) -> Table {
+        let advice: Vec<Advice<'_>> = (self.studies.iter())
+            .map(|measured| {
+                let study = measured.study;
+                let is_reference = study.recommended == study.reference;
+                let of = || measured.of(study.recommended);
+                let time = mean_and_largest(of().filter_map(|c| c.time_ratio));
+                let error = mean_and_largest(of().filter_map(|c| c.values[0]));
+                Advice {
+                    study,
+                    time: time.map(|t| t.0).or(is_reference.then_some(1.0)),
+                    error: error.or(is_reference.then_some((0.0, 0.0))),
+                }
+            })
+            .collect();
+        let mut columns = vec![
+            Column::text("study", "study", |a: &Advice<'_>| a.study.title),
+            Column::text("recommended", "recommended", |a: &Advice<'_>| {
+                a.study.recommended
+            }),
+        ];
+        if times {
+            columns.push(Column::real(
+                "time_ratio",
+                "time",
+                "\u{d7}",
+                2,
+                |a: &Advice<'_>| a.time,
+            ));
         }
+        columns.extend([
+            Column::text("figure", "error of", |a: &Advice<'_>| {
+                a.study.figures[0].name
+            }),
+            Column::real("mean", "mean", "", 3, |a: &Advice<'_>| a.error.map(|e| e.0)),
+            Column::real("largest", "largest", "", 3, |a: &Advice<'_>| {
+                a.error.map(|e| e.1)
+            }),
+            Column::text("unit", "", |a: &Advice<'_>| a.study.figures[0].unit),
+            Column::text("reason", "because", |a: &Advice<'_>| a.study.reason),
+        ]);
+        Table::new(&columns, &advice)
     }
 
-    /// The page: what was measured, with its charts.
+    /// Every value of every choice, one a line.
+    #[must_use]
+    pub fn choices_csv(&self) -> String {
+        type Line<'a> = (&'a Study, &'a Choice, usize);
+        let lines: Vec<Line<'_>> = (self.studies.iter())
+            .flat_map(|m| m.choices.iter().map(|choice| (m.study, choice)))
+            .flat_map(|(study, choice)| {
+                (0..study.figures.len()).map(move |index| (study, choice, index))
+            })
+            .filter(|(_, choice, index)| choice.values[*index].is_some())
+            .collect();
+        let columns = [
+            Column::text("study", "study", |l: &Line<'_>| l.0.key),
+            Column::text("choice", "choice", |l: &Line<'_>| l.1.name.clone()),
+            Column::text("scene", "scene", |l: &Line<'_>| l.1.scene.clone()),
+            Column::text("figure", "figure", |l: &Line<'_>| l.0.figures[l.2].key),
+            Column::real("value", "value", "", 6, |l: &Line<'_>| l.1.values[l.2]),
+            Column::text("unit", "unit", |l: &Line<'_>| l.0.figures[l.2].unit),
+        ];
+        Table::new(&columns, &lines).csv()
+    }
+
+    /// Times over the reference's, as CSV; they differ from run to run.
+    #[must_use]
+    pub fn times_csv(&self) -> String {
+        type Line<'a> = (&'a Study, &'a Choice);
+        let lines: Vec<Line<'_>> = (self.studies.iter())
+            .flat_map(|m| m.choices.iter().map(|choice| (m.study, choice)))
+            .filter(|(_, choice)| choice.time_ratio.is_some())
+            .collect();
+        let columns = [
+            Column::text("study", "study", |l: &Line<'_>| l.0.key),
+            Column::text("choice", "choice", |l: &Line<'_>| l.1.name.clone()),
+            Column::text("scene", "scene", |l: &Line<'_>| l.1.scene.clone()),
+            Column::real("time_ratio", "time", "\u{d7}", 3, |l: &Line<'_>| {
+                l.1.time_ratio
+            }),
+        ];
+        Table::new(&columns, &lines).csv()
+    }
+
+    /// As one JSON object, without times.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        let study = |measured: &Measured| {
+            let columns = measured.columns(false);
+            let choices = measured.choices.iter();
+            let records = choices.map(|choice| {
+                serde_json::to_value(Record {
+                    columns: &columns,
+                    row: choice,
+                })
+            });
+            Ok(StudyDocument {
+                key: measured.study.key,
+                title: measured.study.title,
+                about: measured.study.about,
+                reference: measured.study.reference,
+                recommended: measured.study.recommended,
+                reason: measured.study.reason,
+                choices: records.collect::<serde_json::Result<_>>()?,
+            })
+        };
+        serde_json::to_string_pretty(&Document {
+            schema: ACCURACY_SCHEMA,
+            tool: TOOL,
+            config: &self.config,
+            studies: (self.studies.iter())
+                .map(study)
+                .collect::<serde_json::Result<_>>()?,
+        })
+    }
+
+    /// The rows of the report's table of errors: mean and largest of each contribution, and the
+    /// scenes that they were measured on; `size` says how large a scene's pictures are.
+    #[must_use]
+    pub fn errors(&self, command: &str, size: &dyn Fn(&str) -> String) -> Vec<KnownError> {
+        let mut errors = Vec::new();
+        for figure in headline_figures() {
+            for contribution in Contribution::ALL {
+                let mut scenes: Vec<String> = Vec::new();
+                let mut values = Vec::new();
+                for measured in &self.studies {
+                    let keys = measured.study.figures.iter();
+                    let Some(index) = keys.into_iter().position(|f| f.key == figure.key) else {
+                        continue;
+                    };
+                    let of = measured.choices.iter();
+                    for choice in of.filter(|c| c.contribution == Some(contribution)) {
+                        let Some(value) = choice.values[index] else {
+                            continue;
+                        };
+                        values.push(value);
+                        let scene = size(&choice.scene);
+                        if !scenes.contains(&scene) {
+                            scenes.push(scene);
+                        }
+                    }
+                }
+                let Some((mean, largest)) = mean_and_largest(values.into_iter()) else {
+                    continue;
+                };
+                let round = |value: f64| (value * 1e4).round() / 1e4;
+                errors.push(KnownError {
+                    figure: figure.key.to_owned(),
+                    name: figure.name.to_owned(),
+                    contribution: contribution.name().to_owned(),
+                    mean: round(mean),
+                    largest: round(largest),
+                    unit: figure.unit.to_owned(),
+                    scenes: scenes.join(", "),
+                    command: command.to_owned(),
+                });
+            }
+        }
+        errors
+    }
+
+    /// The page: what to choose, and a section a study.
     ///
     /// # Errors
     /// A chart that cannot be drawn.
     pub fn page(&self) -> Result<String, PlotError> {
-        let mut charts = Vec::new();
-        for (_, chart) in self.charts() {
-            charts.push((chart.svg()?, String::new()));
+        let mut sections = vec![Section::new(
+            "What to choose",
+            html! {
+                p { "The recommended choice of each study, its time over that of the study's reference, and the error that it brings: mean and largest over the scenes. Times differ from run to run." }
+                // The reasons stand with the studies.
+                @let advice = self.advice(true);
+                @let keys = advice.headings.iter().map(|h| h.key.as_ref()).filter(|key| *key != "reason");
+                (advice.picked(keys).markup())
+            },
+        )];
+        for measured in &self.studies {
+            sections.push(Section::new(measured.study.title, section(measured)?));
         }
-        let sections = [
-            Section::new(
-                "In place of another",
-                html! {
-                    (self.variants().markup())
-                    p.note { "The larger error of Morton order and Z2 STA; relative where the unit is %." }
-                    (html::figures(&charts))
-                },
-            ),
-            Section::new(
-                "Samples",
-                html! {
-                    p { "External bytes estimated from a part, by textbook intervals. An interval lies where it holds the truth less often than 95 % of the time." }
-                    (self.samples().markup())
-                },
-            ),
-            Section::new(
-                "Times",
-                html! {
-                    p { "Over the reference's, or over the whole's; from run to run they differ." }
-                    (self.times().markup())
-                },
-            ),
-        ];
-        let lead = html! { p { "What a quicker way of counting, or another one, costs in accuracy: " (TOOL) ", one thread." } };
+        let lead = html! { p { "What a quicker or another way of counting costs in accuracy (" (TOOL) "), measured one after another on one thread." } };
         Ok(html::page(
             "Parallax: run time against error",
             &lead,
             &sections,
         ))
+    }
+}
+
+fn section(measured: &Measured) -> Result<Markup, PlotError> {
+    let study = measured.study;
+    let mut charts = Vec::new();
+    if let Some(chart) = measured.chart() {
+        charts.push((chart.svg()?, String::new()));
+    }
+    Ok(html! {
+        p { (study.about) }
+        p { "Recommended: " strong { (study.recommended) } ", " (study.reason) "." }
+        (html::figures(&charts))
+        (measured.table().markup())
+        p.note { "Time: " (study.time) "." }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accuracy::STUDIES;
+
+    fn report() -> AccuracyReport {
+        let study = STUDIES.iter().find(|s| s.key == "mode").unwrap();
+        let choice = |scene: &str, time, bytes| Choice {
+            name: "functional".into(),
+            scene: scene.into(),
+            contribution: Some(Contribution::Timing),
+            time_ratio: Some(time),
+            values: vec![Some(bytes), Some(0.1), None, None, None, None],
+        };
+        AccuracyReport {
+            config: RunConfig::default(),
+            studies: vec![Measured {
+                study,
+                choices: vec![choice("a", 0.2, -0.5), choice("b", 0.4, 0.1)],
+            }],
+        }
+    }
+
+    #[test]
+    fn errors_are_means_and_largest_of_absolute_values_with_their_scenes() {
+        let errors = report().errors("replay accuracy", &|scene| format!("{scene} 1x1"));
+        assert_eq!(errors.len(), 2);
+        let bytes = &errors[0];
+        assert_eq!(
+            (bytes.figure.as_str(), bytes.contribution.as_str()),
+            ("external_bytes", "timing")
+        );
+        assert_eq!((bytes.mean, bytes.largest), (0.3, 0.5));
+        assert_eq!(bytes.scenes, "a 1x1, b 1x1");
+    }
+
+    #[test]
+    fn times_are_on_the_page_and_in_their_table_and_not_in_the_results() {
+        let report = report();
+        assert_eq!(report.advice(true).cells()[0][2], "0.30");
+        assert!(report.times_csv().contains("0.2"));
+        assert!(!report.json().unwrap().contains("time_ratio"));
+        assert!(!report.choices_csv().contains("time_ratio"));
+        let page = report.page().unwrap();
+        for text in ["Functional or timed", "0.200", "what to choose"] {
+            assert!(page.to_lowercase().contains(&text.to_lowercase()), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_chart_has_the_reference_and_a_point_a_choice() {
+        let chart = report().studies[0].chart().unwrap();
+        let names: Vec<&str> = chart.points.iter().map(|p| p.style.name.as_str()).collect();
+        assert_eq!(names, ["timed", "functional"]);
+        assert!(
+            (chart.points[1].at.0 - 0.3).abs() < 1e-9 && (chart.points[1].at.1 - 0.3).abs() < 1e-9
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! One replay, and one in both modes.
 
 use super::columns::{Column, Row, Show, Value};
+use super::errors::{self, KnownError, Of};
 use super::figures::figures;
 use super::table::Table;
 use crate::config::{Mode, RunConfig};
@@ -20,6 +21,8 @@ struct Document<'a> {
     trace: &'a TraceId,
     config: &'a RunConfig,
     result: &'a RunResult,
+    /// What is known of the figures' errors; last, since it is not about this trace.
+    errors: Vec<&'static KnownError>,
 }
 
 impl<'a> Document<'a> {
@@ -30,6 +33,7 @@ impl<'a> Document<'a> {
             trace: &row.subject.id,
             config: &row.point.config,
             result: row.result,
+            errors: errors::known(Of::Textures),
         }
     }
 }
@@ -83,7 +87,7 @@ pub fn text(row: &ResultRow) -> String {
     if let Some(tmu) = &result.tmu {
         text += &format!("{} loops of threads that missed\n", tmu.loops);
     }
-    text
+    text + &errors::text(Of::Textures)
 }
 
 type Level<'a> = (&'a str, &'a LevelResult);

@@ -4,10 +4,12 @@ mod charts;
 mod tables;
 
 use crate::paper::sgrt as paper;
+use crate::report::errors::{self, KnownError, Of};
 use crate::report::html::{Section, folded, page as html_page};
 use crate::report::plots::{PlotError, data_uri};
 use crate::sgrt::result::Report;
 use maud::{Markup, html};
+use serde::Serialize;
 
 pub use tables::{csv, rows};
 
@@ -95,6 +97,7 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
             ));
         }
     }
+    out.extend(errors::section(Of::Rays));
     if let Some(entry) = entries.first() {
         let config = toml::to_string(&entry.report.config).unwrap_or_default();
         out.push(Section::new(
@@ -103,6 +106,27 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
         ));
     }
     Ok(out)
+}
+
+/// A report as JSON, with what is known of the figures' errors last.
+///
+/// # Errors
+/// A figure that is not finite.
+pub fn json(report: &Report, pretty: bool) -> serde_json::Result<String> {
+    #[derive(Serialize)]
+    struct Document<'a> {
+        #[serde(flatten)]
+        report: &'a Report,
+        errors: Vec<&'static KnownError>,
+    }
+    let document = Document {
+        report,
+        errors: errors::known(Of::Rays),
+    };
+    match pretty {
+        true => serde_json::to_string_pretty(&document),
+        false => serde_json::to_string(&document),
+    }
 }
 
 /// The tables for a terminal.
@@ -142,7 +166,7 @@ pub fn text(entries: &[Entry]) -> String {
     }
     out.truncate(out.trim_end().len());
     out.push('\n');
-    out
+    out + &errors::text(Of::Rays)
 }
 
 fn performance(entries: &[Entry]) -> Result<Markup, PlotError> {

@@ -15,13 +15,13 @@ use image_error::flip::FlipMap;
 impl LoadedTrace<'_> {
     /// Units' cycles saved against image error, over rules and levels of reuse.
     #[must_use]
-    pub fn curve(&self, rules: &[Rule], config: &SgrtConfig) -> Vec<CurvePoint> {
+    pub fn curve(&self, rules: &[Rule], levels: &[Reuse], config: &SgrtConfig) -> Vec<CurvePoint> {
         let mut points = Vec::new();
         for rule in rules {
             let decisions = decide(&self.frame, &self.arrived, rule);
             let accuracy = count_errors(&self.frame, &decisions);
             let mut last: Option<(Picture, FlipMap)> = None;
-            for reuse in Reuse::ALL {
+            for &reuse in levels {
                 let work = tile_work(&self.frame, &decisions, reuse);
                 // By rates for all points: a point should cost no second pass over the trace.
                 let misses = misses_by_rates(&work, &self.frame, config);
@@ -130,7 +130,7 @@ mod tests {
         let loaded = LoadedTrace::load(&source).expect("loads");
         let config = SgrtConfig::default();
         let rules: Vec<Rule> = vec!["depth=0.02".parse().expect("a rule")];
-        for point in loaded.curve(&rules, &config) {
+        for point in loaded.curve(&rules, &Reuse::ALL, &config) {
             let run = loaded.run(&rules[0], point.reuse, &config).expect("runs");
             assert_eq!(point.flip_mean, run.outcome.flip_mean);
             assert_eq!(point.tni_reduction_pct, run.outcome.tni_reduction_pct);

@@ -5,6 +5,7 @@ pub mod frame;
 pub mod light;
 pub mod material;
 pub mod picture;
+pub mod precision;
 pub mod ray;
 pub mod reference;
 pub mod robustness;

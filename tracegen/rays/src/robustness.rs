@@ -208,10 +208,10 @@ impl Subject {
 }
 
 /// A small generator with a seed.
-struct Random(u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    fn unit(&mut self) -> f32 {
+    pub(crate) fn unit(&mut self) -> f32 {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -219,11 +219,11 @@ impl Random {
         (self.0 >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         (f64::from(self.unit()) * n as f64) as usize % n.max(1)
     }
 
-    fn in_ball(&mut self) -> Vec3 {
+    pub(crate) fn in_ball(&mut self) -> Vec3 {
         loop {
             let p = Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
             if p.length_squared() <= 1.0 {

@@ -3,6 +3,7 @@
 mod cache_args;
 pub mod lens_args;
 mod path_args;
+pub mod precision;
 mod prepared;
 pub mod raster;
 mod raster_auto;
@@ -56,6 +57,8 @@ enum Command {
     Rays(Box<rays::RaysArgs>),
     /// Drive captures to where arithmetic ends and hold them against a reference: numbers of every kind, their errors and bounds.
     Stress(stress::StressArgs),
+    /// Measure what rays cost and get wrong in single and in double precision, near the origin and far from it.
+    Precision(precision::PrecisionArgs),
     #[command(flatten)]
     Documents(Documents),
 }
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
                 Command::Verify(args) => verify::run(&args)?,
                 Command::Rays(args) => rays::run(&args)?,
                 Command::Stress(args) => return stress::run(&args),
+                Command::Precision(args) => precision::run(&args)?,
                 Command::Documents(documents) => return documents.run::<Cli>(),
             }
             Ok(ExitCode::SUCCESS)

@@ -4,6 +4,7 @@ use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::scene_args::{SceneArgs, SceneSetup};
 use super::technique_args::TechniqueArgs;
+use crate::doubtful::Doubtful;
 use crate::picture;
 use crate::study::auto::Budget;
 use crate::study::{memory, processor};
@@ -312,6 +313,12 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let time_s = setup.moments.time_s(views.frame);
         draws.pose(&setup.scene, time_s);
         backend.pose(&draws);
+        if summary.doubtful.is_none() {
+            let doubtful = summary.doubtful.insert(Doubtful::default());
+            for eye in planner.eyes() {
+                doubtful.look(&setup.scene, &draws, &views.eyes[*eye as usize], size_px);
+            }
+        }
         let job = self::job(args, &setup, &draws, &planner, bounds);
         let frame = match first.take() {
             Some(first) => first,
@@ -379,6 +386,11 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     }
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, bounds, setup.scene.origin);
+    }
+    let of_a_frame = summary.counts.fragments / setup.frames.len().max(1) as u64;
+    let doubtful = summary.doubtful.unwrap_or_default();
+    for warning in doubtful.warnings(&setup.scene, of_a_frame) {
+        shell::warn(&warning);
     }
     let views = [setup.frames.len(), planner.eyes().len()];
     note(&texels);
@@ -473,6 +485,8 @@ struct Summary {
     sorting: Duration,
     counts: CaptureCounts,
     predicted: Vec<Predicted>,
+    /// Of the first frame.
+    doubtful: Option<Doubtful>,
     /// What is the same with and without capture.
     compared: Option<&'static str>,
     looking: Duration,

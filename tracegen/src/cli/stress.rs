@@ -16,6 +16,9 @@ pub struct StressArgs {
     /// Sweeps to run, separated by commas [default: all].
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = names())]
     only: Vec<String>,
+    /// Also points that take minutes and gigabytes: 10 million triangles.
+    #[arg(long)]
+    full: bool,
 }
 
 fn names() -> clap::builder::PossibleValuesParser {
@@ -35,7 +38,7 @@ pub fn run(args: &StressArgs) -> anyhow::Result<ExitCode> {
     };
     let progress = Progress::new("stress", count as u64, "sweeps");
     let scratch = args.output.join("scratch");
-    let report = stress::run(&scratch, &args.only, |_| progress.advance(1))?;
+    let report = stress::run(&scratch, &args.only, args.full, |_| progress.advance(1))?;
     drop(progress);
     std::fs::remove_dir_all(&scratch)
         .with_context(|| format!("cannot remove {}", scratch.display()))?;

@@ -25,6 +25,8 @@ pub struct Sweep {
     pub about: &'static str,
     /// Bounds that its points have to keep.
     bounds: Bounds,
+    /// Part of the warning of a point beyond them; none where there should be no such point.
+    warning: Option<&'static str>,
     run: fn(&mut Points<'_>) -> anyhow::Result<()>,
 }
 
@@ -54,7 +56,7 @@ pub struct Error {
 pub enum Outcome {
     /// Captured, within the bounds.
     Within,
-    /// Captured beyond the bounds, with a warning.
+    /// Captured beyond the bounds, with the warning that belongs to them.
     Warned,
     /// Refused with exit code 2.
     Refused,
@@ -64,18 +66,19 @@ pub enum Outcome {
 
 impl Outcome {
     /// Of a run, with the error of its capture where it has one.
-    fn of(ran: &Ran, error: Option<&Error>, bounds: &Bounds) -> Self {
-        match (ran.exit_code, error, &ran.said) {
-            (Some(0), Some(error), said) => {
+    fn of(ran: &Ran, error: Option<&Error>, bounds: &Bounds, warning: Option<&str>) -> Self {
+        match (ran.exit_code, error) {
+            (Some(0), Some(error)) => {
                 let within = error.fragments_pct <= bounds.fragments_pct
                     && error.uv_texels <= bounds.uv_texels;
-                match (within, said) {
+                let warned = warning.is_some_and(|part| ran.said(part).is_some());
+                match (within, warned) {
                     (true, _) => Self::Within,
-                    (false, Some(_)) => Self::Warned,
-                    (false, None) => Self::Broken,
+                    (false, true) => Self::Warned,
+                    (false, false) => Self::Broken,
                 }
             }
-            (Some(2), None, Some(_)) => Self::Refused,
+            (Some(2), None) if ran.said("error:").is_some() => Self::Refused,
             _ => Self::Broken,
         }
     }
@@ -90,14 +93,17 @@ pub struct Point {
     pub outcome: Outcome,
     /// Its error, where there is a capture.
     pub error: Option<Error>,
-    /// What the program said, its first warning or error.
+    /// What the program said: its error, the warning that belongs to the point, or its first one.
     pub said: Option<String>,
 }
 
 /// The points of a sweep as they are made.
 pub struct Points<'a> {
     probe: &'a Probe<'a>,
+    /// Whether points that take minutes are wanted, too.
+    full: bool,
     bounds: Bounds,
+    warning: Option<&'static str>,
     points: Vec<Point>,
 }
 
@@ -112,12 +118,14 @@ impl Points<'_> {
         let ran = self.probe.capture(capture)?;
         let captured = ran.exit_code == Some(0);
         let error = captured.then(|| measure(self.probe)).transpose()?;
-        let outcome = Outcome::of(&ran, error.as_ref(), &self.bounds);
+        let outcome = Outcome::of(&ran, error.as_ref(), &self.bounds, self.warning);
+        let belongs = self.warning.and_then(|part| ran.said(part));
+        let said = ran.said("error:").or(belongs).or(ran.said(""));
         self.points.push(Point {
             at: at.into(),
             outcome,
             error,
-            said: ran.said,
+            said: said.map(str::to_owned),
         });
         Ok(())
     }
@@ -132,13 +140,15 @@ impl Points<'_> {
     }
 }
 
-/// Runs the sweeps of these names (all where there are none); scratch files go into `folder`.
+/// Runs the sweeps of these names (all where there are none), with points that take minutes where
+/// `full`; scratch files go into `folder`.
 ///
 /// # Errors
 /// A folder that cannot be written, a program that cannot be started.
 pub fn run(
     folder: &Path,
     names: &[String],
+    full: bool,
     mut progress: impl FnMut(&Sweep),
 ) -> anyhow::Result<Report> {
     let probe = Probe::new(folder)?;
@@ -148,10 +158,13 @@ pub fn run(
         progress(sweep);
         // What a sweep may replace.
         probe.write("stress.png", shapes::checker([64, 64])?)?;
+        probe.write("holes.png", shapes::holes([64, 64])?)?;
         probe.write("stress.mtl", shapes::MATERIALS)?;
         let mut points = Points {
             probe: &probe,
+            full,
             bounds: sweep.bounds,
+            warning: sweep.warning,
             points: Vec::new(),
         };
         (sweep.run)(&mut points)?;
@@ -176,19 +189,29 @@ mod tests {
             uv_texels,
         };
         let of = |exit_code: Option<i32>, said: &str, error: Option<Error>| {
-            let said = Some(said.to_owned()).filter(|said| !said.is_empty());
-            Outcome::of(&Ran { exit_code, said }, error.as_ref(), &bounds)
+            let ran = Ran {
+                exit_code,
+                said: said.lines().map(str::to_owned).collect(),
+            };
+            Outcome::of(&ran, error.as_ref(), &bounds, Some("too thin"))
         };
         assert_eq!(of(Some(0), "", Some(off(0.1, 0.5))), Outcome::Within);
-        assert_eq!(of(Some(0), "warning", Some(off(0.2, 0.0))), Outcome::Warned);
-        assert_eq!(of(Some(2), "error", None), Outcome::Refused);
+        let both = "warning: a texture is missing\nwarning: triangles are too thin";
+        assert_eq!(of(Some(0), both, Some(off(0.2, 0.0))), Outcome::Warned);
+        assert_eq!(of(Some(2), "error: no", None), Outcome::Refused);
         for broken in [
             of(Some(0), "", Some(off(0.2, 0.0))),
             of(Some(0), "", Some(off(0.0, 0.6))),
             of(Some(0), "", Some(off(0.0, f64::NAN))),
+            // Another warning is none for this.
+            of(
+                Some(0),
+                "warning: a texture is missing",
+                Some(off(0.2, 0.0)),
+            ),
             of(Some(2), "", None),
-            of(Some(101), "error", None),
-            of(None, "error", None),
+            of(Some(101), "error: no", None),
+            of(None, "error: no", None),
         ] {
             assert_eq!(broken, Outcome::Broken);
         }

@@ -2,22 +2,26 @@
 
 use super::Error;
 use super::lanes::{FragmentKey, Lane, lanes};
+use crate::verify::alpha::SampledAlpha;
 use crate::verify::geometry::Geometry;
 use crate::verify::piece::center;
 use crate::verify::reference::render_tile;
+use crate::verify::sampler::SoftwareSampler;
 use anyhow::{Context, anyhow};
+use formats::footprint::LodFormula;
 use formats::textrace::{Textrace, Tile};
 use formats::view::Eye;
 use glam::DVec2;
 use raster::backend::Fragments;
-use raster::draws::{DrawCall, DrawList};
+use raster::draws::{DrawList, DrawMode};
 use scene::{LoadOptions, load_file};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use textures::TextureSet;
 
 /// The views of a trace, left and right.
-type Views = [BTreeMap<FragmentKey, Lane>; 2];
+pub(super) type Views = [BTreeMap<FragmentKey, Lane>; 2];
 
 /// A scene and how it is captured.
 #[derive(Clone, Debug)]
@@ -42,8 +46,18 @@ impl Capture {
 pub(super) struct Ran {
     /// `None` after a signal.
     pub exit_code: Option<i32>,
-    /// Its first warning or error.
-    pub said: Option<String>,
+    /// Its warnings and errors, a line each.
+    pub said: Vec<String>,
+}
+
+impl Ran {
+    /// The first line that has this part.
+    pub fn said(&self, part: &str) -> Option<&str> {
+        self.said
+            .iter()
+            .map(String::as_str)
+            .find(|line| line.contains(part))
+    }
 }
 
 /// Runs captures in a folder.
@@ -85,12 +99,15 @@ impl<'a> Probe<'a> {
             .arg(self.trace())
             .output()?;
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        let said =
-            (text.lines()).find(|line| ["warning:", "error:"].iter().any(|w| line.contains(w)));
+        let folder = format!("{}/", self.folder.display());
+        let said = (text.lines())
+            .filter(|line| ["warning:", "error:"].iter().any(|w| line.contains(w)))
+            .map(|line| line.replace(&folder, ""));
+        let said = said.collect();
         let panicked = text.contains("panicked");
         Ok(Ran {
             exit_code: output.status.code().filter(|_| !panicked),
-            said: said.map(|line| line.replace(&format!("{}/", self.folder.display()), "")),
+            said,
         })
     }
 
@@ -118,6 +135,17 @@ impl<'a> Probe<'a> {
     pub fn against_reference(&self, capture: &Capture) -> anyhow::Result<Error> {
         let scene = load_file(&capture.scene, &LoadOptions::ALL)?.scene;
         let draws = DrawList::new(&scene, 0)?;
+        // Alpha is tested on the texels; where nothing is masked they need not be made.
+        let masked = draws.calls.iter().any(|call| call.mode == DrawMode::Masked);
+        let textures = match masked {
+            true => TextureSet::prepare(&scene, |_| Some(0), None)?,
+            false => TextureSet::default(),
+        };
+        let sampler = SoftwareSampler::new(&textures);
+        let alpha = SampledAlpha {
+            sampler: &sampler,
+            formula: LodFormula::Llvmpipe,
+        };
         let trace = Textrace::open(&self.trace())?;
         let meta = &trace.tables().meta;
         let size_px = meta.hmd.eye_size_px;
@@ -127,12 +155,7 @@ impl<'a> Probe<'a> {
             let geometry = Geometry::new(&scene, &draws, eye, size_px, |_| true);
             let mut expected = Vec::new();
             for tile in 0..(geometry.tiles[0] * geometry.tiles[1]) as usize {
-                let rendered = render_tile(
-                    &geometry,
-                    tile,
-                    &|_: &DrawCall, _| true,
-                    Fragments::DepthTested,
-                );
+                let rendered = render_tile(&geometry, tile, &alpha, Fragments::DepthTested);
                 expected.extend(rendered.iter().map(|fragment| {
                     let piece = geometry.piece(fragment.piece);
                     let group = geometry.groups(piece).first();

@@ -163,9 +163,12 @@ impl Shape {
     }
 }
 
-/// A material library: `checker` repeats `stress.png`, `clamped` does not.
-pub(super) const MATERIALS: &str =
-    "newmtl checker\nmap_Kd stress.png\nnewmtl clamped\nmap_Kd -clamp on stress.png\n";
+/// A material library: `checker` repeats `stress.png`, `clamped` does not; `masked` has the holes of
+/// `holes.png`, `blended` lets half of the light through.
+pub(super) const MATERIALS: &str = "newmtl checker\nmap_Kd stress.png\n\
+                                    newmtl clamped\nmap_Kd -clamp on stress.png\n\
+                                    newmtl masked\nmap_Kd holes.png\nmap_d holes.png\n\
+                                    newmtl blended\nmap_Kd stress.png\nd 0.5\n";
 
 /// A PNG of this size.
 pub(super) fn checker(size: [u32; 2]) -> anyhow::Result<Vec<u8>> {
@@ -177,6 +180,19 @@ pub(super) fn checker(size: [u32; 2]) -> anyhow::Result<Vec<u8>> {
         }])
     };
     let picture = image::GrayImage::from_fn(size[0], size[1], texel);
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut png, image::ImageFormat::Png)?;
+    Ok(png.into_inner())
+}
+
+/// A PNG of this size with round holes.
+pub(super) fn holes(size: [u32; 2]) -> anyhow::Result<Vec<u8>> {
+    let texel = |x: u32, y: u32| {
+        let off = |v: u32| f64::from(v % 16) - 7.5;
+        let solid = off(x).hypot(off(y)) > 5.0;
+        image::Rgba([200, 120, 60, if solid { 255 } else { 0 }])
+    };
+    let picture = image::RgbaImage::from_fn(size[0], size[1], texel);
     let mut png = std::io::Cursor::new(Vec::new());
     picture.write_to(&mut png, image::ImageFormat::Png)?;
     Ok(png.into_inner())

@@ -245,18 +245,20 @@ impl Coordinates<'_> {
     }
 
     /// Coordinates at a pixel with the differences in its quad that drivers take for derivatives: those
-    /// of the left column and of the top row, or of the bottom row in softpipe.
+    /// of the left column and of the top row, or of the bottom row in softpipe, or a lane's own.
     #[must_use]
     pub fn in_quad(&self, pixel: [u32; 2], formula: LodFormula) -> Sampled {
         let quad = quad_center(pixel);
-        let row = match formula {
-            LodFormula::Softpipe => quad + DVec2::Y,
-            LodFormula::Llvmpipe | LodFormula::Exact => quad,
+        let lane = center(pixel) - quad;
+        let (row, column) = match formula {
+            LodFormula::Softpipe => (quad + DVec2::Y, quad),
+            LodFormula::Llvmpipe | LodFormula::Exact => (quad, quad),
+            LodFormula::PerLane => (quad + DVec2::Y * lane.y, quad + DVec2::X * lane.x),
         };
         Sampled {
             uv: self.at(center(pixel)),
             dx: self.at(row + DVec2::X) - self.at(row),
-            dy: self.at(quad + DVec2::Y) - self.at(quad),
+            dy: self.at(column + DVec2::Y) - self.at(column),
         }
     }
 

@@ -17,7 +17,7 @@ pub fn level_of_detail(at: &Sampled, texture: &Texture, formula: LodFormula) -> 
     let (dx, dy) = (at.dx * size(texture), at.dy * size(texture));
     let longest = dx.length_squared().max(dy.length_squared());
     match formula {
-        LodFormula::Exact => 0.5 * longest.log2(),
+        LodFormula::Exact | LodFormula::PerLane => 0.5 * longest.log2(),
         LodFormula::Llvmpipe => {
             // The logarithm as a chord between powers of two.
             let exponent = longest.log2().floor().clamp(-127.0, 127.0);

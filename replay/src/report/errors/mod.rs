@@ -1,8 +1,11 @@
 //! How far headline figures are from the truth, as `replay accuracy` has measured it on the scenes
 //! that the table names. What nobody has measured is not in the table.
 
-use super::columns::{Column, Row};
+use super::columns::Column;
+use super::html::Section;
 use super::table::Table;
+use crate::accuracy::{Contribution, REUSE};
+use maud::html;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
@@ -13,7 +16,7 @@ pub struct KnownError {
     pub figure: String,
     /// Its name.
     pub name: String,
-    /// What the error comes from: `timing`, `lod`, `calibration`, `model`.
+    /// What the error comes from: `capture`, `lod`, `timing`, `calibration`, `model`.
     pub contribution: String,
     /// Mean absolute error.
     pub mean: f64,
@@ -35,53 +38,132 @@ fn parse(text: &str) -> Vec<KnownError> {
     lines.deserialize().filter_map(Result::ok).collect()
 }
 
-/// All that was measured.
-#[must_use]
-pub fn known() -> &'static [KnownError] {
-    &ERRORS
+/// What figures are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// A texture trace.
+    Textures,
+    /// A ray trace.
+    Rays,
 }
 
-impl Row for KnownError {
-    #[rustfmt::skip]
-    fn columns() -> Vec<Column<'static, Self>> {
-        vec![
-            Column::text("name", "figure", |e: &Self| e.name.clone()),
-            Column::text("contribution", "error from", |e: &Self| e.contribution.clone()),
-            Column::real("mean", "mean", "absolute", 2, |e: &Self| e.mean),
-            Column::real("largest", "largest", "absolute", 2, |e: &Self| e.largest),
-            Column::text("unit", "", |e: &Self| e.unit.clone()),
-        ]
+/// What was measured of these figures.
+#[must_use]
+pub fn known(of: Of) -> Vec<&'static KnownError> {
+    let rays = |error: &&KnownError| error.figure == REUSE.key;
+    let wanted = ERRORS
+        .iter()
+        .filter(|error| rays(error) == (of == Of::Rays));
+    wanted.collect()
+}
+
+/// A figure with what is known of its error.
+struct Figure {
+    first: &'static KnownError,
+    /// By [`Contribution::ALL`].
+    errors: [Option<&'static KnownError>; 5],
+}
+
+/// The figures that anything is known of, in the table's order.
+fn by_figure(of: Of) -> Vec<Figure> {
+    let mut figures: Vec<Figure> = Vec::new();
+    for error in known(of) {
+        if !figures.iter().any(|f| f.first.figure == error.figure) {
+            figures.push(Figure {
+                first: error,
+                errors: [None; 5],
+            });
+        }
+        let mut contributions = Contribution::ALL.iter();
+        let at = contributions.position(|c| c.name() == error.contribution);
+        let figure = figures.iter_mut().find(|f| f.first.figure == error.figure);
+        if let Some((figure, at)) = figure.zip(at) {
+            figure.errors[at] = Some(error);
+        }
     }
+    figures
 }
 
-/// The table for a terminal and for the page.
+/// The table for a terminal and for the page: a row a figure, the largest error of each source.
 #[must_use]
-pub fn table() -> Table {
-    Table::new(&KnownError::columns(), known()).grouped_by(1)
+pub fn table(of: Of) -> Table {
+    let mut columns = vec![
+        Column::text("name", "largest error of", |f: &Figure| {
+            f.first.name.clone()
+        }),
+        Column::text("unit", "", |f: &Figure| f.first.unit.clone()),
+    ];
+    for (index, contribution) in Contribution::ALL.into_iter().enumerate() {
+        let (key, name) = (contribution.name(), contribution.title());
+        let largest = move |f: &Figure| Some(f.errors[index]?.largest);
+        columns.push(Column::real(key, name, "", 3, largest));
+    }
+    Table::new(&columns, &by_figure(of)).without_empty_columns()
+}
+
+/// The table under its heading, for a terminal; empty where nothing was measured.
+#[must_use]
+pub fn text(of: Of) -> String {
+    source(of).map_or_else(String::new, |source| {
+        format!("\nHow far figures are off ({source})\n{}", table(of).text())
+    })
+}
+
+/// The table as a section of a page; none where nothing was measured.
+#[must_use]
+pub fn section(of: Of) -> Option<Section> {
+    let source = source(of)?;
+    Some(Section::new(
+        "How far the figures are off",
+        html! {
+            p { "The largest error of each figure by its source, measured by " (source) "; on other scenes it may be another. What is empty was not measured." }
+            (table(of).markup())
+        },
+    ))
 }
 
 /// How and on what the errors were measured; none where nothing was.
-#[must_use]
-pub fn source() -> Option<String> {
-    let first = known().first()?;
-    Some(format!("{} on {}", first.command, first.scenes))
+fn source(of: Of) -> Option<String> {
+    let known = known(of);
+    let command = &known.first()?.command;
+    let mut scenes: Vec<&str> = Vec::new();
+    for scene in known.iter().flat_map(|e| e.scenes.split(", ")) {
+        if !scenes.contains(&scene) {
+            scenes.push(scene);
+        }
+    }
+    Some(format!("{command} on {}", scenes.join(", ")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accuracy::ERROR_FIGURES;
+    use crate::accuracy::headline_figures;
+    use crate::report::columns::Value;
 
     #[test]
     fn every_line_reads_and_names_a_figure_its_source_and_a_unit() {
         let lines = include_str!("measured.csv").lines().count();
-        assert_eq!(known().len(), lines - 1);
-        for error in known() {
-            let figure = ERROR_FIGURES.iter().find(|figure| figure.0 == error.figure);
-            let (_, name, unit) = figure.expect("a headline figure");
-            assert_eq!((*name, *unit), (error.name.as_str(), error.unit.as_str()));
+        assert_eq!(ERRORS.len(), lines - 1);
+        for error in ERRORS.iter() {
+            let figure = headline_figures().find(|figure| figure.key == error.figure);
+            let figure = figure.expect("a headline figure");
+            let found = (error.name.as_str(), error.unit.as_str());
+            assert_eq!((figure.name, figure.unit), found);
+            let mut contributions = Contribution::ALL.iter().map(|c| c.name());
+            assert!(contributions.any(|name| name == error.contribution));
             assert!(error.command.starts_with("replay "), "{error:?}");
             assert!(!error.scenes.is_empty() && error.mean <= error.largest);
         }
+    }
+
+    #[test]
+    fn every_headline_figure_has_an_error_of_its_own_and_the_table_all_of_them() {
+        let tables = [Of::Textures, Of::Rays].map(table);
+        let rows = || tables.iter().flat_map(|table| &table.rows);
+        assert_eq!(rows().count(), headline_figures().count());
+        let cells = rows().flat_map(|row| &row[2..]);
+        let filled = cells.filter(|cell| **cell != Value::None);
+        assert_eq!(filled.count(), ERRORS.len());
     }
 }

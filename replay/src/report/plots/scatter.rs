@@ -99,14 +99,14 @@ impl ScatterChart {
             let corner = |pair: &[(f64, f64)]| [pair[0], (pair[1].0, pair[0].1)];
             let mut steps: Vec<(f64, f64)> = front.windows(2).flat_map(corner).collect();
             steps.extend(front.last());
-            let line = PathElement::new(steps, theme::AXIS.stroke_width(1));
+            let line = PathElement::new(steps.clone(), theme::AXIS.stroke_width(1));
             chart.plotting_area().draw(&line)?;
-            let dots: Vec<(f64, f64)> = self
-                .points
-                .iter()
-                .map(|p| chart.backend_coord(&p.at))
-                .map(|(x, y)| (f64::from(x), f64::from(y)))
-                .collect();
+            let in_px = |at: &(f64, f64)| {
+                let (x, y) = chart.backend_coord(at);
+                (f64::from(x), f64::from(y))
+            };
+            let steps: Vec<(f64, f64)> = steps.iter().map(in_px).collect();
+            let dots: Vec<(f64, f64)> = self.points.iter().map(|p| in_px(&p.at)).collect();
             let widths: Vec<f64> = self
                 .points
                 .iter()
@@ -119,7 +119,7 @@ impl ScatterChart {
                 bottom: f64::from(TOP_PX) + PLOT_PX.1 - 2.0,
             };
             // Leaders lie under dots and names.
-            let names = place(&dots, &widths, room);
+            let names = place(&dots, &widths, &steps, room);
             for (dot, name) in dots.iter().zip(&names) {
                 let to = name.nearest(*dot);
                 if distance(*dot, to) > NEAR_PX {
@@ -206,8 +206,8 @@ fn cross(a: [(f64, f64); 2], b: [(f64, f64); 2]) -> bool {
 }
 
 /// A rectangle for the name of each dot: of the places around it, the nearest one that covers
-/// nothing placed before, no dot, and whose line to the dot crosses none.
-fn place(dots: &[(f64, f64)], widths: &[f64], room: Rect) -> Vec<Rect> {
+/// nothing placed before, no dot and none of the front's `steps`, and whose line to the dot crosses none.
+fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) -> Vec<Rect> {
     let mut placed: Vec<Rect> = Vec::new();
     let mut leaders: Vec<[(f64, f64); 2]> = Vec::new();
     for (index, (&dot, &width)) in dots.iter().zip(widths).enumerate() {
@@ -217,6 +217,20 @@ fn place(dots: &[(f64, f64)], widths: &[f64], room: Rect) -> Vec<Rect> {
                 .iter()
                 .map(|dot| place.overlap(&Rect::around(*dot, f64::from(DOT_PX) + 1.0)))
                 .sum();
+            // A step is upright or level: a narrow rectangle.
+            let on_steps = steps.windows(2).filter(|ends| {
+                let between = |a: f64, b: f64| (a.min(b) - 1.0, a.max(b) + 1.0);
+                let ((left, right), (top, bottom)) =
+                    (between(ends[0].0, ends[1].0), between(ends[0].1, ends[1].1));
+                let step = Rect {
+                    left,
+                    top,
+                    right,
+                    bottom,
+                };
+                place.overlap(&step) > 0.0
+            });
+            let on_steps = 25.0 * on_steps.count() as f64;
             let leader = [dot, place.nearest(dot)];
             let away = distance(leader[0], leader[1]);
             let crossed = leaders
@@ -245,7 +259,11 @@ fn place(dots: &[(f64, f64)], widths: &[f64], room: Rect) -> Vec<Rect> {
             };
             // Beside a dot, its own height reads best.
             let aside = (f64::midpoint(place.top, place.bottom) - dot.1).abs();
-            away + aside + 40.0 * (names + marks) + 30.0 * crossed as f64 + 30.0 * through as f64
+            away + aside
+                + on_steps
+                + 40.0 * (names + marks)
+                + 30.0 * crossed as f64
+                + 30.0 * through as f64
         };
         let mut best: Option<(f64, Rect)> = None;
         let mut radius = f64::from(DOT_PX) + 4.0;
@@ -309,7 +327,7 @@ mod tests {
             .map(|i| (300.0 + 9.0 * f64::from(i), 390.0))
             .collect();
         let widths = [90.0; 10];
-        let names = place(&dots, &widths, ROOM);
+        let names = place(&dots, &widths, &[], ROOM);
         for (i, name) in names.iter().enumerate() {
             assert!(ROOM.contains(name), "{name:?}");
             for other in &names[..i] {
@@ -327,13 +345,24 @@ mod tests {
 
     #[test]
     fn a_point_alone_has_its_name_right_beside_it() {
-        let names = place(&[(100.0, 100.0)], &[50.0], ROOM);
+        let names = place(&[(100.0, 100.0)], &[50.0], &[], ROOM);
         assert!(
             names[0].left > 104.0 && names[0].left < 112.0,
             "{:?}",
             names[0]
         );
         assert!((f64::midpoint(names[0].top, names[0].bottom) - 100.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn a_name_keeps_off_the_line_that_leaves_its_point() {
+        let steps = [(100.0, 100.0), (300.0, 100.0)];
+        let names = place(&[(100.0, 100.0)], &[50.0], &steps, ROOM);
+        let name = names[0];
+        assert!(
+            name.bottom < 100.0 || name.top > 100.0 || name.right < 100.0,
+            "{name:?}"
+        );
     }
 
     #[test]

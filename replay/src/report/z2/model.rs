@@ -4,7 +4,7 @@ use crate::config::{Order, RunConfig};
 use crate::experiment::{Outcome, ResultRow, Subject, frame_count};
 use crate::paper::z2::{self, PublishedRow};
 use crate::report::columns::{Column, Records, Row, Value};
-use crate::report::errors::{self, KnownError};
+use crate::report::errors::{self, KnownError, Of};
 use crate::report::figures::{Figure, number};
 use crate::report::table::Table;
 use crate::result::{Part, TOOL, TileMap, TraceId};
@@ -268,7 +268,7 @@ impl<'a> PaperReport<'a> {
             },
             closed_form: self.closed_form,
             conservation: &self.conservation,
-            errors: errors::known(),
+            errors: errors::known(Of::Textures),
             details: details.map(Detail::new).collect(),
         })
     }
@@ -286,7 +286,7 @@ struct Document<'a, 'r> {
     closed_form: Deviation,
     conservation: &'a [Conservation],
     /// What is known of the figures' errors.
-    errors: &'a [KnownError],
+    errors: Vec<&'static KnownError>,
     details: Vec<Detail<'a>>,
 }
 

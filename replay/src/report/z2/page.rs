@@ -4,7 +4,7 @@ use super::model::{PaperReport, TraceInfo};
 use super::plots::{self, TileMeasure};
 use super::tables;
 use crate::config::{Mode, Order};
-use crate::report::errors;
+use crate::report::errors::{self, Of};
 use crate::report::html::{self, Section, figures, folded};
 use crate::report::picture::EmbeddedPicture;
 use crate::report::plots::PlotError;
@@ -61,12 +61,7 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
     sections.push(Section::new("Heat maps by tile", heat_maps(report)?));
     sections.push(Section::new("By mip level", levels(report)?));
     sections.push(Section::new("By texture", textures(report)?));
-    if let Some(source) = errors::source() {
-        sections.push(Section::new(
-            "How far the figures are off",
-            html! { p { "Measured by " (source) "; what is not listed was not measured." } (errors::table().markup()) },
-        ));
-    }
+    sections.extend(errors::section(Of::Textures));
     sections.push(Section::new("Configuration", configuration(report)));
     let lead = html! {
         p {

@@ -103,6 +103,16 @@ impl Rule {
         self.0.iter().filter_map(test).collect()
     }
 
+    /// With every share times a factor.
+    #[must_use]
+    pub fn scaled(&self, factor: f32) -> Self {
+        let scaled = |part: &Part| Part {
+            share: part.share * factor,
+            ..*part
+        };
+        Self(self.0.iter().map(scaled).collect())
+    }
+
     /// Neighbours whose triangles are intersected beside the candidate's; `None` for no re-test.
     #[must_use]
     pub fn retests(&self) -> Option<&'static [Offset]> {

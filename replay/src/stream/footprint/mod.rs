@@ -14,7 +14,7 @@ pub use bundle::Bundle;
 use super::StreamError;
 use crate::config::{RunConfig, SamplingConfig};
 use axis::Axis;
-use formats::footprint::{LodFormula, Reach, fast_log2, quad_lod, select_levels};
+use formats::footprint::{LodFormula, Reach, fast_log2, lane_lod, quad_lod, select_levels};
 use formats::textrace::{QuadRecord, Tables};
 use formats::texture::{Filter, Sampler};
 use std::sync::Arc;
@@ -121,7 +121,7 @@ impl Footprints {
         mut emit: impl FnMut(SampleRef, &Bundle),
     ) {
         let groups = &self.draws[draw as usize];
-        if self.sampling.max_anisotropy > 1 {
+        if self.sampling.max_anisotropy > 1 || self.sampling.lod == LodFormula::PerLane {
             self.for_long_quad(groups, records, scratch, &mut emit);
             return;
         }
@@ -144,7 +144,8 @@ impl Footprints {
         }
     }
 
-    /// [`Self::for_quad`] where pixels may be long and narrow.
+    /// [`Self::for_quad`] where a level may have any number of bundles: pixels may be long and narrow, or
+    /// each lane has levels of its own.
     #[inline(never)]
     fn for_long_quad(
         &self,
@@ -186,6 +187,9 @@ impl Footprints {
             &kind.sampler,
             &self.sampling,
         ) {
+            Reach::Isotropic if self.sampling.lod == LodFormula::PerLane => {
+                self.by_lane(kind, record, lanes, &uv, out);
+            }
             Reach::Isotropic => {
                 let mut bundles = [Bundle::default(); 2];
                 let both = self.bundles(kind, record, &mut bundles);
@@ -224,6 +228,56 @@ impl Footprints {
                     bundle.push([line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)]);
                 }
             }
+        }
+    }
+
+    /// Footprints of a record in one kind of texture where each lane has levels of its own: level by
+    /// level, the lanes that read it.
+    fn by_lane(
+        &self,
+        kind: &Kind,
+        record: &QuadRecord,
+        lanes: u8,
+        uv: &[[i32; 2]; 4],
+        out: &mut Vec<Bundle>,
+    ) {
+        let levels = kind.levels.len() as u32;
+        let chosen = [0, 1, 2, 3].map(|lane| {
+            let lod = lane_lod(record, lane, kind.extent, kind.size) + self.sampling.lod_bias;
+            select_levels(lod, &kind.sampler, levels)
+        });
+        for level in 0..levels {
+            // Lanes in a row that filter alike share a bundle.
+            let mut open: Option<(Filter, u8)> = None;
+            for lane in lanes_of(lanes) {
+                let of = chosen[lane];
+                if !(of.first..of.first + of.count).contains(&level) {
+                    continue;
+                }
+                open = match open {
+                    Some((filter, mask)) if filter == of.filter => Some((filter, mask | 1 << lane)),
+                    before => {
+                        self.push(kind, level, before, uv, out);
+                        Some((of.filter, 1 << lane))
+                    }
+                };
+            }
+            self.push(kind, level, open, uv, out);
+        }
+    }
+
+    fn push(
+        &self,
+        kind: &Kind,
+        level: u32,
+        lanes: Option<(Filter, u8)>,
+        uv: &[[i32; 2]; 4],
+        out: &mut Vec<Bundle>,
+    ) {
+        if let Some((filter, mask)) = lanes {
+            let mut bundle = Bundle::default();
+            self.fill(kind, level, filter, mask, uv, &mut bundle);
+            out.push(bundle);
         }
     }
 

@@ -123,6 +123,7 @@ fn config() -> impl Strategy<Value = RunConfig> {
             LodFormula::Llvmpipe,
             LodFormula::Softpipe,
             LodFormula::Exact,
+            LodFormula::PerLane,
         ]),
         any::<bool>(),
         prop::sample::select(vec![1, 1, 2, 5, 16]),

@@ -11,6 +11,7 @@ pub(super) const SWEEP: Sweep = Sweep {
         fragments_pct: 0.2,
         uv_texels: 0.05,
     },
+    warning: None,
     run,
 };
 

@@ -3,11 +3,13 @@
 mod eyes;
 mod fields;
 mod grazing;
+mod mirrored;
 mod planes;
 mod scale;
 mod slivers;
 mod textures;
 mod translation;
+mod transparency;
 mod triangle_counts;
 mod triangles;
 mod uv_offsets;
@@ -16,7 +18,7 @@ mod viewports;
 use super::Sweep;
 
 /// Every sweep, in the order in which they run.
-pub const SWEEPS: [Sweep; 12] = [
+pub const SWEEPS: [Sweep; 14] = [
     translation::SWEEP,
     scale::SWEEP,
     planes::SWEEP,
@@ -27,6 +29,8 @@ pub const SWEEPS: [Sweep; 12] = [
     triangles::SWEEP,
     slivers::SWEEP,
     grazing::SWEEP,
+    transparency::SWEEP,
+    mirrored::SWEEP,
     triangle_counts::SWEEP,
     viewports::SWEEP,
 ];

@@ -11,6 +11,7 @@ pub(super) const SWEEP: Sweep = Sweep {
         fragments_pct: 0.1,
         uv_texels: 0.01,
     },
+    warning: None,
     run,
 };
 

@@ -6,17 +6,18 @@ use super::super::{Bounds, Points, Sweep};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "slivers",
-    about: "Rows of triangles of 0.3 and 0.03 pixels high, against the reference. All of their fragments lie at edges, where a vertex that rounds to the next \
-            of 1/256 of a pixel decides; those thinner than that are drawn or not as their rounding falls, and not looked at.",
+    about: "Rows of triangles of 0.3, 0.03 and 0.003 pixels high, against the reference. All of their fragments lie at edges, where a vertex that rounds to the next \
+            of 1/256 of a pixel decides, and moves coordinates that run through a whole texture within the height; those thinner than that are drawn or not as their rounding falls.",
     bounds: Bounds {
         fragments_pct: 10.0,
-        uv_texels: 0.05,
+        uv_texels: 0.1,
     },
+    warning: Some("thinner than 1/256 pixel"),
     run,
 };
 
 fn run(points: &mut Points<'_>) -> anyhow::Result<()> {
-    for rows in [100, 1000] {
+    for rows in [100, 1000, 10_000] {
         let mut slivers = Shape::default();
         for row in 0..rows {
             let y = 2.0 * f64::from(row) / f64::from(rows) - 1.0;

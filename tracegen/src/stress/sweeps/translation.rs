@@ -12,6 +12,7 @@ pub(super) const SWEEP: Sweep = Sweep {
         fragments_pct: 0.0,
         uv_texels: 0.0,
     },
+    warning: None,
     run,
 };
 

@@ -6,11 +6,12 @@ use super::super::{Bounds, Points, Sweep};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "triangles",
-    about: "Degenerate and huge triangles, exact duplicates (the first one wins), one plane close before another, NaN and infinity, against the reference. Planes less than a few steps of 32-bit depth apart (z^2 / near / 2^24, here 10^-5 m), and duplicates that are wound the other way, are told apart by no renderer and not looked at.",
+    about: "Degenerate and huge triangles, exact duplicates (the first one wins), one plane close before another, NaN and infinity, against the reference. Planes less than a few steps of 32-bit depth apart (z^2 / near / 2^24, here 10^-5 m), and duplicates that are wound the other way, are told apart by no renderer.",
     bounds: Bounds {
         fragments_pct: 0.2,
         uv_texels: 0.05,
     },
+    warning: Some("lie upon others"),
     run,
 };
 
@@ -30,6 +31,14 @@ fn run(points: &mut Points<'_>) -> anyhow::Result<()> {
             .extend(triangles.map(|t| t.map(|v| v + first)));
         shape
     };
+    let wound_back = || {
+        let mut shape = twice(0.0);
+        let half = shape.triangles.len() / 2;
+        shape.triangles[half..]
+            .iter_mut()
+            .for_each(|t| t.swap(1, 2));
+        shape
+    };
     let with = |value: f64| {
         let mut shape = Shape::square(2);
         shape.positions[4][0] = value;
@@ -43,6 +52,9 @@ fn run(points: &mut Points<'_>) -> anyhow::Result<()> {
         ("10^9 m", huge(1e9)),
         ("10^18 m", huge(1e18)),
         ("exact duplicates", twice(0.0)),
+        ("duplicates wound the other way", wound_back()),
+        ("a plane 10^-6 m before another", twice(1e-6)),
+        ("a plane 10^-5 m before another", twice(1e-5)),
         ("a plane 10^-3 m before another", twice(1e-3)),
         ("a plane 10^-4 m before another", twice(1e-4)),
         ("NaN", with(f64::NAN)),

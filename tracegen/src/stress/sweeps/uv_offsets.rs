@@ -11,6 +11,7 @@ pub(super) const SWEEP: Sweep = Sweep {
         fragments_pct: 0.05,
         uv_texels: 0.25,
     },
+    warning: Some("texture coordinates of"),
     run,
 };
 

@@ -1,0 +1,78 @@
+//! Utilisation by a formula in place of a cycle model.
+
+use super::inputs::{Inputs, time_ratio};
+use super::study::{Choice, Figure, Study, StudyError, figure};
+use crate::config::{Mode, RunConfig};
+use crate::result::RunResult;
+use crate::tmu::closed_form;
+
+const FIGURES: [Figure; 1] = [figure("tmu_util_pct", "TMU utilisation", "points")];
+
+pub const CLOSED_FORM: Study = Study {
+    key: "closed-form",
+    title: "Closed form for a cycle model",
+    about: "Utilisation by the surface through the paper's table, at the rates of first look-ups, as the paper counts, and at those of a functional replay. Errors are against the first-miss model.",
+    time: "replay, over the first-miss model's",
+    reference: "first-miss model",
+    recommended: "first-miss model",
+    reason: "the formula needs the model's own rates to come close, and with those it spares no time; at other rates it is off by more than orders differ",
+    figures: &FIGURES,
+    measure: forms,
+};
+
+fn forms(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
+    let mut choices = Vec::new();
+    for subject in inputs.stills() {
+        let of = |mode| {
+            let mut config = RunConfig {
+                mode,
+                ..inputs.config
+            };
+            if mode == Mode::FirstMiss {
+                config.tmu.loop_cycles = 24;
+            }
+            inputs.replays.of(subject, config)
+        };
+        let (model, functional) = (of(Mode::FirstMiss)?, of(Mode::Functional)?);
+        let first = |r: &RunResult| r.first_lookups.map(|f| (f.l1_miss_rate, f.l2_miss_rate));
+        let all = |r: &RunResult| Some((r.l1.miss_rate, r.l2.miss_rate));
+        for (name, rates, from) in [
+            ("at first look-ups", first as fn(&RunResult) -> _, &model),
+            ("at functional rates", all, &functional),
+        ] {
+            let points = |(ours, theirs): (&RunResult, &RunResult)| {
+                let (l1, l2) = rates(ours)?;
+                Some(100.0 * (closed_form(l1, l2) - theirs.tmu.as_ref()?.utilization))
+            };
+            let found = from.results.iter().zip(&model.results).filter_map(points);
+            choices.push(Choice {
+                name: name.to_owned(),
+                scene: subject.label.clone(),
+                contribution: None,
+                time_ratio: Some(time_ratio(from.time, model.time)),
+                values: vec![found.max_by(|a, b| a.abs().total_cmp(&b.abs()))],
+            });
+        }
+    }
+    Ok(choices)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{inputs, small_trace};
+    use super::*;
+
+    #[test]
+    fn the_form_is_nearer_at_the_rates_that_it_was_made_for() {
+        let trace = small_trace();
+        let choices = forms(&inputs(&trace)).unwrap();
+        let [first, functional] = &choices[..] else {
+            panic!("{choices:?}");
+        };
+        let error = |choice: &Choice| choice.values[0].unwrap().abs();
+        assert!(
+            error(first) > 0.0 && error(first) < error(functional),
+            "{choices:?}"
+        );
+    }
+}

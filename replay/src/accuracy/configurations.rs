@@ -1,0 +1,210 @@
+//! Configurations of the replay that stand for another one. A choice is a line here.
+
+use super::headline::TEXTURE_FIGURES;
+use super::inputs::{Inputs, time_ratio};
+use super::study::{Choice, Contribution, Study, StudyError};
+use crate::config::{LodFormula, Mode, RunConfig};
+
+/// A configuration under its name.
+struct Variant {
+    name: &'static str,
+    contribution: Option<Contribution>,
+    config: fn(RunConfig) -> RunConfig,
+}
+
+const fn variant(
+    name: &'static str,
+    contribution: Option<Contribution>,
+    config: fn(RunConfig) -> RunConfig,
+) -> Variant {
+    Variant {
+        name,
+        contribution,
+        config,
+    }
+}
+
+/// Replays every still trace as the reference and as each variant.
+fn measured(
+    inputs: &Inputs<'_>,
+    reference: fn(RunConfig) -> RunConfig,
+    variants: &[Variant],
+) -> Result<Vec<Choice>, StudyError> {
+    let mut choices = Vec::new();
+    for subject in inputs.stills() {
+        let expected = inputs.replays.of(subject, reference(inputs.config))?;
+        for variant in variants {
+            let found = inputs
+                .replays
+                .of(subject, (variant.config)(inputs.config))?;
+            choices.push(Choice {
+                name: variant.name.to_owned(),
+                scene: subject.label.clone(),
+                contribution: variant.contribution,
+                time_ratio: Some(time_ratio(found.time, expected.time)),
+                values: found.errors(&expected),
+            });
+        }
+    }
+    Ok(choices)
+}
+
+fn timed(config: RunConfig) -> RunConfig {
+    RunConfig {
+        mode: Mode::Timed,
+        ..config
+    }
+}
+
+fn functional(config: RunConfig) -> RunConfig {
+    RunConfig {
+        mode: Mode::Functional,
+        ..config
+    }
+}
+
+fn lod(config: RunConfig, formula: LodFormula) -> RunConfig {
+    let mut config = functional(config);
+    config.sampling.lod = formula;
+    config
+}
+
+fn looping(config: RunConfig, mode: Mode, cycles: u32) -> RunConfig {
+    let mut config = RunConfig { mode, ..config };
+    config.tmu.loop_cycles = cycles;
+    config
+}
+
+const REPLAY_TIME: &str = "replay, over the reference's";
+
+pub const MODE: Study = Study {
+    key: "mode",
+    title: "Functional or timed",
+    about: "Caches without latencies in place of the cycle model. Errors are against the timed replay.",
+    time: REPLAY_TIME,
+    reference: "timed",
+    recommended: "timed",
+    reason: "functional replay is quicker and gives bytes, rates and savings within a per cent, but for scenes that thrash the caches (foliage), where requests that are merged in flight count",
+    figures: &TEXTURE_FIGURES,
+    measure: |inputs| {
+        let variants = [variant(
+            "functional",
+            Some(Contribution::Timing),
+            functional,
+        )];
+        measured(inputs, timed, &variants)
+    },
+};
+
+pub const LOD: Study = Study {
+    key: "lod",
+    title: "Level of detail",
+    about: "How levels follow from derivatives, functional mode. Errors are against the exact logarithm of each lane's own derivatives.",
+    time: REPLAY_TIME,
+    reference: "exact logarithm, per lane",
+    recommended: "fast logarithm, per quad",
+    reason: "what hardware of this kind and the capturing driver do: the logarithm costs nothing, and a level a quad moves fewer bytes than timing does",
+    figures: &TEXTURE_FIGURES,
+    measure: |inputs| {
+        let variants = [
+            variant("fast logarithm, per quad", Some(Contribution::Lod), |c| {
+                lod(c, LodFormula::Llvmpipe)
+            }),
+            variant("exact logarithm, per quad", None, |c| {
+                lod(c, LodFormula::Exact)
+            }),
+            variant("larger axis, per quad", None, |c| {
+                lod(c, LodFormula::Softpipe)
+            }),
+        ];
+        measured(inputs, |c| lod(c, LodFormula::PerLane), &variants)
+    },
+};
+
+/// The loop is moved as far as docs/tmu-model.md says that it may be.
+pub const LOOP: Study = Study {
+    key: "loop",
+    title: "Calibrated loop of the cycle model",
+    about: "Cycles until a thread that missed tries again, at both ends of what the calibration allows. Errors are against 64 cycles.",
+    time: REPLAY_TIME,
+    reference: "64 cycles",
+    recommended: "64 cycles",
+    reason: "the middle of what fits; the ends move utilisation by up to two points, and bytes by a per cent where the caches thrash",
+    figures: &TEXTURE_FIGURES,
+    measure: |inputs| {
+        let calibration = Some(Contribution::Calibration);
+        let variants = [
+            variant("36 cycles", calibration, |c| looping(c, Mode::Timed, 36)),
+            variant("74 cycles", calibration, |c| looping(c, Mode::Timed, 74)),
+        ];
+        measured(inputs, |c| looping(c, Mode::Timed, 64), &variants)
+    },
+};
+
+pub const MODEL: Study = Study {
+    key: "model",
+    title: "Cycle model",
+    about: "Threads that stop at their first miss (the machine of --preset z2-paper) in place of threads that go on. Errors are against these.",
+    time: REPLAY_TIME,
+    reference: "primary misses",
+    recommended: "primary misses",
+    reason: "its misses are real traffic; which model the level of utilisation follows is not known, so trust utilisation's ratios before its level",
+    figures: &TEXTURE_FIGURES,
+    measure: |inputs| {
+        let model = Some(Contribution::Model);
+        let variants = [variant("first miss", model, |c| {
+            looping(c, Mode::FirstMiss, 24)
+        })];
+        measured(inputs, timed, &variants)
+    },
+};
+
+/// As far as docs/paper-comparison.md says that it may be moved.
+pub const FIRST_MISS_LOOP: Study = Study {
+    key: "first-miss-loop",
+    title: "Calibrated loop of the first-miss model",
+    about: "As above for threads that stop at their first miss. Errors are against 24 cycles.",
+    time: REPLAY_TIME,
+    reference: "24 cycles",
+    recommended: "24 cycles",
+    reason: "found by search on half of the paper's scenes; where the caches thrash its neighbours move bytes by some per cent",
+    figures: &TEXTURE_FIGURES,
+    measure: |inputs| {
+        let variants = [
+            variant("20 cycles", None, |c| looping(c, Mode::FirstMiss, 20)),
+            variant("28 cycles", None, |c| looping(c, Mode::FirstMiss, 28)),
+        ];
+        measured(inputs, |c| looping(c, Mode::FirstMiss, 24), &variants)
+    },
+};
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{inputs, small_trace};
+    use super::*;
+    use crate::config::Order;
+    use crate::engine::replay;
+
+    #[test]
+    fn a_variant_that_is_its_reference_has_no_error_and_another_one_has_its_own() {
+        let trace = small_trace();
+        let inputs = inputs(&trace);
+        let same = measured(&inputs, timed, &[variant("itself", None, timed)]).unwrap();
+        assert_eq!(same[0].values, [Some(0.0); 6]);
+        let found = &(MODE.measure)(&inputs).unwrap()[0];
+        let bytes = |config: RunConfig, order| {
+            let result = replay(&trace, &RunConfig { order, ..config }).unwrap();
+            result.external_bytes as f64
+        };
+        let by_order = [Order::MORTON, Order::Z2_STA].map(|order| {
+            let config = inputs.config;
+            100.0 * (bytes(functional(config), order) / bytes(timed(config), order) - 1.0)
+        });
+        let largest = by_order
+            .into_iter()
+            .max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        assert_eq!(found.values[0], largest);
+        // Functional replay has no texture unit.
+        assert_eq!(found.values[4], None);
+    }
+}

@@ -1,0 +1,147 @@
+//! Means of samples, their intervals, and how often these hold the truth.
+
+/// SplitMix64.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// So many of the first `of` numbers, each set as likely.
+    pub fn some(&mut self, count: usize, of: usize) -> Vec<usize> {
+        let mut all: Vec<usize> = (0..of).collect();
+        for at in 0..count.min(of) {
+            let with = at + (self.next() % (of - at) as u64) as usize;
+            all.swap(at, with);
+        }
+        all.truncate(count);
+        all
+    }
+}
+
+/// Student's t for 95 %, two-sided, from 1 degree of freedom.
+const STUDENT: [f64; 30] = [
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160,
+    2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056,
+    2.052, 2.048, 2.045, 2.042,
+];
+
+/// Beyond the table within 0.003.
+fn student(degrees: usize) -> f64 {
+    match degrees.checked_sub(1) {
+        None => f64::INFINITY,
+        Some(index) => (STUDENT.get(index).copied()).unwrap_or_else(|| 1.96 + 2.4 / degrees as f64),
+    }
+}
+
+/// Mean of a sample and half the width of its 95 % interval, as textbooks have them: Student's, with
+/// the correction for a finite whole.
+pub fn interval(sample: &[f64], whole: usize) -> (f64, f64) {
+    let count = sample.len() as f64;
+    let mean = sample.iter().sum::<f64>() / count;
+    let squares = sample.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    let left = 1.0 - count / whole as f64;
+    if left <= 0.0 {
+        return (mean, 0.0);
+    }
+    let variance = squares / (count - 1.0).max(1.0);
+    let half = student(sample.len() - 1) * (variance / count * left).sqrt();
+    (mean, half)
+}
+
+/// How a kind of sample does, percent.
+#[derive(Clone, Copy, Debug)]
+pub struct Judged {
+    /// Root mean square error.
+    pub error_pct: f64,
+    /// Mean error: what no larger sample takes away.
+    pub bias_pct: f64,
+    /// Mean half width of the 95 % interval.
+    pub interval_pct: f64,
+    /// Intervals that hold the truth; 95 are promised.
+    pub holds_pct: f64,
+}
+
+/// Sums up draws of (estimate, half width) against the truth.
+pub fn judged(truth: f64, draws: &[(f64, f64)]) -> Judged {
+    let count = draws.len().max(1) as f64;
+    let percent = |value: f64| 100.0 * value / truth.max(1.0);
+    let errors = draws.iter().map(|(mean, _)| mean - truth);
+    let squares = errors.clone().map(|e| e * e).sum::<f64>();
+    let holds = draws.iter();
+    // Rounding: an estimate from everything is the truth.
+    let holds = holds.filter(|(mean, half)| (mean - truth).abs() <= half + 1e-9 * truth);
+    Judged {
+        error_pct: percent((squares / count).sqrt()),
+        bias_pct: percent(errors.sum::<f64>() / count),
+        interval_pct: percent(draws.iter().map(|(_, half)| half).sum::<f64>() / count),
+        holds_pct: 100.0 * holds.count() as f64 / count,
+    }
+}
+
+/// Draws samples of one in so many values at random and estimates the sum of what they stand for.
+pub fn drawn(values: &[f64], one_in: u64, truth: f64) -> Judged {
+    /// Enough to tell 95 % from 92.
+    const DRAWS: u64 = 400;
+    let whole = values.len();
+    let count = (whole / one_in as usize).max(2);
+    let draw = |seed: u64| {
+        let chosen = Random(seed).some(count, whole);
+        let sample: Vec<f64> = chosen.iter().map(|&at| values[at]).collect();
+        let (mean, half) = interval(&sample, whole);
+        (mean * whole as f64, half * whole as f64)
+    };
+    let draws: Vec<(f64, f64)> = (0..DRAWS).map(draw).collect();
+    judged(truth, &draws)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(values: &[f64], one_in: u64) -> Judged {
+        drawn(values, one_in, values.iter().sum())
+    }
+
+    /// Values that are alike but for noise: intervals hold the truth about as often as they promise.
+    #[test]
+    fn intervals_hold_where_values_are_alike_and_lie_where_few_have_it_all() {
+        let mut random = Random(5);
+        let mut value = || 1000.0 + (random.next() % 200) as f64;
+        let alike: Vec<f64> = (0..128).map(|_| value()).collect();
+        for one_in in [8, 32] {
+            let good = of(&alike, one_in);
+            assert!(good.holds_pct > 91.0 && good.holds_pct < 99.0, "{good:?}");
+            assert!(
+                good.error_pct < 4.0 && good.bias_pct.abs() < 1.0,
+                "{good:?}"
+            );
+        }
+        let mut few = vec![10.0; 128];
+        few[7] = 100_000.0;
+        let bad = of(&few, 8);
+        assert!(bad.holds_pct < 50.0, "{bad:?}");
+    }
+
+    #[test]
+    fn a_sample_of_everything_is_the_truth() {
+        let all = of(&[5.0, 9.0, 1.0, 40.0], 1);
+        assert_eq!((all.interval_pct, all.holds_pct), (0.0, 100.0));
+        assert!(all.error_pct < 1e-9);
+    }
+
+    #[test]
+    fn draws_are_without_repetition() {
+        for seed in 0..50 {
+            let mut chosen = Random(seed).some(20, 32);
+            chosen.sort_unstable();
+            chosen.dedup();
+            assert_eq!(chosen.len(), 20);
+        }
+    }
+}

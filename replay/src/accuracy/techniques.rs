@@ -1,0 +1,67 @@
+//! Rendering techniques, as `tracegen techniques` has measured and rendered them.
+
+use super::inputs::Inputs;
+use super::study::{Choice, Figure, Study, StudyError, figure};
+use crate::result::scene_name;
+use crate::techniques::{Timing, picture_figures};
+
+const FIGURES: [Figure; 2] = [
+    figure("flip_mean", "mean FLIP", ""),
+    figure("flip_p99", "mean of the pictures' 99th percentiles", ""),
+];
+
+pub const TECHNIQUES: Study = Study {
+    key: "techniques",
+    title: "Rendering techniques",
+    about: "What a frame may leave out or do more coarsely. Errors are against each eye rendered in full; docs/techniques.md has every figure of them.",
+    time: "frame through the capturing rasteriser, over the baseline's (median)",
+    reference: "per-eye",
+    recommended: "per-eye",
+    reason: "a choice between time and image: the hollow points are never it",
+    figures: &FIGURES,
+    measure: measured,
+};
+
+fn measured(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
+    let mut choices = Vec::new();
+    for folder in inputs.techniques {
+        let manifest = &folder.manifest;
+        let figures = picture_figures(folder, &|_| ())?;
+        for (row, pictures) in manifest.rows.iter().zip(&figures) {
+            if row.technique == manifest.baseline {
+                continue;
+            }
+            choices.push(Choice {
+                name: row.technique.clone(),
+                scene: scene_name(&manifest.scene).to_owned(),
+                contribution: None,
+                time_ratio: Timing::of(row).map(|timing| timing.ratio.median),
+                values: vec![Some(pictures.flip_mean), Some(pictures.flip_p99)],
+            });
+        }
+    }
+    Ok(choices)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{inputs, small_trace};
+    use super::*;
+    use crate::techniques::{Folder, testing};
+
+    #[test]
+    fn each_technique_but_the_baseline_is_a_choice() {
+        let root = tempfile::tempdir().unwrap();
+        testing::folder(root.path());
+        let folders = [Folder::open(root.path()).unwrap()];
+        let trace = small_trace();
+        let mut inputs = inputs(&trace);
+        inputs.techniques = &folders;
+        let choices = measured(&inputs).unwrap();
+        let names: Vec<&str> = choices.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["superfrustum", "grey"]);
+        assert_eq!(choices[0].time_ratio, Some(0.5));
+        assert_eq!(choices[0].values[0], Some(0.0));
+        assert!(choices[1].values[0] > Some(0.0));
+    }
+}

@@ -1,0 +1,43 @@
+//! Small inputs for tests.
+
+use super::headline::Replays;
+use super::inputs::Inputs;
+use crate::config::{CacheConfig, RunConfig};
+use crate::experiment::Subject;
+use crate::result::TraceId;
+use crate::stream::synthetic::Synthetic;
+use crate::stream::{MemoryTrace, TileSource};
+
+/// A trace that fits no cache of [`inputs`].
+pub fn small_trace() -> MemoryTrace {
+    Synthetic {
+        size_px: [96, 96],
+        patch_px: 24,
+        materials: 4,
+        ..Synthetic::default()
+    }
+    .generate()
+}
+
+/// A trace under a label.
+pub fn subject<'a>(trace: &'a dyn TileSource, label: &str) -> Subject<'a> {
+    Subject::new(trace, TraceId::default(), label.to_owned())
+}
+
+/// One trace and nothing else.
+pub fn inputs(trace: &dyn TileSource) -> Inputs<'_> {
+    Inputs {
+        config: RunConfig {
+            l2: CacheConfig::lru(16 << 10),
+            ..RunConfig::default()
+        },
+        subjects: vec![subject(trace, "small")],
+        truths: Vec::new(),
+        captures: Vec::new(),
+        seconds: Vec::new(),
+        rays: Vec::new(),
+        techniques: &[],
+        traversal: Vec::new(),
+        replays: Replays::default(),
+    }
+}

@@ -1,0 +1,68 @@
+//! `tracegen precision`.
+
+use anyhow::Context;
+use clap::Args;
+use formats::container::AtomicFile;
+use rays::precision::{Precision, measure};
+use rays::reference::TestMesh;
+use serde_json::{Value, json};
+use shell::{Output, Progress};
+use std::path::PathBuf;
+
+/// Arguments of `tracegen precision`.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "The times in the result are of this machine. `replay accuracy --traversal FILE` sets it beside other choices."
+)]
+pub struct PrecisionArgs {
+    /// Where the JSON goes (schema tracegen.precision/1) [default: standard output].
+    #[arg(short, long, value_name = "JSON")]
+    output: Option<PathBuf>,
+    /// Rays at each place.
+    #[arg(long, value_name = "N", default_value_t = 6000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    rays: u32,
+}
+
+/// Distances from the origin, metres.
+const PLACES_M: [f64; 5] = [0.0, 1e3, 1e5, 1e6, 1e7];
+
+/// Runs `tracegen precision`.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn run(args: &PrecisionArgs) -> anyhow::Result<()> {
+    if let Some(path) = &args.output {
+        shell::check_outputs(&[Output::text("--output", path)], None)?;
+    }
+    let progress = Progress::new("tracing", PLACES_M.len() as u64, "places");
+    let mesh = TestMesh::sphere(5);
+    let mut rows = Vec::new();
+    for at_m in PLACES_M {
+        rows.extend(measure(&mesh, at_m, args.rays as usize).map(|row| written(&row)));
+        progress.advance(1);
+    }
+    drop(progress);
+    let document = json!({
+        "schema": "tracegen.precision/1",
+        "tool": super::tool(),
+        "mesh": format!("a sphere of 10 m, {} triangles", mesh.triangles.len()),
+        "rows": rows,
+    });
+    let text = serde_json::to_string_pretty(&document)? + "\n";
+    match &args.output {
+        Some(path) => AtomicFile::write_whole(path, text.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display())),
+        None => shell::print(&text),
+    }
+}
+
+fn written(row: &Precision) -> Value {
+    json!({
+        "arithmetic": row.arithmetic,
+        "at_m": row.at_m,
+        "rays": row.rays,
+        "wrong_pct": row.wrong_pct,
+        "distance_ppm": row.distance_ppm,
+        "time_ratio": row.time_ratio,
+    })
+}

@@ -1,0 +1,276 @@
+//! Triangles of which rounding decides what is drawn: too thin for the rasteriser's grid, or too close
+//! upon another for the depth buffer.
+//!
+//! Found on the screen, where the rasteriser decides: triangles of an eye's picture that no plane cuts and
+//! that may cover the middle of a pixel.
+//! Planes that lie upon one another but are divided into other triangles are not found.
+
+use formats::view::EyeView;
+use glam::{DMat4, DVec2, DVec3, Mat4};
+use raster::draws::{DrawCall, DrawList, DrawMode};
+use scene::Scene;
+use std::collections::HashMap;
+
+/// Vertices are rounded to a grid of this many pixels before a triangle is drawn.
+const GRID_PX: f64 = 1.0 / 256.0;
+
+/// Depths that differ by no more steps of 32 bits change places by rounding: interpolation takes some.
+const DEPTH_STEPS: f64 = 4.0;
+
+/// The last step of 32-bit depths before 1.
+const DEPTH_STEP: f64 = 1.0 / (1 << 24) as f64;
+
+/// Fragments that may be wrong without a word, as a share of all: captures are off by as much at edges.
+const SHARE: f64 = 0.002;
+
+/// Vertices of triangles that may lie upon one another are less than this apart.
+const SAME_PLACE_PX: f64 = 1.0 / 16.0;
+
+/// What a view shows of a kind of doubtful triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Kind {
+    triangles: u64,
+    area_px: f64,
+    /// The mesh of the first one.
+    mesh: Option<usize>,
+}
+
+impl Kind {
+    fn add(&mut self, area_px: f64, mesh: usize) {
+        self.triangles += 1;
+        self.area_px += area_px;
+        self.mesh.get_or_insert(mesh);
+    }
+}
+
+/// Doubtful triangles of some views.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Doubtful {
+    thin: Kind,
+    coincident: Kind,
+}
+
+/// A triangle on the screen.
+struct Shown {
+    /// Pixels, and depth from 0 to 1.
+    corners: [DVec3; 3],
+    mesh: usize,
+    double_sided: bool,
+}
+
+impl Doubtful {
+    /// Looks at a view.
+    pub fn look(&mut self, scene: &Scene, draws: &DrawList, view: &EyeView, size_px: [u32; 2]) {
+        let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
+        let clip_from_world = wide(&view.eye_to_clip) * wide(&view.world_to_eye);
+        let mut places: HashMap<[[i32; 2]; 3], Vec<Shown>> = HashMap::new();
+        for call in &draws.calls {
+            let of_draw = on_screen(scene, call, clip_from_world, size_px);
+            for (shown, area_px) in of_draw {
+                if shown.height_px() < GRID_PX {
+                    self.thin.add(area_px, shown.mesh);
+                    continue;
+                }
+                // What is blended hides nothing.
+                if call.mode == DrawMode::Blended {
+                    continue;
+                }
+                let others = places.entry(shown.place()).or_default();
+                if others.iter().any(|other| shown.is_upon(other)) {
+                    self.coincident.add(area_px, shown.mesh);
+                }
+                others.push(shown);
+            }
+        }
+    }
+
+    /// Warnings of what was looked at, where it may spoil more than a share of its `fragments`.
+    #[must_use]
+    pub fn warnings(&self, scene: &Scene, fragments: u64) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let name = |kind: &Kind| {
+            kind.mesh
+                .map_or("", |mesh| scene.meshes[mesh].name.as_str())
+        };
+        let share = |kind: &Kind| kind.area_px / fragments.max(1) as f64;
+        let percent = |kind: &Kind| 100.0 * share(kind).min(1.0);
+        if share(&self.thin) > SHARE {
+            let Kind { triangles, .. } = self.thin;
+            warnings.push(format!(
+                "{triangles} triangles are thinner than 1/256 pixel (first in mesh '{}'), about {:.1} % of the fragments: \
+                 the rounding of their vertices decides which of them are drawn",
+                name(&self.thin),
+                percent(&self.thin),
+            ));
+        }
+        if share(&self.coincident) > SHARE {
+            let Kind { triangles, .. } = self.coincident;
+            warnings.push(format!(
+                "{triangles} triangles lie upon others, closer than the depth buffer tells apart (first in mesh '{}'), \
+                 about {:.1} % of the fragments: rounding decides which of both are seen",
+                name(&self.coincident),
+                percent(&self.coincident),
+            ));
+        }
+        warnings
+    }
+}
+
+/// The triangles of a draw that no plane of the view cuts or hides, with their pixels in the picture.
+fn on_screen(
+    scene: &Scene,
+    call: &DrawCall,
+    clip_from_world: DMat4,
+    size_px: [u32; 2],
+) -> impl Iterator<Item = (Shown, f64)> {
+    let mesh = &scene.meshes[call.mesh];
+    let double_sided = scene.materials[call.material].double_sided;
+    let clip_from_object = clip_from_world * Mat4::from(call.transform).as_dmat4();
+    let size = DVec2::new(size_px[0].into(), size_px[1].into());
+    let project = move |p: &glam::Vec3| {
+        let clip = clip_from_object * p.as_dvec3().extend(1.0);
+        let inside = clip.w > 0.0 && clip.z >= 0.0 && clip.z <= clip.w;
+        inside.then(|| {
+            let [x, y, z] = (clip.truncate() / clip.w).to_array();
+            (DVec2::new(0.5 + 0.5 * x, 0.5 - 0.5 * y) * size).extend(z)
+        })
+    };
+    let corners: Vec<Option<DVec3>> = mesh.positions.iter().map(project).collect();
+    let mirrored = call.mirrored;
+    let index = call.mesh;
+    mesh.indices.chunks_exact(3).filter_map(move |triangle| {
+        let corner = |i: usize| corners[triangle[i] as usize];
+        let shown = Shown {
+            corners: [corner(0)?, corner(1)?, corner(2)?],
+            mesh: index,
+            double_sided,
+        };
+        let area = shown.signed_area_px();
+        // On the screen y points down.
+        let shows_front = (area < 0.0) != mirrored;
+        let seen = area != 0.0 && (double_sided || shows_front);
+        let inside = shown.share_inside(size);
+        (seen && inside > 0.0 && shown.may_cover()).then(|| (shown, area.abs() * inside))
+    })
+}
+
+impl Shown {
+    fn signed_area_px(&self) -> f64 {
+        let [a, b, c] = self.corners.map(DVec3::truncate);
+        0.5 * (b - a).perp_dot(c - a)
+    }
+
+    /// Height above the longest side.
+    fn height_px(&self) -> f64 {
+        let [a, b, c] = self.corners.map(DVec3::truncate);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        2.0 * self.signed_area_px().abs() / longest
+    }
+
+    /// Whether the bounding box holds the middle of a pixel.
+    fn may_cover(&self) -> bool {
+        let [a, b, c] = self.corners.map(|corner| corner.truncate() - 0.5);
+        let (low, high) = (a.min(b).min(c).ceil(), a.max(b).max(c).floor());
+        low.cmple(high).all()
+    }
+
+    /// Share of the bounding box that lies in the picture, as an estimate for the triangle's.
+    fn share_inside(&self, size: DVec2) -> f64 {
+        let [a, b, c] = self.corners.map(DVec3::truncate);
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let whole = (high - low).max(DVec2::splat(1e-9));
+        let inside = high.min(size) - low.max(DVec2::ZERO);
+        (inside.max(DVec2::ZERO).min(whole) / whole)
+            .to_array()
+            .iter()
+            .product()
+    }
+
+    /// Corners in an order that does not depend on where they start nor how they wind.
+    fn sorted(&self) -> [DVec3; 3] {
+        let mut corners = self.corners;
+        let at = |v: &DVec3| (place(v), v.z);
+        corners.sort_by(|a, b| at(a).0.cmp(&at(b).0).then(at(a).1.total_cmp(&at(b).1)));
+        corners
+    }
+
+    fn place(&self) -> [[i32; 2]; 3] {
+        self.sorted().map(|corner| place(&corner))
+    }
+
+    /// Whether it cannot be told from another one at the same place. One that is the same to the bit and
+    /// wound alike can: the first one is seen.
+    fn is_upon(&self, other: &Self) -> bool {
+        let wound_alike = (self.signed_area_px() > 0.0) == (other.signed_area_px() > 0.0);
+        let (ours, theirs) = (self.sorted(), other.sorted());
+        if ours == theirs && wound_alike {
+            return false;
+        }
+        debug_assert!(wound_alike || (self.double_sided && other.double_sided));
+        let near = |(a, b): (&DVec3, &DVec3)| (a.z - b.z).abs() <= DEPTH_STEPS * DEPTH_STEP;
+        ours.iter().zip(&theirs).all(near)
+    }
+}
+
+fn place(corner: &DVec3) -> [i32; 2] {
+    [corner.x, corner.y].map(|px| (px / SAME_PLACE_PX).round() as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(corners: [[f64; 3]; 3]) -> Shown {
+        Shown {
+            corners: corners.map(DVec3::from),
+            mesh: 0,
+            double_sided: true,
+        }
+    }
+
+    const A: [f64; 3] = [10.0, 10.0, 0.5];
+    const B: [f64; 3] = [20.0, 10.0, 0.6];
+    const C: [f64; 3] = [10.0, 30.0, 0.7];
+
+    #[test]
+    fn a_triangle_is_upon_another_unless_depth_or_place_tells_them_apart() {
+        let one = shown([A, B, C]);
+        let lifted = |by: f64| shown([A, B, C].map(|[x, y, z]| [x, y, z + by]));
+        assert!(
+            !shown([B, C, A]).is_upon(&one),
+            "wound alike, the same bits"
+        );
+        assert!(shown([A, C, B]).is_upon(&one), "wound the other way");
+        assert!(lifted(3.0 * DEPTH_STEP).is_upon(&one));
+        assert!(!lifted(100.0 * DEPTH_STEP).is_upon(&one));
+        let aside = shown([A, B, C].map(|[x, y, z]| [x + 0.2, y, z]));
+        assert_ne!(aside.place(), one.place());
+        assert_eq!(lifted(1e-6).place(), one.place());
+    }
+
+    #[test]
+    fn height_and_share_of_the_picture() {
+        let one = shown([A, B, C]);
+        assert_eq!(one.signed_area_px(), 100.0);
+        assert!((one.height_px() - 200.0 / 500_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(one.share_inside(DVec2::splat(100.0)), 1.0);
+        assert_eq!(one.share_inside(DVec2::new(15.0, 100.0)), 0.5);
+        assert_eq!(one.share_inside(DVec2::splat(5.0)), 0.0);
+    }
+
+    #[test]
+    fn few_doubtful_pixels_are_no_warning() {
+        let mut doubtful = Doubtful::default();
+        doubtful.thin.add(1.0, 0);
+        let scene = Scene {
+            meshes: vec![scene::Mesh::default()],
+            ..Scene::default()
+        };
+        assert!(doubtful.warnings(&scene, 1_000_000).is_empty());
+        let said = doubtful.warnings(&scene, 100);
+        assert!(
+            said[0].contains("1 triangles are thinner than 1/256 pixel"),
+            "{said:?}"
+        );
+    }
+}
