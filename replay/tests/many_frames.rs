@@ -1,7 +1,8 @@
-//! Memory and time of long traces: `cargo test --release -p replay --test many_frames -- --ignored
-//! --nocapture`; `FRAMES` and `TEXTRACE` choose how many frames and the trace whose first is repeated.
+//! Memory of long traces, and with `FRAMES=300 cargo test --release -p replay --test many_frames -- --nocapture`
+//! the time of a frame as well; `TEXTRACE` names the trace whose first frame is repeated.
 
 use formats::textrace::{Pass, Tables, Textrace, TextraceWriter, Tile};
+use formats::view::FrameViews;
 use replay::config::{CacheConfig, Mode, Order, RunConfig};
 use replay::engine::replay_all;
 use replay::stream::synthetic::Synthetic;
@@ -23,7 +24,11 @@ fn write(source: &dyn TileSource, frames: u32, path: &Path) {
         ..old.clone()
     };
     let views = old.meta.frames[first as usize].clone();
-    tables.meta.frames = vec![views; frames as usize];
+    let view = |frame| FrameViews {
+        frame,
+        ..views.clone()
+    };
+    tables.meta.frames = (0..frames).map(view).collect();
     for frame in 0..frames {
         let again = of_frame.iter().map(|(_, pass)| Pass { frame, ..**pass });
         tables.passes.extend(again);
@@ -71,12 +76,16 @@ fn watched(work: impl FnOnce()) -> (f64, u64) {
 }
 
 #[test]
-#[ignore = "minutes"]
 fn neither_memory_nor_the_time_of_a_frame_grows_with_the_number_of_frames() {
-    let frames: u32 = std::env::var("FRAMES").map_or(300, |frames| frames.parse().unwrap());
+    let asked: Option<u32> = (std::env::var("FRAMES").ok()).map(|frames| frames.parse().unwrap());
+    let frames = asked.unwrap_or(40);
     let given = std::env::var_os("TEXTRACE").map(|path| Textrace::open(Path::new(&path)).unwrap());
     let generated = Synthetic {
-        size_px: [480, 540],
+        size_px: if asked.is_some() {
+            [480, 540]
+        } else {
+            [160, 192]
+        },
         ..Synthetic::default()
     };
     let source: Box<dyn TileSource> = match given {
@@ -96,9 +105,10 @@ fn neither_memory_nor_the_time_of_a_frame_grows_with_the_number_of_frames() {
         l1: CacheConfig::lru(l1_kib << 10),
         ..RunConfig::default()
     };
-    let batches: [(&str, Vec<RunConfig>); 4] = [
+    let batches: [(&str, Vec<RunConfig>); 5] = [
         ("functional", vec![config(Mode::Functional, 8)]),
         ("timed", vec![config(Mode::Timed, 8)]),
+        ("first miss", vec![config(Mode::FirstMiss, 8)]),
         ("both, three caches each", {
             let modes = [Mode::Functional, Mode::Timed];
             let all = modes
@@ -131,7 +141,8 @@ fn neither_memory_nor_the_time_of_a_frame_grows_with_the_number_of_frames() {
             long_bytes / 1_000_000
         );
         assert!(long_bytes < 512_000_000, "{long_bytes} bytes");
-        // Other programs run on the machine, too.
-        assert!(long_ms < 2.0 * short_ms, "{short_ms} ms, then {long_ms} ms");
+        // Time is for a machine on which nothing else runs.
+        let grows = asked.is_some() && long_ms > 1.5 * short_ms;
+        assert!(!grows, "{short_ms} ms, then {long_ms} ms");
     }
 }
