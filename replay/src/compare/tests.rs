@@ -115,7 +115,13 @@ fn two_records_of_a_quad_are_what_one_with_all_their_lanes_is() {
         assert_eq!(found.tiles_that_differ, 1);
         // Levels of detail alone are counted by pairs of records.
         let lod_levels = itself.lod_levels.clone();
-        assert_eq!(Tally { lod_levels, ..found.all }, itself);
+        assert_eq!(
+            Tally {
+                lod_levels,
+                ..found.all
+            },
+            itself
+        );
     }
 }
 

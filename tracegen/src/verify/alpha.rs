@@ -24,7 +24,9 @@ impl AlphaTest for SampledAlpha<'_> {
         };
         let texel = material.base_color_texture.and_then(|reference| {
             let texture = self.sampler.texture(reference.image)?;
-            let at = geometry.coordinates(piece, &reference).in_quad(pixel, self.formula);
+            let at = geometry
+                .coordinates(piece, &reference)
+                .in_quad(pixel, self.formula);
             let lod = level_of_detail(&at, &texture.texture, self.formula);
             Some(
                 self.sampler

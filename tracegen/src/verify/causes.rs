@@ -11,9 +11,9 @@ use serde::Serialize;
 /// single precision.
 const SMALL: f64 = 1.0 / 64.0;
 
-/// By how much single precision moves a vertex on the screen: units in the last place of the largest
-/// coordinate there.
-const VERTEX_ULPS: f64 = 8.0;
+/// By how much transforming, clipping and projecting in single precision moves a vertex on the screen: units in the
+/// last place of the largest coordinate there.
+const VERTEX_ULPS: f64 = 16.0;
 
 /// A cause of an error of coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -113,10 +113,12 @@ impl Subject<'_> {
         if texels(error) <= SMALL {
             return UvCause::Small;
         }
-        let single = texels(self.by_single_precision(|s| s.uv));
+        let center = super::piece::center(self.pixel);
+        let planes = self.coordinates.interpolation_error(center);
+        let single = texels(self.by_single_precision(|s| s.uv) + planes);
         if self.formula == LodFormula::Softpipe {
             // From whichever lane the quad's coordinates come.
-            let found = self.coordinates.at(super::piece::center(self.pixel)) + error;
+            let found = self.coordinates.at(center) + error;
             let near = |lane| texels(found - self.coordinates.without_cross(self.pixel, lane));
             if (0..4).any(|lane| near(lane) <= SMALL + single) {
                 return UvCause::NoCross;
