@@ -274,6 +274,28 @@ mod tests {
     }
 
     #[test]
+    fn colours_between_end_points_are_the_drivers_in_8_bits() {
+        let steps = |v: f64| DVec3::splat(v / 255.0);
+        let found = |a: f64, b: f64, share: f64| {
+            let found = between(steps(a), steps(b), share, Decoder::EightBits);
+            (found.x * 255.0).round()
+        };
+        // A third of three steps is a step, but 85/256 of them is less.
+        assert_eq!(found(0.0, 3.0, 1.0 / 3.0), 0.0);
+        assert_eq!(found(3.0, 0.0, 1.0 / 3.0), 2.0);
+        assert_eq!(found(10.0, 110.0, 2.0 / 3.0), 76.0);
+        assert_eq!(found(0.0, 1.0, 0.5), 1.0);
+        let exact = between(steps(0.0), steps(3.0), 1.0 / 3.0, Decoder::Exact);
+        assert!((exact - steps(1.0)).length() < 1e-12);
+        // The polynomial is near the curve, and not on it.
+        let apart = |v: f64| (polynomial_of_srgb(v) - linear_of_srgb(v)).abs();
+        let largest = (0..=255).map(|v| apart(f64::from(v) / 255.0));
+        let largest = largest.fold(0.0, f64::max);
+        assert!(largest > 1e-4 && largest < 2e-3, "{largest}");
+        assert!((polynomial_of_srgb(1.0) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
     fn blocks_decode_as_a_library_decodes_them_but_for_rounding() {
         let mut state = 1_u32;
         for round in 0..500 {
