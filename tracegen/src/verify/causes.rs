@@ -3,6 +3,7 @@
 use super::geometry::{Coordinates, Sampled};
 use super::lod::{clamped, level_of_detail};
 use formats::footprint::LodFormula;
+use formats::textrace::QuadRecord;
 use formats::texture::Texture;
 use glam::DVec2;
 use serde::Serialize;
@@ -11,9 +12,12 @@ use serde::Serialize;
 /// single precision.
 const SMALL: f64 = 1.0 / 64.0;
 
-/// By how much single precision moves a vertex on the screen: units in the last place of the largest
-/// coordinate there.
-const VERTEX_ULPS: f64 = 8.0;
+/// By how much transforming, clipping and projecting in single precision moves a vertex on the screen: units in the
+/// last place of the largest coordinate there.
+const VERTEX_ULPS: f64 = 32.0;
+
+/// Where captures let the differences of a record end: sums of four stay in 32 bits.
+const LARGEST_DIFFERENCE: u32 = 1 << 28;
 
 /// A cause of an error of coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -25,6 +29,8 @@ pub enum UvCause {
     NoCross,
     /// Vertices in single precision: near the horizon and on slivers, coordinates change fast with them.
     SinglePrecision,
+    /// Slivers whose differences over a quad are beyond the trace's fixed point.
+    Saturated,
     /// None of these.
     Unexplained,
 }
@@ -49,10 +55,11 @@ pub enum SampleCause {
 
 impl UvCause {
     /// Every cause.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::Small,
         Self::NoCross,
         Self::SinglePrecision,
+        Self::Saturated,
         Self::Unexplained,
     ];
 
@@ -63,6 +70,7 @@ impl UvCause {
             Self::Small => "within 1/64 texel",
             Self::NoCross => "quads without a cross term",
             Self::SinglePrecision => "vertices in single precision",
+            Self::Saturated => "beyond the trace's fixed point",
             Self::Unexplained => "unexplained",
         }
     }
@@ -106,17 +114,19 @@ pub struct Subject<'a> {
 }
 
 impl Subject<'_> {
-    /// The cause of an error of coordinates, `error` being the captured ones less the true ones, in repeats.
+    /// The cause of an error of the coordinates that a record has, `error` being these less the true ones, in repeats.
     #[must_use]
-    pub fn of_uv(&self, error: DVec2) -> UvCause {
+    pub fn of_uv(&self, record: &QuadRecord, error: DVec2) -> UvCause {
         let texels = |uv: DVec2| (uv * self.extent).length();
         if texels(error) <= SMALL {
             return UvCause::Small;
         }
-        let single = texels(self.by_single_precision(|s| s.uv));
+        let center = super::piece::center(self.pixel);
+        let planes = self.coordinates.interpolation_error(center);
+        let single = texels(self.by_single_precision(|s| s.uv) + planes);
         if self.formula == LodFormula::Softpipe {
             // From whichever lane the quad's coordinates come.
-            let found = self.coordinates.at(super::piece::center(self.pixel)) + error;
+            let found = self.coordinates.at(center) + error;
             let near = |lane| texels(found - self.coordinates.without_cross(self.pixel, lane));
             if (0..4).any(|lane| near(lane) <= SMALL + single) {
                 return UvCause::NoCross;
@@ -124,6 +134,10 @@ impl Subject<'_> {
         }
         if texels(error) <= SMALL + single {
             return UvCause::SinglePrecision;
+        }
+        let differences = [record.dx, record.dy, record.cross];
+        if (differences.as_flattened().iter()).any(|d| d.unsigned_abs() >= LARGEST_DIFFERENCE) {
+            return UvCause::Saturated;
         }
         UvCause::Unexplained
     }

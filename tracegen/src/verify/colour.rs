@@ -3,7 +3,7 @@
 use super::compare::{Lane, captured_uv, key, lanes};
 use super::geometry::Geometry;
 use super::reference::origin;
-use super::sampler::{SoftwareSampler, srgb_of_linear};
+use super::sampler::{Decoder, SoftwareSampler, srgb_of_linear};
 use formats::footprint::{LodFormula, quad_lod};
 use formats::textrace::{Tables, Tile};
 use formats::texture::ColorSpace;
@@ -33,8 +33,10 @@ pub struct ColourErrors {
     pub within_as_light: u64,
     /// Those that differ by no more than 1/255 as the texture encodes colour.
     pub within_as_encoded: u64,
-    /// Beyond that only because the driver rounds what it decodes down to 8 bits.
+    /// Beyond that only because the driver decodes blocks in 8 bits.
     pub by_decoding: u64,
+    /// Beyond that, but not with the driver's polynomial for sRGB as well.
+    pub by_srgb: u64,
     /// Beyond that, but not for coordinates that lie 1/64 texel away: where texels differ much, the driver's single
     /// precision shows.
     pub by_coordinates: u64,
@@ -42,6 +44,8 @@ pub struct ColourErrors {
     pub sum: f64,
     /// Largest of them.
     pub max: f64,
+    /// Largest difference where blocks and sRGB are decoded as the driver does.
+    pub max_as_driver: f64,
 }
 
 impl ColourErrors {
@@ -59,9 +63,11 @@ impl ColourErrors {
         self.within_as_light += other.within_as_light;
         self.within_as_encoded += other.within_as_encoded;
         self.by_decoding += other.by_decoding;
+        self.by_srgb += other.by_srgb;
         self.by_coordinates += other.by_coordinates;
         self.sum += other.sum;
         self.max = self.max.max(other.max);
+        self.max_as_driver = self.max_as_driver.max(other.max_as_driver);
     }
 }
 
@@ -103,28 +109,35 @@ impl ColourCheck<'_> {
                 }
                 errors.fragments += 1;
                 let found = DVec4::from(texels.colors[pixel].map(f64::from));
-                let difference = |sampler, moved: DVec2| {
+                let difference = |decoder, moved: DVec2| {
+                    let sampler = self.sampler.with(decoder);
                     let (expected, srgb) =
-                        self.filtered(sampler, &lanes, tile, (primitive, [x, y]), slot, moved)?;
+                        self.filtered(&sampler, &lanes, tile, (primitive, [x, y]), slot, moved)?;
                     let light = (found - expected).abs().max_element();
                     let encoded = (encode(found) - encode(expected)).abs().max_element();
                     Some((light, if srgb { encoded } else { light }))
                 };
-                let Some((light, encoded)) = difference(self.sampler, DVec2::ZERO) else {
+                let Some((light, encoded)) = difference(Decoder::Exact, DVec2::ZERO) else {
                     errors.unrecorded += 1;
                     continue;
                 };
                 errors.add(light, encoded);
+                let of_driver = difference(Decoder::EightBitsAndPolynomial, DVec2::ZERO);
+                let (_, of_driver) = of_driver.unwrap_or_default();
+                errors.max_as_driver = errors.max_as_driver.max(of_driver);
                 if encoded > STEP {
-                    let rounded = self.sampler.rounding_down();
-                    let explains =
-                        |moved| difference(&rounded, moved).is_some_and(|(_, d)| d <= STEP);
-                    if explains(DVec2::ZERO) {
+                    let explains = |decoder, moved| {
+                        let found = difference(decoder, moved);
+                        found.is_some_and(|(_, d)| d <= STEP)
+                    };
+                    if explains(Decoder::EightBits, DVec2::ZERO) {
                         errors.by_decoding += 1;
-                    } else if AROUND
-                        .into_iter()
-                        .any(|to| explains(DVec2::from(to) * MOVED_TEXELS))
-                    {
+                    } else if of_driver <= STEP {
+                        errors.by_srgb += 1;
+                    } else if AROUND.into_iter().any(|to| {
+                        let moved = DVec2::from(to) * MOVED_TEXELS;
+                        explains(Decoder::EightBitsAndPolynomial, moved)
+                    }) {
                         errors.by_coordinates += 1;
                     }
                 }

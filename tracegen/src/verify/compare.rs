@@ -166,7 +166,7 @@ impl Comparison<'_> {
                 result.not_finite += 1;
                 continue;
             }
-            let cause = subject.of_uv(error);
+            let cause = subject.of_uv(record, error);
             result.uv_errors_texels.0.push(error_texels as f32);
             result.uv_causes[cause as usize] += 1;
             self.samples(record, index, group, &subject, cause, result);

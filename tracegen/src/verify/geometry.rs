@@ -272,6 +272,21 @@ impl Coordinates<'_> {
         self.at(start) + quad.dx * steps.x + quad.dy * steps.y
     }
 
+    /// What single precision may make of them at a point: a few units in the last place of the largest terms of
+    /// the equations of the planes that they are fractions of.
+    #[must_use]
+    pub fn interpolation_error(&self, p: DVec2) -> DVec2 {
+        let (above, below) = self.fraction(p);
+        let (mut terms, mut term) = (above.abs(), below.abs());
+        for (axis, step) in [DVec2::X, DVec2::Y].into_iter().enumerate() {
+            let (a, b) = self.fraction(p + step);
+            let away = self.piece.farthest_px(p, axis);
+            terms += (a - above).abs() * away;
+            term += (b - below).abs() * away;
+        }
+        16.0 * f64::from(f32::EPSILON) * (terms + (above / below).abs() * term) / below.abs()
+    }
+
     /// What they are over.
     #[must_use]
     pub fn piece(&self) -> &Piece {

@@ -235,14 +235,16 @@ impl Piece {
     pub fn depth_error(&self, p: DVec2) -> f64 {
         let here = self.depth(p);
         let slope = |step: DVec2| (self.depth(p + step) - here).abs();
-        let away = |axis: usize| {
-            self.corners
-                .map(|c| (c.at[axis] - p[axis]).abs())
-                .into_iter()
-                .fold(0.0, f64::max)
-        };
-        let largest = here.abs() + slope(DVec2::X) * away(0) + slope(DVec2::Y) * away(1);
-        16.0 * f64::from(f32::EPSILON) * largest
+        let across = slope(DVec2::X) * self.farthest_px(p, 0);
+        let down = slope(DVec2::Y) * self.farthest_px(p, 1);
+        16.0 * f64::from(f32::EPSILON) * (here.abs() + across + down)
+    }
+
+    /// Distance to the corner that is farthest from a point along an axis.
+    #[must_use]
+    pub fn farthest_px(&self, p: DVec2, axis: usize) -> f64 {
+        let away = self.corners.map(|c| (c.at[axis] - p[axis]).abs());
+        away.into_iter().fold(0.0, f64::max)
     }
 
     /// Weights of the primitive's vertices over w at a point of the screen: linear in the point, and

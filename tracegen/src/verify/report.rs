@@ -105,10 +105,13 @@ struct Colour {
     within_1_255_share: f64,
     within_1_255_as_light_share: f64,
     beyond_by_decoding: u64,
+    beyond_by_srgb: u64,
     beyond_by_coordinates: u64,
     beyond_unexplained: u64,
     mean: f64,
     max: f64,
+    /// With blocks and sRGB decoded as the driver does.
+    max_as_driver: f64,
 }
 
 fn share(part: u64, whole: u64) -> f64 {
@@ -265,13 +268,15 @@ impl Report {
             line(
                 &format!("{}: texels within 1/255", colour.texture),
                 format!(
-                    "{} of {} ({} as light; mean {:.5}, max {:.4}; beyond: {} by the decoder's rounding, {} by 1/64 texel, {} unexplained, {} without a record)",
+                    "{} of {} ({} as light; mean {:.5}, max {:.4}, {:.5} as the driver decodes; beyond: {} by blocks decoded in 8 bits, {} by a polynomial for sRGB, {} by 1/64 texel, {} unexplained, {} without a record)",
                     percent(colour.within_1_255_share),
                     colour.fragments,
                     percent(colour.within_1_255_as_light_share),
                     colour.mean,
                     colour.max,
+                    colour.max_as_driver,
                     colour.beyond_by_decoding,
+                    colour.beyond_by_srgb,
                     colour.beyond_by_coordinates,
                     colour.beyond_unexplained,
                     colour.unrecorded
@@ -314,13 +319,16 @@ impl Colour {
             within_1_255_share: share(errors.within_as_encoded, errors.fragments),
             within_1_255_as_light_share: share(errors.within_as_light, errors.fragments),
             beyond_by_decoding: errors.by_decoding,
+            beyond_by_srgb: errors.by_srgb,
             beyond_by_coordinates: errors.by_coordinates,
             beyond_unexplained: compared
                 - errors.within_as_encoded
                 - errors.by_decoding
+                - errors.by_srgb
                 - errors.by_coordinates,
             mean: errors.sum / compared.max(1) as f64,
             max: errors.max,
+            max_as_driver: errors.max_as_driver,
         }
     }
 }

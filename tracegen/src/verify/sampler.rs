@@ -12,8 +12,18 @@ const BLOCK: u32 = 4;
 #[derive(Clone, Copy)]
 pub struct SoftwareSampler<'a> {
     set: &'a TextureSet,
-    /// Decoded texels are rounded down to 8 bits.
-    rounds_down: bool,
+    decoder: Decoder,
+}
+
+/// How blocks become light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decoder {
+    /// Without rounding, as the specification has it.
+    Exact,
+    /// Colours between a block's end points in 8 bits, as Mesa has them: see [`between`].
+    EightBits,
+    /// The same, and sRGB by the polynomial that llvmpipe takes for its curve: see [`polynomial_of_srgb`].
+    EightBitsAndPolynomial,
 }
 
 impl<'a> SoftwareSampler<'a> {
@@ -22,17 +32,14 @@ impl<'a> SoftwareSampler<'a> {
     pub fn new(set: &'a TextureSet) -> Self {
         Self {
             set,
-            rounds_down: false,
+            decoder: Decoder::Exact,
         }
     }
 
-    /// The same with texels that are rounded down to 8 bits between a block's end points, as Mesa's decoder does.
+    /// The same with another decoder.
     #[must_use]
-    pub fn rounding_down(self) -> Self {
-        Self {
-            rounds_down: true,
-            ..self
-        }
+    pub fn with(self, decoder: Decoder) -> Self {
+        Self { decoder, ..self }
     }
 
     /// The texture of an image, if it has blocks.
@@ -58,7 +65,7 @@ impl<'a> SoftwareSampler<'a> {
         for tap in taps(uv, lod, &texture.texture, sampler) {
             let texel = |x: usize, y: usize| {
                 let at = [tap.texels[0][x], tap.texels[1][y]];
-                texel(texture, tap.level, at, self.rounds_down)
+                texel(texture, tap.level, at, self.decoder)
             };
             let row = |y: usize| texel(0, y).lerp(texel(1, y), tap.between.x);
             sum += row(0).lerp(row(1), tap.between.y) * tap.weight;
@@ -68,21 +75,21 @@ impl<'a> SoftwareSampler<'a> {
 }
 
 /// A decoded texel as light. Levels finer than those that were made are read from the finest of those.
-fn texel(of: &CompressedTexture, level: u32, at: [u32; 2], rounds_down: bool) -> DVec4 {
-    let mut encoded = decoded(of, level.max(of.first_level), at).unwrap_or_default();
-    if rounds_down {
-        // Whole steps are not always whole numbers of 1/255 in floating point.
-        encoded = (encoded * 255.0 + 1e-6).floor() / 255.0;
-    }
+fn texel(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> DVec4 {
+    let encoded = decoded(of, level.max(of.first_level), at, decoder).unwrap_or_default();
     if of.texture.color_space == ColorSpace::Srgb {
-        let [r, g, b] = [encoded.x, encoded.y, encoded.z].map(linear_of_srgb);
+        let linear = match decoder {
+            Decoder::EightBitsAndPolynomial => polynomial_of_srgb,
+            Decoder::Exact | Decoder::EightBits => linear_of_srgb,
+        };
+        let [r, g, b] = [encoded.x, encoded.y, encoded.z].map(linear);
         return DVec4::new(r, g, b, encoded.w);
     }
     encoded
 }
 
 /// A texel of a level as its block encodes it; `None` where there are no such blocks.
-fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2]) -> Option<DVec4> {
+fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> Option<DVec4> {
     let block_bytes = match of.texture.format {
         TexelFormat::Bc1 => 8,
         // The only other format that textures are made in.
@@ -97,18 +104,23 @@ fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2]) -> Option<DVec4> {
     let block = of.blocks.get(offset..offset + block_bytes)?;
     let texel = at[1] % BLOCK * BLOCK + at[0] % BLOCK;
     let (alpha, color) = block.split_at(block_bytes - 8);
-    let (rgb, opaque) = color_of(color, texel, alpha.is_empty());
+    let (rgb, opaque) = color_of(color, texel, alpha.is_empty(), decoder);
     let alpha = if alpha.is_empty() {
         f64::from(u8::from(opaque))
     } else {
-        alpha_of(alpha, texel)
+        let exact = alpha_of(alpha, texel);
+        match decoder {
+            Decoder::Exact => exact,
+            // Whole steps are not always whole numbers of 1/255 in floating point.
+            _ => (exact * 255.0 + 1e-6).floor() / 255.0,
+        }
     };
     Some(rgb.extend(alpha))
 }
 
 /// Colour of a texel of a BC1 block, and whether it is opaque: end points with 8 bits a channel, between which the
-/// specification interpolates without rounding. Drivers round down to 8 bits, by up to 2/3 of a step.
-fn color_of(block: &[u8], texel: u32, may_be_transparent: bool) -> (DVec3, bool) {
+/// specification interpolates without rounding.
+fn color_of(block: &[u8], texel: u32, may_be_transparent: bool, decoder: Decoder) -> (DVec3, bool) {
     let word = |at: usize| u32::from(block[at]) | u32::from(block[at + 1]) << 8;
     let ends = [word(0), word(2)];
     let [a, b] = ends.map(|c| {
@@ -125,12 +137,27 @@ fn color_of(block: &[u8], texel: u32, may_be_transparent: bool) -> (DVec3, bool)
     let color = match (index, three_colors) {
         (0, _) => a,
         (1, _) => b,
-        (2, false) => a.lerp(b, 1.0 / 3.0),
-        (3, false) => a.lerp(b, 2.0 / 3.0),
-        (2, true) => a.lerp(b, 0.5),
+        (2, false) => between(a, b, 1.0 / 3.0, decoder),
+        (3, false) => between(a, b, 2.0 / 3.0, decoder),
+        (2, true) => between(a, b, 0.5, decoder),
         _ => return (DVec3::ZERO, false),
     };
     (color, true)
+}
+
+/// A colour between end points. In 8 bits as gallivm has it, up to a step off: halves are rounded up, thirds are
+/// 85/256 and 170/256 of the difference, rounded down.
+fn between(a: DVec3, b: DVec3, share: f64, decoder: Decoder) -> DVec3 {
+    if decoder == Decoder::Exact {
+        return a.lerp(b, share);
+    }
+    let [a, b] = [a, b].map(|v| (v * 255.0).round());
+    let steps = if share == 0.5 {
+        ((a + b) / 2.0).ceil()
+    } else {
+        a + ((b - a) * (share * 256.0).floor() / 256.0).floor()
+    };
+    steps / 255.0
 }
 
 /// Alpha of a texel of a BC3 block.
@@ -168,7 +195,16 @@ fn linear_of_srgb(v: f64) -> f64 {
     }
 }
 
-/// The inverse.
+/// What llvmpipe takes for it (gallivm's lp_bld_format_srgb.c): a cubic polynomial above 15/255.
+fn polynomial_of_srgb(v: f64) -> f64 {
+    if v <= 15.0 / 255.0 {
+        v / 12.6
+    } else {
+        0.0023 + v * (0.0030 + v * (0.6935 + v * 0.3012))
+    }
+}
+
+/// The inverse of [`linear_of_srgb`].
 #[must_use]
 pub fn srgb_of_linear(v: f64) -> f64 {
     if v <= 0.003_130_8 {
@@ -228,13 +264,35 @@ mod tests {
         assert!((green - 130.0 / 255.0).abs() < 1e-12, "{green}");
         // Two thirds of blue's 132 (16 of 31 steps) are 88, a third of red's 255 is 85.
         let block = [0x10, 0x00, 0x00, 0xf8, 0xaa, 0xaa, 0xaa, 0xaa];
-        let (rgb, _) = color_of(&block, 5, false);
+        let (rgb, _) = color_of(&block, 5, false, Decoder::Exact);
         assert!(
             (rgb - DVec3::new(85.0, 0.0, 88.0) / 255.0).length() < 1e-12,
             "{rgb}"
         );
         let mixed = sample(0.25, 0.25);
         assert!((mixed.x - 0.75).abs() < 1e-12 && (mixed.y - 0.25 * green).abs() < 1e-12);
+    }
+
+    #[test]
+    fn colours_between_end_points_are_the_drivers_in_8_bits() {
+        let steps = |v: f64| DVec3::splat(v / 255.0);
+        let found = |a: f64, b: f64, share: f64| {
+            let found = between(steps(a), steps(b), share, Decoder::EightBits);
+            (found.x * 255.0).round()
+        };
+        // A third of three steps is a step, but 85/256 of them is less.
+        assert_eq!(found(0.0, 3.0, 1.0 / 3.0), 0.0);
+        assert_eq!(found(3.0, 0.0, 1.0 / 3.0), 2.0);
+        assert_eq!(found(10.0, 110.0, 2.0 / 3.0), 76.0);
+        assert_eq!(found(0.0, 1.0, 0.5), 1.0);
+        let exact = between(steps(0.0), steps(3.0), 1.0 / 3.0, Decoder::Exact);
+        assert!((exact - steps(1.0)).length() < 1e-12);
+        // The polynomial is near the curve, and not on it.
+        let apart = |v: f64| (polynomial_of_srgb(v) - linear_of_srgb(v)).abs();
+        let largest = (0..=255).map(|v| apart(f64::from(v) / 255.0));
+        let largest = largest.fold(0.0, f64::max);
+        assert!(largest > 1e-4 && largest < 2e-3, "{largest}");
+        assert!((polynomial_of_srgb(1.0) - 1.0).abs() < 1e-12);
     }
 
     #[test]
@@ -253,7 +311,7 @@ mod tests {
                 bcdec_rs::bc3(&block, &mut expected, 16);
             }
             for (texel, expected) in (0..16).zip(expected.chunks_exact(4)) {
-                let (rgb, opaque) = color_of(&block[8..], texel, bc1);
+                let (rgb, opaque) = color_of(&block[8..], texel, bc1, Decoder::Exact);
                 let alpha = if bc1 {
                     f64::from(u8::from(opaque))
                 } else {
