@@ -146,7 +146,7 @@ pub(super) fn to_front<L: Line>(set: &mut [L], line: L) -> usize {
 
 /// Moves the line to the front if it is there.
 #[inline(always)]
-fn look_up(set: &mut [u32], line: u32) -> bool {
+pub(super) fn look_up(set: &mut [u32], line: u32) -> bool {
     if let Ok(four) = <&mut [u32; 4]>::try_from(&mut *set) {
         let [first, second, third, fourth] = *four;
         if first == line {

@@ -6,6 +6,7 @@
 
 use super::EMPTY;
 use super::delayed::{DelayedFill, Missing, NOT_ASKED};
+use super::lru::look_up;
 
 /// A line on its way.
 #[derive(Clone, Copy, Debug)]
@@ -90,24 +91,6 @@ impl Set {
         self.tags = [line, first, second, third];
     }
 
-    /// Moves the line to the front if it is there.
-    #[inline(always)]
-    fn look_up(&mut self, line: u32) -> bool {
-        // Where the line lies is a coin toss to the processor, so nothing but a miss branches.
-        let [first, second, third, fourth] = self.tags;
-        let found = self.tags.map(|tag| tag == line);
-        let there = found[0] | found[1] | found[2] | found[3];
-        if there {
-            self.tags = [
-                line,
-                if found[0] { second } else { first },
-                if found[0] | found[1] { third } else { second },
-                if found[3] { third } else { fourth },
-            ];
-        }
-        there
-    }
-
     /// When a line arrives that the set does not hold.
     #[inline(always)]
     fn arrival(&self, later: &[Arrival], line: u32) -> u64 {
@@ -117,7 +100,7 @@ impl Set {
         if self.later == 0 {
             return NOT_ASKED;
         }
-        // No early end: where in the list it is, the processor cannot guess either.
+        // No early end: where in the list it is, the processor cannot guess.
         let or_that = |found, other: &Arrival| match other.line == line {
             true => other.cycle,
             false => found,
@@ -138,7 +121,7 @@ impl DelayedFill for SetOrder {
             if set.due <= now {
                 set.settle(&mut laters[index], now);
             }
-            if !set.look_up(line) {
+            if !look_up(&mut set.tags, line) {
                 let arrival = set.arrival(&laters[index], line);
                 latest = latest.max(arrival);
                 missing.push(Missing { index: at, arrival });
@@ -150,7 +133,7 @@ impl DelayedFill for SetOrder {
     #[inline(always)]
     fn look_up(&mut self, line: u32, now: u64) -> u64 {
         let (set, later) = self.settled(line, now);
-        if set.look_up(line) {
+        if look_up(&mut set.tags, line) {
             return 0;
         }
         set.arrival(later, line)
