@@ -55,51 +55,57 @@ impl SetOrder {
         }
     }
 
+    /// The set that holds a line, with all that has arrived, and what else is on its way into it.
     #[inline(always)]
-    fn index(&self, line: u32) -> usize {
-        line as usize & (self.sets.len() - 1)
+    fn settled(&mut self, line: u32, now: u64) -> (&mut Set, &mut Vec<Arrival>) {
+        let index = line as usize & (self.sets.len() - 1);
+        let (set, later) = (&mut self.sets[index], &mut self.later[index]);
+        if set.due <= now {
+            set.settle(later, now);
+        }
+        (set, later)
     }
+}
 
-    /// Fills what has arrived in a set.
+impl Set {
+    /// Fills what has arrived.
     #[inline(never)]
-    fn settle(&mut self, index: usize, now: u64) {
-        let set = &mut self.sets[index];
-        while set.due <= now {
-            let [first, second, third, _] = set.tags;
-            set.tags = [set.first, first, second, third];
-            let next = match set.later {
+    fn settle(&mut self, later: &mut Vec<Arrival>, now: u64) {
+        while self.due <= now {
+            self.fill(self.first);
+            let next = match self.later {
                 0 => None,
-                _ => self.later[index].pop(),
+                _ => later.pop(),
             };
-            match next {
-                Some(next) => {
-                    set.later -= 1;
-                    (set.due, set.first) = (next.cycle, next.line);
-                }
-                None => (set.due, set.first) = (u64::MAX, EMPTY),
+            (self.due, self.first) = (u64::MAX, EMPTY);
+            if let Some(Arrival { cycle, line }) = next {
+                (self.due, self.first) = (cycle, line);
+                self.later -= 1;
             }
         }
     }
 
-    /// When a line arrives in a settled set that does not hold it.
     #[inline(always)]
-    fn on_its_way(&self, index: usize, line: u32) -> u64 {
-        let set = &self.sets[index];
-        if set.first == line {
-            return set.due;
+    fn fill(&mut self, line: u32) {
+        let [first, second, third, _] = self.tags;
+        self.tags = [line, first, second, third];
+    }
+
+    /// When a line arrives that the set does not hold.
+    #[inline(always)]
+    fn arrival(&self, later: &[Arrival], line: u32) -> u64 {
+        if self.first == line {
+            return self.due;
         }
-        if set.later == 0 {
+        if self.later == 0 {
             return NOT_ASKED;
         }
         // No early end: where in the list it is, the processor cannot guess.
-        let later = self.later[index].iter();
-        later.fold(NOT_ASKED, |found, other| {
-            if other.line == line {
-                other.cycle
-            } else {
-                found
-            }
-        })
+        let or_that = |found, other: &Arrival| match other.line == line {
+            true => other.cycle,
+            false => found,
+        };
+        later.iter().fold(NOT_ASKED, or_that)
     }
 }
 
@@ -107,13 +113,16 @@ impl DelayedFill for SetOrder {
     #[inline(always)]
     fn look_up_all(&mut self, lines: &[u32], now: u64, missing: &mut Vec<Missing>) -> u64 {
         let mut latest = 0;
+        let (sets, laters) = (&mut *self.sets, &mut *self.later);
+        let mask = sets.len() - 1;
         for (at, &line) in (0..).zip(lines) {
-            let index = self.index(line);
-            if self.sets[index].due <= now {
-                self.settle(index, now);
+            let index = line as usize & mask;
+            let set = &mut sets[index];
+            if set.due <= now {
+                set.settle(&mut laters[index], now);
             }
-            if !look_up(&mut self.sets[index].tags, line) {
-                let arrival = self.on_its_way(index, line);
+            if !look_up(&mut set.tags, line) {
+                let arrival = set.arrival(&laters[index], line);
                 latest = latest.max(arrival);
                 missing.push(Missing { index: at, arrival });
             }
@@ -123,32 +132,24 @@ impl DelayedFill for SetOrder {
 
     #[inline(always)]
     fn look_up(&mut self, line: u32, now: u64) -> u64 {
-        let index = self.index(line);
-        if self.sets[index].due <= now {
-            self.settle(index, now);
-        }
-        if look_up(&mut self.sets[index].tags, line) {
+        let (set, later) = self.settled(line, now);
+        if look_up(&mut set.tags, line) {
             return 0;
         }
-        self.on_its_way(index, line)
+        set.arrival(later, line)
     }
 
     #[inline(always)]
     fn arrival(&mut self, line: u32, now: u64) -> u64 {
-        let index = self.index(line);
-        if self.sets[index].due <= now {
-            self.settle(index, now);
-        }
-        self.on_its_way(index, line)
+        let (set, later) = self.settled(line, now);
+        set.arrival(later, line)
     }
 
     #[inline(always)]
     fn enter(&mut self, line: u32, now: u64, arrival: u64) {
-        let index = self.index(line);
-        let set = &mut self.sets[index];
+        let (set, later) = self.settled(line, now);
         if arrival <= now {
-            let [first, second, third, _] = set.tags;
-            set.tags = [line, first, second, third];
+            set.fill(line);
             return;
         }
         if set.due == u64::MAX {
@@ -156,7 +157,10 @@ impl DelayedFill for SetOrder {
             return;
         }
         set.later += 1;
-        let later = &mut self.later[index];
+        let new = Arrival {
+            cycle: arrival,
+            line,
+        };
         if arrival < set.due {
             later.push(Arrival {
                 cycle: set.due,
@@ -165,10 +169,6 @@ impl DelayedFill for SetOrder {
             (set.due, set.first) = (arrival, line);
             return;
         }
-        let new = Arrival {
-            cycle: arrival,
-            line,
-        };
         let mut at = later.len();
         later.push(new);
         while at > 0 && later[at - 1].cycle <= arrival {

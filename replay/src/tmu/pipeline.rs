@@ -76,14 +76,12 @@ pub struct Pending {
     pub segment: u32,
 }
 
-/// How many footprints wait after `now`, and when the first of what they wait for is there. What is
-/// there leaves the list.
-#[inline]
-fn waiting(pending: &mut Vec<Pending>, now: u64) -> (u32, u64) {
-    let (mut waiting, mut earliest, mut left) = (0, u64::MAX, 0);
+/// How many footprints wait after `now`, and when the first of what they wait for is there.
+#[inline(always)]
+fn waiting(pending: &[Pending], now: u64) -> (u32, u64) {
+    let (mut waiting, mut earliest) = (0, u64::MAX);
     let (mut segment, mut footprints) = (0, 0_u32);
-    for index in 0..pending.len() {
-        let one = pending[index];
+    for one in pending {
         if one.segment != segment {
             waiting += footprints.count_ones();
             (segment, footprints) = (one.segment, 0);
@@ -92,10 +90,7 @@ fn waiting(pending: &mut Vec<Pending>, now: u64) -> (u32, u64) {
         let late = one.ready > now;
         footprints |= if late { one.footprints } else { 0 };
         earliest = earliest.min(if late { one.ready } else { u64::MAX });
-        pending[left] = one;
-        left += usize::from(late);
     }
-    pending.truncate(left);
     (waiting + footprints.count_ones(), earliest)
 }
 
@@ -190,7 +185,7 @@ impl Pipeline {
             self.trip(0, thread);
             return;
         }
-        let list = &mut self.pending[thread.list as usize];
+        let list = &self.pending[thread.list as usize];
         let waited = thread.waiting;
         (thread.waiting, thread.earliest) = waiting(list, self.clock);
         if thread.waiting == 0 {
@@ -331,12 +326,9 @@ mod tests {
             footprints,
             segment,
         };
-        let mut list = vec![one(9, 0b11, 0), one(5, 0b110, 0), one(7, 0b1, 3)];
-        assert_eq!(waiting(&mut list, 4), (4, 5));
-        assert_eq!(waiting(&mut list, 6), (3, 7));
-        assert_eq!(waiting(&mut list, 7), (2, 9));
-        assert_eq!(list, [one(9, 0b11, 0)]);
-        assert_eq!(waiting(&mut list, 9), (0, u64::MAX));
+        let list = [one(9, 0b11, 0), one(5, 0b110, 0), one(7, 0b1, 3)];
+        let found = [4, 6, 7, 9].map(|now| waiting(&list, now));
+        assert_eq!(found, [(4, 5), (3, 7), (2, 9), (0, u64::MAX)]);
     }
 
     #[test]
