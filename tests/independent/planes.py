@@ -8,7 +8,7 @@ from pathlib import Path
 from container import require, unzigzag
 
 FORMAT = Path(__file__).resolve().parents[2] / "FORMAT.md"
-ESCAPE_PLACE = 105
+ESCAPE_PLACE = 0
 ESCAPE_SIZES = 625
 
 
@@ -262,7 +262,7 @@ class Tile:
         t = self.bits.symbol(self.codes["place"][context])
         if t == ESCAPE_PLACE:
             return base + self.bits.take(6), self.bits.take(4), self.bits.take(4)
-        step, mask = 1 + t // 15, 1 + t % 15
+        step, mask = 1 + t // 16, t % 16
         if step == 7:
             step = self.bits.take(6)
         place = base + step

@@ -18,14 +18,19 @@ use crate::varint::{low_u32, unzigzag};
 /// What was expected where the bits went wrong.
 pub(super) type Outcome<T> = Result<T, &'static str>;
 
-/// A group of a run: the quad that tells its plane, and the plane.
-struct Told {
+/// A group of a run.
+#[derive(Clone, Copy)]
+struct First {
     /// Index of its first record.
     record: u32,
     /// Records after that one.
     others: u32,
     /// It is the first group of its run.
     starts_run: bool,
+}
+
+/// Its plane.
+struct Told {
     plane: Plane,
     departure: Departure,
     noise: usize,
@@ -43,6 +48,7 @@ struct Later {
 pub(super) struct Decoder<'a> {
     bits: BitReader<'a>,
     codes: &'static Codes,
+    firsts: Vec<First>,
     told: Vec<Told>,
     later: Vec<Later>,
 }
@@ -52,6 +58,7 @@ impl<'a> Decoder<'a> {
         Self {
             bits: BitReader::new(input),
             codes: Codes::get(),
+            firsts: Vec::new(),
             told: Vec::new(),
             later: Vec::new(),
         }
@@ -64,7 +71,7 @@ impl<'a> Decoder<'a> {
 
     /// Reads the runs and their records.
     pub fn tile(&mut self, runs: u32, records: u32, tile: &mut Tile) -> Outcome<()> {
-        self.told.reserve(tile.runs.capacity());
+        self.firsts.reserve(tile.runs.capacity());
         self.later.reserve(tile.records.capacity());
         self.places(runs, records, tile)?;
         self.planes(&mut tile.records)?;
@@ -182,18 +189,15 @@ impl<'a> Decoder<'a> {
             let plane = planes.get_mut(usize::from(place.group) % GROUPS);
             let plane = plane.ok_or(SHORT)?;
             if *plane == u32::MAX {
-                *plane = low_u32(self.told.len() as u64);
-                self.told.push(Told {
+                *plane = low_u32(self.firsts.len() as u64);
+                self.firsts.push(First {
                     record: number,
                     others: 0,
                     starts_run: number == first,
-                    plane: Plane::default(),
-                    departure: Departure::default(),
-                    noise: 0,
                 });
             } else {
-                if let Some(told) = self.told.get_mut(*plane as usize) {
-                    told.others += 1;
+                if let Some(first) = self.firsts.get_mut(*plane as usize) {
+                    first.others += 1;
                 }
                 self.later.push(Later {
                     record: number,
@@ -208,19 +212,16 @@ impl<'a> Decoder<'a> {
 
     /// First quads and planes.
     fn planes(&mut self, records: &mut [QuadRecord]) -> Outcome<()> {
-        let groups = self.told.iter().map(|told| {
-            let record = records.get(told.record as usize);
+        let firsts = std::mem::take(&mut self.firsts);
+        self.told.reserve(firsts.len());
+        let groups = firsts.iter().map(|first| {
+            let record = records.get(first.record as usize);
             record.map_or(0, |record| record.group)
         });
         let mut lineage = Lineage::new(groups);
-        let mut before = Plane::default();
-        for number in 0..self.told.len() {
-            let Some(told) = self.told.get(number) else {
-                break;
-            };
-            let of_run = (!told.starts_run).then_some(before);
-            let (first, others) = (told.record as usize, told.others);
-            let record = records.get_mut(first).ok_or(SHORT)?;
+        let mut last = Plane::default();
+        for (number, first) in firsts.iter().enumerate() {
+            let record = records.get_mut(first.record as usize).ok_or(SHORT)?;
             let back = self.number(&self.codes.parent)? - 1;
             let back = usize::try_from(back).unwrap_or(usize::MAX);
             let parent = match lineage.parent(record.group, back) {
@@ -228,10 +229,10 @@ impl<'a> Decoder<'a> {
                 Some(None) => Plane::default(),
                 None => return Err("an earlier run of the group"),
             };
-            let (plane, departure, noise) = self.first(record, &parent, of_run, others)?;
-            let told = self.told.get_mut(number).ok_or(SHORT)?;
-            (told.plane, told.departure, told.noise) = (plane, departure, noise);
-            before = plane;
+            let of_run = (!first.starts_run).then_some(last);
+            let told = self.first(record, &parent, of_run, first.others)?;
+            last = told.plane;
+            self.told.push(told);
             lineage.note(record.group, number);
         }
         Ok(())
@@ -245,7 +246,7 @@ impl<'a> Decoder<'a> {
         parent: &Plane,
         of_run: Option<Plane>,
         others: u32,
-    ) -> Outcome<(Plane, Departure, usize)> {
+    ) -> Outcome<Told> {
         let QuadRecord { x, y, .. } = *record;
         let mut left = [[0; 2]; 4];
         let mut width = 0;
@@ -273,7 +274,11 @@ impl<'a> Decoder<'a> {
         } else {
             Plane::corrected(x, y, &quad, tilt, level, &by)
         };
-        Ok((plane, Departure::start(mode, x, y), first_noise(level)))
+        Ok(Told {
+            plane,
+            departure: Departure::start(mode, x, y),
+            noise: first_noise(level),
+        })
     }
 
     /// How residuals are told, and how fine the correction of the plane is; a lone record has

@@ -93,10 +93,10 @@ impl Departure {
             Mode::Bending | Mode::Following => {
                 let (x, y) = (x.into(), y.into());
                 let guess = self.guess(x, y);
-                let [wide_uv, dx, dy, cross] = quad.map(|pair| pair.map(Wrapping));
+                let [as_uv, dx, dy, cross] = quad.map(|pair| pair.map(Wrapping));
                 let now = Derivatives { dx, dy, cross };
                 let guess_uv = self.last.uv(x, y, &now);
-                self.last.learn(x, y, wide_uv, now, true);
+                self.last.learn(x, y, as_uv, now, true);
                 let plain = |pair: [Wrapping<i32>; 2]| pair.map(|number| number.0);
                 [
                     minus(uv, plain(guess_uv)),

@@ -7,33 +7,13 @@ use super::encode::Sink;
 use super::{GROUPS, SHORT};
 use crate::varint::low_u32;
 
-/// Masks of a quad.
-const MASKS: u32 = 15;
-/// Steps along the curve that have symbols, 1 to this; the last symbol stands for all from here on,
-/// and the step follows.
+/// Steps along the curve that have symbols, 1 to this; the last one stands for all from here on,
+/// and the step follows. Symbols are `16 * (step - 1) + mask`.
 const STEPS: u32 = 7;
-/// The symbol after which step, mask and group follow as numbers.
-pub(super) const ESCAPE_PLACE: u32 = STEPS * MASKS;
+/// The symbol after which step, mask and group follow as numbers: no step has a mask of 0.
+pub(super) const ESCAPE_PLACE: u32 = 0;
 
 const OUTSIDE: &str = "a quad inside the tile";
-
-/// Step and mask of each symbol but the escape.
-const STEP_AND_MASK: [[u8; 2]; 128] = {
-    let mut table = [[0; 2]; 128];
-    let mut symbol = 0;
-    while symbol < 128 {
-        #[allow(
-            clippy::indexing_slicing,
-            clippy::cast_possible_truncation,
-            reason = "evaluated when compiled"
-        )]
-        {
-            table[symbol] = [1 + (symbol / 15) as u8, 1 + (symbol % 15) as u8];
-        }
-        symbol += 1;
-    }
-    table
-};
 
 /// Place on the Morton curve, covered lanes, group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,6 +164,11 @@ impl Places {
         let same_quad = !last.first_of_run
             & (place.morton == last.place.morton)
             & (place.mask == last.place.mask);
+        self.note_other(last, place, likeliest, same_quad);
+    }
+
+    #[inline(always)]
+    fn note_other(&mut self, last: &mut Last, place: Place, likeliest: bool, same_quad: bool) {
         if let Some(follow) = self.follows.get_mut(usize::from(last.place.group) % GROUPS) {
             *follow = Follow {
                 group: place.group,
@@ -249,9 +234,8 @@ impl Places {
             self.note(last, place, likeliest);
             return Ok((place, used));
         }
-        let entry = STEP_AND_MASK.get(symbol as usize & 127).copied();
-        let [step, mask] = entry.unwrap_or_default();
-        let mut step = u32::from(step);
+        let mask = (symbol & 15).to_le_bytes()[0];
+        let mut step = 1 + (symbol >> 4);
         if step == STEPS {
             step = low_u32(bits & 63);
             used += 6;
@@ -265,7 +249,12 @@ impl Places {
             mask: self.swap_mask(morton, mask),
             group: follow.group,
         };
-        self.note(last, place, mask == 15);
+        if step == 0 {
+            self.note(last, place, mask == 15);
+        } else {
+            // The context of the next code does not wait for the mask.
+            self.note_other(last, place, mask == 15, false);
+        }
         Ok((place, used))
     }
 
@@ -299,7 +288,7 @@ impl Places {
         let code = &codes.place[last.context()];
         let swapped = self.swap_mask(place.morton, place.mask);
         let symbol = if place.group == follow.group && step > 0 {
-            (step.min(STEPS) - 1) * MASKS + u32::from(swapped) - 1
+            (step.min(STEPS) - 1) << 4 | u32::from(swapped)
         } else {
             ESCAPE_PLACE
         };

@@ -35,7 +35,11 @@ const SMALL: [[i8; 2]; 32] = {
             let mut v = -2;
             while v <= 2 {
                 if class_of(u, v) == class {
-                    #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+                    #[allow(
+                        clippy::indexing_slicing,
+                        clippy::cast_possible_truncation,
+                        reason = "evaluated when compiled"
+                    )]
                     {
                         pairs[at] = [u as i8, v as i8];
                     }
@@ -73,6 +77,7 @@ pub(super) struct Classes {
 
 impl Classes {
     /// From each class.
+    #[allow(clippy::cast_possible_truncation, reason = "classes take three bits")]
     pub const fn new([dx, dy, cross, uv]: [u32; 4]) -> Self {
         const SIZE: u32 = 0x3_2110;
         let size = nibble(SIZE, dx) + nibble(SIZE, dy) + nibble(SIZE, cross) + nibble(SIZE, uv);
@@ -163,18 +168,32 @@ pub(super) const fn class_bits(class: u32) -> u32 {
 
 /// Class of a pair and, unless it is wide, the bits that name it.
 pub(super) fn classify([u, v]: Pair) -> (u32, u32) {
-    let class = class_of(u, v);
-    if class == WIDE {
-        return (WIDE, 0);
-    }
-    let is = |pair: &[i8; 2]| pair.map(i32::from) == [u, v];
-    let index = (0..)
-        .zip(&SMALL)
-        .skip(nibble(STARTS, class) as usize)
-        .find(|(_, pair)| is(pair));
-    let index = index.map_or(0, |(index, _)| index);
-    (class, index - nibble(STARTS, class))
+    let place = |number: i32| usize::try_from(number.checked_add(2)?).ok();
+    let found = place(u)
+        .zip(place(v))
+        .and_then(|(u, v)| NAMES.get(u)?.get(v));
+    found.copied().unwrap_or((WIDE, 0))
 }
+
+/// Class and index of each pair from (-2, -2) to (2, 2).
+const NAMES: [[(u32, u32); 5]; 5] = {
+    let mut names = [[(0, 0); 5]; 5];
+    let mut at = 0;
+    while at < 25 {
+        #[allow(
+            clippy::indexing_slicing,
+            clippy::cast_possible_truncation,
+            reason = "evaluated when compiled"
+        )]
+        {
+            let [u, v] = SMALL[at];
+            let class = class_of(u as i32, v as i32);
+            names[(u + 2) as usize][(v + 2) as usize] = (class, at as u32 - nibble(STARTS, class));
+        }
+        at += 1;
+    }
+    names
+};
 
 /// Bits that the larger of a pair needs.
 pub(super) fn width(pair: Pair) -> u32 {
