@@ -1,4 +1,4 @@
-"""Encoding 2 of a .textrace's tiles.
+"""Encoding 3 of a .textrace's tiles.
 
 Written from FORMAT.md alone; even the code lengths are read from there.
 """
@@ -8,8 +8,8 @@ from pathlib import Path
 from container import require, unzigzag
 
 FORMAT = Path(__file__).resolve().parents[2] / "FORMAT.md"
-ESCAPE_PLACE = 105
-ESCAPE_SIZES = 256
+ESCAPE_PLACE = 0
+ESCAPE_SIZES = 625
 
 
 def i32(number):
@@ -36,7 +36,7 @@ class Code:
 
 def read_codes():
     """The lines of the block below the heading: a name, lengths."""
-    _, text = FORMAT.read_text(encoding="utf-8").split("## Code lengths of encoding 2\n")
+    _, text = FORMAT.read_text(encoding="utf-8").split("## Code lengths of encoding 3\n")
     _, block, *_ = text.split("```")
     codes = {}
     for line in block.split("\n"):
@@ -141,23 +141,74 @@ def least_squares(dx, dy, cross, p, q):
     return one(p + ((B + L) * E - C * F) / D), one(q + ((A + L) * F - C * E) / D)
 
 
-def of_size(size):
+def pairs_of(holds):
     """Pairs of a class by u, then v."""
-    numbers = range(-size, size + 1)
-    return [[u, v] for u in numbers for v in numbers if max(abs(u), abs(v)) == size]
+    numbers = range(-2, 3)
+    return [[u, v] for u in numbers for v in numbers if holds(abs(u), abs(v))]
 
 
-SMALL = [[], of_size(1), of_size(2)]
+SMALL = [
+    [],
+    pairs_of(lambda u, v: u + v == 1),
+    pairs_of(lambda u, v: u == v == 1),
+    pairs_of(lambda u, v: max(u, v) == 2),
+]
+NUMBER_BITS = [0, 2, 2, 4]
+SIZES = [0, 1, 1, 2, 3]
 NOISE = [0, 1, 1, 2, 2, 3, 3, 4, 4, 4, 5, 5, 5]
+
+
+class Context:
+    """Encoding 1's, of departures."""
+
+    def __init__(self, x, y):
+        self.x, self.y = x, y
+        self.uv = self.dx = self.dy = self.cross = self.sx = self.sy = [0, 0]
+
+    def next(self, mode, x, y, r_uv, r_dx, r_dy, r_cross):
+        R, D = x - self.x, y - self.y
+        quad = [[], [], [], []]
+        sx, sy = list(self.sx), list(self.sy)
+        for i in range(2):
+            dx, dy, cross = self.dx[i], self.dy[i], self.cross[i]
+            bend_x, bend_y = 2 * D * cross, 2 * R * cross
+            new_dx, new_dy = dx, dy
+            if mode == 2:
+                new_dx = i32(dx + R * self.sx[i] + bend_x)
+                new_dy = i32(dy + D * self.sy[i] + bend_y)
+            new_dx, new_dy = i32(new_dx + r_dx[i]), i32(new_dy + r_dy[i])
+            uv = self.uv[i] + along(R, dx, i32(new_dx - bend_x)) + along(D, i32(dy + bend_y), new_dy)
+            if abs(R) == 1:
+                sx[i] = i32(R * (new_dx - dx - bend_x))
+            if abs(D) == 1:
+                sy[i] = i32(D * (new_dy - dy - bend_y))
+            for to, value in zip(quad, (uv + r_uv[i], new_dx, new_dy, cross + r_cross[i])):
+                to.append(i32(value))
+        self.x, self.y, self.sx, self.sy = x, y, sx, sy
+        self.uv, self.dx, self.dy, self.cross = quad
+        return quad
+
+
+def along(n, start, end):
+    return n * (start + end) - (i32(end - start) >> 1 if n else 0)
+
+
+class Told:
+    """A group's plane in a run, and its records' numbers."""
+
+    def __init__(self, x, y, group, starts_run):
+        self.x, self.y, self.group, self.starts_run = x, y, group, starts_run
+        self.others = 0
 
 
 class Tile:
     def __init__(self, data, codes):
         self.bits = Bits(data)
         self.codes = codes
-        self.earlier = [[] for _ in range(16)]
         self.place = self.mask = self.group = self.start = self.draw = 0
-        self.one = False
+        self.one = self.likely = False
+        # x, y, mask, group and the plane of each record; of each plane the first record.
+        self.records, self.planes = [], []
         self.start_anew()
 
     def start_anew(self):
@@ -165,28 +216,53 @@ class Tile:
         self.covered = [0] * 64
         self.group = 0
 
-    def start_run(self, draw, count):
+    def run(self, draw, count):
         if draw != self.draw:
             self.start_anew()
             self.draw = draw
-        self.count, self.first = count, True
-        self.told = None
-        self.planes = {}
+        self.regular = any(same for _, same in self.follows) and self.bits.take(1)
+        self.first = True
+        of_run = {}
+        for _ in range(count):
+            place, mask, group = self.next_place()
+            require(0 <= place < 64, "a quad outside its tile")
+            x = place & 1 | place >> 1 & 2 | place >> 2 & 4
+            y = place >> 1 & 1 | place >> 2 & 2 | place >> 3 & 4
+            is_first = group not in of_run
+            if is_first:
+                of_run[group] = Told(x, y, group, self.first)
+                self.planes.append(of_run[group])
+            else:
+                of_run[group].others += 1
+            self.records.append((x, y, mask, group, of_run[group], is_first))
+            self.note(place, mask, group)
+
+    def note(self, place, mask, group):
+        same = not self.first and (place, mask) == (self.place, self.mask)
+        self.follows[self.group] = (group, same)
+        rest = 15 & ~self.covered[place]
+        self.covered[place] |= mask
+        if not same:
+            self.likely = mask == (rest or 15)
+            self.one = not self.first and place == self.place + 1
+        if self.first:
+            self.start = place
+        self.place, self.mask, self.group, self.first = place, mask, group, False
 
     def next_place(self):
         group, same = self.follows[self.group]
-        if not self.first and same and self.bits.take(1):
+        if not self.first and same and (self.regular or self.bits.take(1)):
             return self.place, self.mask, group
         if self.first:
             base = (self.start ^ self.bits.symbol(self.codes["start"][0])) - 1
             context = 16
         else:
             base = self.place
-            context = 4 * (base & 3) + 2 * (self.mask == 15) + self.one
+            context = 4 * (base & 3) + 2 * self.likely + self.one
         t = self.bits.symbol(self.codes["place"][context])
         if t == ESCAPE_PLACE:
             return base + self.bits.take(6), self.bits.take(4), self.bits.take(4)
-        step, mask = 1 + t // 15, 1 + t % 15
+        step, mask = 1 + t // 16, t % 16
         if step == 7:
             step = self.bits.take(6)
         place = base + step
@@ -196,52 +272,39 @@ class Tile:
             mask ^= 15 ^ rest
         return place, mask, group
 
-    def record(self):
-        place, mask, group = self.next_place()
-        require(0 <= place < 64, "a quad outside its tile")
-        x = place & 1 | place >> 1 & 2 | place >> 2 & 4
-        y = place >> 1 & 1 | place >> 2 & 2 | place >> 3 & 4
-        quad = self.later(group, x, y) if group in self.planes else self.told_first(group, x, y)
-        same = not self.first and (place, mask) == (self.place, self.mask)
-        self.follows[self.group] = (group, same)
-        self.covered[place] |= mask
-        if not same:
-            self.one = not self.first and place == self.place + 1
-        if self.first:
-            self.start = place
-        self.place, self.mask, self.group, self.first = place, mask, group, False
-        uv, dx, dy, cross = quad
-        return x, y, mask, group, uv, dx, dy, cross
+    def tell_planes(self):
+        earlier = [[] for _ in range(16)]
+        last = None
+        for told in self.planes:
+            self.tell(told, earlier[told.group], None if told.starts_run else last)
+            last = told.plane
 
-    def told_first(self, group, x, y):
-        bits, codes = self.bits, self.codes
+    def tell(self, told, earlier, of_run):
+        bits, codes, x, y = self.bits, self.codes, told.x, told.y
         back = bits.power(codes["parent"][0]) - 1
-        earlier = self.earlier[group]
         require(back <= len(earlier), "a plane that is not there")
         parent = Plane() if back == len(earlier) else earlier[-1 - back]
-        p, q = (self.told or parent).tilt(x, y)
-        uv, dx, dy, _ = parent.says(x, y)
-        width, quad = 0, []
+        width, left = 0, []
         for i in range(4):
             width += unzigzag(bits.symbol(codes["first"][i]))
-            expected = [dx, dy, None, uv][i]
-            if i == 2:
-                below = -least((1.0 + p) + q)
-                dx, dy = quad
-                expected = [wide((dx[k] * q + dy[k] * p) / below) for k in range(2)]
-            left = bits.pair(width)
-            quad.append(wrapped(*(expected[k] + left[k] for k in range(2))))
-        dx, dy, cross, uv = quad
-        if not self.told:
-            p, q = least_squares(dx, dy, cross, p, q)
+            left.append(bits.pair(width))
         mode = level = 0
-        if self.count > 1:
-            context = min(self.count.bit_length() - 2, 3)
+        if told.others:
+            context = min((told.others + 1).bit_length() - 2, 3)
             mode, level = divmod(bits.symbol(codes["level"][context]), 8)
-            require(mode <= 2, "a mode")
         by = [[0, 0]] * 4
         if level:
             by = [bits.pair(bits.symbol(codes["correction"][i])) for i in range(4)]
+        p, q = (of_run or parent).tilt(x, y)
+        uv, dx, dy, _ = parent.says(x, y)
+        add = lambda a, b: wrapped(a[0] + b[0], a[1] + b[1])
+        dx, dy = add(dx, left[0]), add(dy, left[1])
+        below = -least((1.0 + p) + q)
+        cross = add([wide((dx[k] * q + dy[k] * p) / below) for k in range(2)], left[2])
+        uv = add(uv, left[3])
+        if not of_run:
+            p, q = least_squares(dx, dy, cross, p, q)
+        if level:
             size = max(abs(d) for d in dx + dy).bit_length()
             p = one(p + by[3][0] * 2.0 ** -(2 * level + size))
             q = one(q + by[3][1] * 2.0 ** -(2 * level + size))
@@ -252,47 +315,54 @@ class Tile:
         plane.right = [dx[k] * (1.0 + p) + by[1][k] * unit for k in range(2)]
         plane.down = [dy[k] * (1.0 + q) + by[2][k] * unit for k in range(2)]
         earlier.append(plane)
-        self.told = plane
-        last = (x, y, [[0, 0]] * 4)
-        self.planes[group] = [plane, mode, 2 if level else 3, last]
-        return uv, dx, dy, cross
+        told.plane, told.quad = plane, (uv, dx, dy, cross)
+        told.mode, told.noise, told.context = mode, 2 if level else 3, Context(x, y)
 
-    def later(self, group, x, y):
-        plane, mode, noise, last = self.planes[group]
-        z = self.bits.symbol(self.codes["sizes"][noise])
-        if z == ESCAPE_SIZES:
-            z = self.bits.take(8)
-        classes = [z >> 2 * i & 3 for i in range(4)]
-        dx, dy, cross, uv = (self.departure(each) for each in classes)
-        if mode == 1:
+    def rows(self):
+        later = [[record, []] for record in self.records if not record[5]]
+        for record, pairs in later:
+            told = record[4]
+            z = self.bits.symbol(self.codes["sizes"][6 * told.mode + told.noise])
+            if z == ESCAPE_SIZES:
+                classes = [self.bits.take(3) for _ in range(4)]
+                require(max(classes) <= 4, "a class")
+            else:
+                classes = [z // 5**i % 5 for i in range(4)]
+            told.noise = NOISE[sum(SIZES[each] for each in classes)]
+            pairs.extend(classes)
+        for _, pairs in later:
+            for i, each in enumerate(pairs):
+                if each < 4:
+                    pairs[i] = SMALL[each][self.bits.take(NUMBER_BITS[each])] if each else [0, 0]
+        for _, pairs in later:
+            for i, each in enumerate(pairs):
+                if each == 4:
+                    pairs[i] = self.bits.pair(self.bits.symbol(self.codes["later"][0]))
+        later = iter(later)
+        rows = []
+        for x, y, mask, group, told, is_first in self.records:
+            quad = told.quad if is_first else self.departed(told, x, y, next(later)[1])
+            rows.append((x, y, mask, group, *quad))
+        return rows
+
+    def departed(self, told, x, y, pairs):
+        dx, dy, cross, uv = pairs
+        departure = [uv, dx, dy, cross]
+        if told.mode == 1:
             cross = [cross[i] + uv[i] - dx[i] - dy[i] for i in range(2)]
             dx = [dx[i] - uv[i] for i in range(2)]
             dy = [dy[i] - uv[i] for i in range(2)]
-        if mode == 2:
-            lx, ly, (l_uv, l_dx, l_dy, l_cross) = last
-            dx, dy, cross = (
-                [a[i] + b[i] for i in range(2)] for a, b in ((l_dx, dx), (l_dy, dy), (l_cross, cross))
-            )
-            uv = [
-                l_uv[i] + uv[i] + (x - lx) * (l_dx[i] + dx[i]) + (y - ly) * (l_dy[i] + dy[i])
-                for i in range(2)
-            ]
-        departure = [wrapped(*pair) for pair in (uv, dx, dy, cross)]
-        noise = NOISE[sum(classes)]
-        self.planes[group] = [plane, mode, noise, (x, y, departure)]
-        says = plane.says(x, y)
+            departure = [uv, dx, dy, cross]
+        elif told.mode >= 2:
+            departure = told.context.next(told.mode, x, y, uv, dx, dy, cross)
+        says = told.plane.says(x, y)
         return [wrapped(a[0] + b[0], a[1] + b[1]) for a, b in zip(says, departure)]
-
-    def departure(self, size):
-        if size == 3:
-            return self.bits.pair(self.bits.symbol(self.codes["later"][0]))
-        return SMALL[size][self.bits.take(2 + size)] if size else [0, 0]
 
 
 def decode_planes(data, runs, records, codes):
     tile = Tile(data.take(data.left()), codes)
     bits = tile.bits
-    heads, rows, following, draw = [], [], 0, 0
+    heads, following, draw = [], 0, 0
     for _ in range(runs):
         head = bits.symbol(codes["header"][0])
         primitive = following - 1 + (1 << (head >> 1)) + bits.take(head >> 1)
@@ -300,11 +370,12 @@ def decode_planes(data, runs, records, codes):
         if head & 1:
             draw = bits.gamma() - 1
         count = bits.power(codes["count"][0])
-        require(len(rows) + count <= records, "records of a run")
+        require(len(tile.records) + count <= records, "records of a run")
         heads.append((primitive, draw, count))
         following = primitive + 1
-        tile.start_run(draw, count)
-        rows.extend(tile.record() for _ in range(count))
-    require(len(rows) == records, "records of the runs")
+        tile.run(draw, count)
+    require(len(tile.records) == records, "records of the runs")
+    tile.tell_planes()
+    rows = tile.rows()
     require(bits.left < 8 and not bits.number, "bits after the last record")
     return heads, rows

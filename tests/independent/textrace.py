@@ -11,6 +11,7 @@ from container import META, Bytes, check_meta, parse_json, print_line, read, req
 from container import shaped, tile_spans, unzigzag
 from planes import decode_planes, read_codes
 
+ENCODINGS = (0, 1, 3)
 TAGS = ["META", "TEXS", "SMPS", "DRAW", "PASS", "TILE", "TIDX"]
 FORMATS = {
     1: "bc1",
@@ -274,7 +275,7 @@ def main(path):
     entries = [index.fields("QIIIIQ") for _ in places]
     index.end()
     touched = [entry for entry in entries if entry[3]]
-    require(all(not any(e[:5]) and e[5] < 3 for e in entries if not e[3]), "an untouched tile")
+    require(all(not any(e[:5]) and e[5] in ENCODINGS for e in entries if not e[3]), "an untouched tile")
     tile_spans([entry[:3] for entry in touched], chunks["TILE"])
     codes = read_codes()
 
@@ -284,8 +285,8 @@ def main(path):
     for (number, tile), (offset, size, _, records, runs, encoding) in zip(places, entries):
         if not records:
             continue
-        require(runs <= records and encoding < 3, "an index entry")
-        decode = [decode_raw, decode_delta, planes][encoding]
+        require(runs <= records and encoding in ENCODINGS, "an index entry")
+        decode = {0: decode_raw, 1: decode_delta, 3: planes}[encoding]
         heads, rows = decode(Bytes(chunks["TILE"][offset : offset + size]), runs, records)
         check_tile(heads, rows, draws)
         rows = iter(rows)

@@ -158,6 +158,10 @@ fn python_reads_a_fresh_capture_in_every_encoding_as_replay_does() {
         assert_eq!(check(&other), records);
         run_ok(program("replay").arg("diff").args([&delta, &other]));
     }
+    let captured = folder.path().join("captured.textrace");
+    let encoding = ["raster", "teapot", "--encoding", "planes"];
+    run_ok(program("tracegen").args(encoding).args(size).arg(&captured));
+    assert_eq!(check(&captured), records);
 }
 
 #[test]

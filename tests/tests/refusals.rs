@@ -91,12 +91,12 @@ fn an_unknown_chunk_is_skipped_but_its_damage_is_not() {
 fn an_untouched_tiles_encoding_means_nothing() {
     let mut parts = texture_parts();
     let untouched = parts.tiles().iter().position(Vec::is_empty).expect("one");
-    for encoding in [0, 1, 2] {
+    for encoding in [0, 1, 3] {
         parts.put(b"TIDX", untouched * 32 + 24, &[encoding]);
         assert_eq!(outcome(parts.sealed()), Ok(()));
     }
-    parts.put(b"TIDX", untouched * 32 + 24, &[3]);
-    assert_refused(parts.sealed(), "an encoding of 0, 1 or 2");
+    parts.put(b"TIDX", untouched * 32 + 24, &[2]);
+    assert_refused(parts.sealed(), "an encoding of 0, 1 or 3");
     parts.put(b"TIDX", untouched * 32 + 24, &[0]);
     parts.put(b"TIDX", untouched * 32 + 20, &[1]);
     assert_refused(parts.sealed(), "an untouched tile's entry");

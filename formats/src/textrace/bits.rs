@@ -52,6 +52,7 @@ impl BitWriter {
 }
 
 /// Reads bits from bytes that end with padding.
+#[derive(Clone, Copy)]
 pub(in crate::textrace) struct BitReader<'a> {
     bytes: &'a [u8],
     bit: usize,

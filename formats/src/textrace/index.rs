@@ -45,7 +45,7 @@ impl IndexEntry {
         .parse(input)?;
         let (rest, id) = context("an index entry of 32 bytes", le_u64).parse(at_encoding)?;
         let encoding = Encoding::from_id(id).ok_or_else(|| {
-            nom::Err::Failure(Fault::new(at_encoding, "an encoding of 0, 1 or 2", id))
+            nom::Err::Failure(Fault::new(at_encoding, "an encoding of 0, 1 or 3", id))
         })?;
         let entry = Self {
             span,

@@ -50,7 +50,7 @@ pub enum Encoding {
     #[default]
     Delta = 1,
     /// A plane for each primitive, and what quads leave over.
-    Planes = 2,
+    Planes = 3,
 }
 
 impl Encoding {

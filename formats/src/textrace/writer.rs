@@ -78,6 +78,7 @@ pub struct TextraceWriter<W = AtomicFile> {
     /// Index slot that the next tile may take at the earliest.
     next_slot: usize,
     tile_bytes: u64,
+    encoding: Encoding,
 }
 
 impl TextraceWriter<AtomicFile> {
@@ -132,7 +133,20 @@ impl<W: Write + Seek> TextraceWriter<W> {
             index: vec![IndexEntry::default(); usize::try_from(slots).map_err(too_many)?],
             next_slot: 0,
             tile_bytes: 0,
+            encoding: Encoding::default(),
         })
+    }
+
+    /// Chooses how tiles are encoded.
+    #[must_use]
+    pub fn with_encoding(self, encoding: Encoding) -> Self {
+        Self { encoding, ..self }
+    }
+
+    /// How whoever encodes tiles for [`Self::append`] should.
+    #[must_use]
+    pub fn encoding(&self) -> Encoding {
+        self.encoding
     }
 
     /// Encodes and appends one tile.
@@ -140,7 +154,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
     /// # Errors
     /// When the tile breaks an invariant, is out of order, or cannot be written.
     pub fn write_tile(&mut self, pass: usize, tile_index: usize, tile: &Tile) -> Result<()> {
-        let encoded = encode_tile(&self.tables, tile)?;
+        let encoded = encode_tile_as(self.encoding, &self.tables, tile)?;
         self.append(pass, tile_index, encoded)
     }
 

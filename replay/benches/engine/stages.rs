@@ -2,7 +2,7 @@
 
 use crate::plain_lru;
 use crate::table::Row;
-use formats::textrace::{Textrace, Tile};
+use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
 use replay::cache::AnyCache;
 use replay::config::{CacheConfig, Mode, Order, RunConfig};
 use replay::engine::replay_all;
@@ -71,7 +71,10 @@ pub fn measure(trace: &Textrace) -> Vec<Row> {
         cores: 1,
         ..RunConfig::default()
     };
-    let mut rows = vec![decode(trace)];
+    let mut rows: Vec<Row> = [Encoding::Delta, Encoding::Planes]
+        .into_iter()
+        .map(|encoding| decode(&encoded(trace, encoding), encoding))
+        .collect();
     let expander = Expander::new(trace, &config).expect("the trace's tables fit together");
     let memory = LineMemory::new(ROOM_BYTES);
     let mut counts = TraceCounts::new(expander.bins());
@@ -138,14 +141,35 @@ fn pass(frame: &Frame<'_>, phases: &[Phase], consumer: &mut impl Consumer) {
         .expect("the tiles were expanded before");
 }
 
-/// Every tile to records: quads, and bytes of the file.
-fn decode(trace: &Textrace) -> Row {
-    let mut tile = Tile::default();
-    let (mut quads, mut bytes) = (0, 0);
-    let tiles: Vec<(usize, usize)> = (0..)
+/// Pass and index of every tile.
+fn tiles(trace: &Textrace) -> Vec<(usize, usize)> {
+    (0..)
         .zip(&trace.tables().passes)
         .flat_map(|(pass, info)| (0..info.tile_count() as usize).map(move |tile| (pass, tile)))
-        .collect();
+        .collect()
+}
+
+/// The trace with another encoding of its tiles, in memory.
+fn encoded(trace: &Textrace, encoding: Encoding) -> Textrace {
+    let tables = trace.tables();
+    let mut writer = TextraceWriter::in_memory(tables).expect("the tables were read");
+    let mut tile = Tile::default();
+    for (pass, index) in tiles(trace) {
+        let decoded = trace.decode_tile(pass, index, &mut tile);
+        decoded.expect("an undamaged trace");
+        let encoded = encode_tile_as(encoding, tables, &tile).expect("a decoded tile");
+        let appended = writer.append(pass, index, encoded);
+        appended.expect("memory takes it");
+    }
+    let bytes = writer.into_bytes().expect("memory takes it");
+    Textrace::from_bytes(bytes).expect("just written")
+}
+
+/// Every tile to records: quads, and bytes of the file.
+fn decode(trace: &Textrace, encoding: Encoding) -> Row {
+    let mut tile = Tile::default();
+    let (mut quads, mut bytes) = (0, 0);
+    let tiles = tiles(trace);
     for &(pass, index) in &tiles {
         let stats = trace.tile_stats(pass, index);
         quads += u64::from(stats.records);
@@ -158,7 +182,9 @@ fn decode(trace: &Textrace) -> Row {
             black_box(&tile);
         }
     });
-    Row::new("decode (quads)", quads, bytes, took)
+    let bytes_a_quad = bytes as f64 / quads as f64;
+    let name = format!("decode {encoding:?}, {bytes_a_quad:.2} B a quad (quads)").to_lowercase();
+    Row::new(name, quads, bytes, took)
 }
 
 /// All orders of a frame: work items.

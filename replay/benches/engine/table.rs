@@ -3,7 +3,7 @@
 /// A stage.
 pub struct Row {
     /// What it does, and what it counts if not lines.
-    pub name: &'static str,
+    pub name: String,
     /// What it went through.
     pub items: u64,
     /// What it read of it, or wrote.
@@ -16,9 +16,9 @@ pub struct Row {
 
 impl Row {
     /// A row that is not the yardstick.
-    pub fn new(name: &'static str, items: u64, bytes: u64, seconds: f64) -> Self {
+    pub fn new(name: impl Into<String>, items: u64, bytes: u64, seconds: f64) -> Self {
         Self {
-            name,
+            name: name.into(),
             items,
             bytes,
             seconds,

@@ -88,7 +88,7 @@ pub enum EncodingName {
     /// Bit-packed differences
     #[default]
     Delta,
-    /// A plane for each primitive: about 0.6 of the size, slower to read and to write
+    /// A plane for each primitive: about 0.5 of the size, slower to read and to write
     Planes,
 }
 

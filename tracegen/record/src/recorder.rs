@@ -4,7 +4,7 @@ use crate::bins::Bins;
 use crate::regions::{TileRect, capture_view};
 use crate::tiles::{CaptureCounts, Scratch, TileRules};
 use crate::{Capturer, RawRecords, RecordError};
-use formats::textrace::{EncodedTile, Tables, TextraceWriter, encode_tile};
+use formats::textrace::{EncodedTile, Encoding, Tables, TextraceWriter, encode_tile_as};
 use rayon::prelude::*;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
@@ -58,9 +58,10 @@ impl<'a> Recorder<'a> {
             }));
         };
         let mut recorded = Recorded::default();
+        let encoding = writer.encoding();
         let mut sink = |rect: &TileRect, records: RawRecords<'_>| {
             let start = Instant::now();
-            let (tiles, counts) = self.encode_region(rect, records)?;
+            let (tiles, counts) = self.encode_region(encoding, rect, records)?;
             recorded.counts += counts;
             for (number, tile) in tiles.into_iter().enumerate() {
                 let [column, row] = rect.tile(number);
@@ -79,6 +80,7 @@ impl<'a> Recorder<'a> {
     /// Bins, sorts, filters, quantises and encodes a region's records, tiles in parallel.
     fn encode_region(
         &self,
+        encoding: Encoding,
         rect: &TileRect,
         records: RawRecords<'_>,
     ) -> Result<(Vec<EncodedTile>, CaptureCounts), RecordError> {
@@ -87,7 +89,7 @@ impl<'a> Recorder<'a> {
             .into_par_iter()
             .map_init(Scratch::default, |scratch, tile| {
                 let mut counts = self.rules.build(records, &bins, tile, scratch)?;
-                let encoded = encode_tile(self.tables, &scratch.tile)?;
+                let encoded = encode_tile_as(encoding, self.tables, &scratch.tile)?;
                 counts.tile_bytes = encoded.size_bytes() as u64;
                 Ok((encoded, counts))
             })

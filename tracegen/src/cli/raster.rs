@@ -10,7 +10,7 @@ use crate::study::auto::Budget;
 use crate::study::{memory, processor};
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
-use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
+use formats::textrace::{Encoding, Pass, Tables, TextraceWriter, TraceMeta};
 use formats::view::{Eye, FrameViews};
 use raster::backend::{CaptureBackend, Fragments, Work};
 use raster::capture::{CaptureJob, Pictures};
@@ -73,6 +73,9 @@ pub struct RasterArgs {
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
     pub(super) record_budget: u64,
+    /// How the trace's tiles are packed.
+    #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
+    pub(super) encoding: TileEncoding,
     /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, draws, regions or all of
     /// them. Pictures and trace stay the same.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -126,6 +129,24 @@ impl Backend {
             Self::Lavapipe => Driver::Lavapipe,
             Self::Osmesa => Driver::Osmesa,
             Self::Auto => Driver::Auto,
+        }
+    }
+}
+
+/// Tile encodings by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum TileEncoding {
+    /// Bit-packed differences.
+    Delta,
+    /// A plane for each primitive: about 0.5 of the size, slower to read and to write.
+    Planes,
+}
+
+impl TileEncoding {
+    pub(super) fn encoding(self) -> Encoding {
+        match self {
+            Self::Delta => Encoding::Delta,
+            Self::Planes => Encoding::Planes,
         }
     }
 }
@@ -306,7 +327,8 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     ));
     progress.stage("capturing", setup.frames.len() as u64, "frames");
 
-    let mut writer = TextraceWriter::create(&args.output, &tables)?;
+    let writer = TextraceWriter::create(&args.output, &tables)?;
+    let mut writer = writer.with_encoding(args.encoding.encoding());
     let mut first_pictures: Option<Pictures> = None;
     let mut first_pass = 0;
     for views in &setup.frames {

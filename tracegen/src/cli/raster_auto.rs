@@ -47,7 +47,9 @@ pub fn run(args: &RasterArgs, budget: Budget) -> anyhow::Result<()> {
     let planners = choice.planners(&world)?;
     let planner = |frame: u32| &planners[choice.held.of_frame[frame as usize]];
     let tables = world.trace_tables(planner, &frames);
-    let mut tracer = Tracer::new(&tables, TextraceWriter::create(&args.output, &tables)?);
+    let writer = TextraceWriter::create(&args.output, &tables)?;
+    let writer = writer.with_encoding(args.encoding.encoding());
+    let mut tracer = Tracer::new(&tables, writer);
     progress.stage("capturing", frames.len() as u64, "frames");
     let mut memory = Occlusion::default();
     let mut counts = CaptureCounts::default();

@@ -2,25 +2,21 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::lengths::LENGTHS;
+use super::mode::Mode;
+use super::residual::NOISES;
 use std::array::from_fn;
 use std::sync::LazyLock;
 
 /// Longest code.
-pub(super) const MOST_BITS: u32 = 11;
+pub(super) const MOST_BITS: u32 = 10;
 const ENTRIES: usize = 1 << MOST_BITS;
-/// Codes of at most 9 bits, nearly all that occur, are looked up in tables small enough to stay in
-/// the nearest cache all together.
-const FEW_ENTRIES: usize = 1 << 9;
-
 /// A prefix code, for both directions.
 pub(super) struct Code {
     /// Its place in [`LENGTHS`].
     #[cfg_attr(not(test), expect(dead_code, reason = "training counts by it"))]
     pub number: usize,
     /// By the next [`MOST_BITS`] bits: symbol * 16 + length.
-    by_bits: Box<[u16; ENTRIES]>,
-    /// The same by fewer bits; 0 where the code is longer.
-    by_few_bits: [u16; FEW_ENTRIES],
+    by_bits: [u16; ENTRIES],
     /// By symbol: bits as they are written, lowest first, and their number (0: not in the code).
     by_symbol: Vec<(u32, u32)>,
 }
@@ -29,7 +25,7 @@ impl Code {
     /// From the length of each symbol's code, a hexadecimal digit each, 0 for none.
     pub fn new(number: usize, lengths: &str) -> Self {
         let lengths: Vec<u32> = lengths.chars().filter_map(|c| c.to_digit(16)).collect();
-        let mut by_bits = Box::new([0; ENTRIES]);
+        let mut by_bits = [0; ENTRIES];
         let mut by_symbol = vec![(0, 0); lengths.len()];
         let mut next = 0u32;
         for length in 1u16.. {
@@ -49,15 +45,9 @@ impl Code {
                 next += 1;
             }
         }
-        let mut by_few_bits = [0; FEW_ENTRIES];
-        for (few, of) in by_few_bits.iter_mut().zip(by_bits.iter()) {
-            // The same entry stands wherever the bits above its length differ.
-            *few = if of & 15 <= 9 { *of } else { 0 };
-        }
         Self {
             number,
             by_bits,
-            by_few_bits,
             by_symbol,
         }
     }
@@ -65,12 +55,9 @@ impl Code {
     /// Symbol and length of the code that the bits start with.
     #[inline(always)]
     pub fn decode(&self, bits: u64) -> (u32, u32) {
-        let entry = lookup(&self.by_few_bits, bits);
-        let entry = if entry == 0 {
-            lookup(&self.by_bits, bits)
-        } else {
-            entry
-        };
+        let low = bits & (ENTRIES as u64 - 1);
+        #[allow(clippy::cast_possible_truncation, reason = "less than ENTRIES")]
+        let entry = self.by_bits.get(low as usize).copied().unwrap_or_default();
         (u32::from(entry >> 4), u32::from(entry & 15))
     }
 
@@ -88,21 +75,12 @@ impl Code {
     }
 }
 
-/// The entry of the lowest bits; `N` is a power of two.
-#[inline(always)]
-fn lookup<const N: usize>(entries: &[u16; N], bits: u64) -> u16 {
-    let low = bits & (N as u64 - 1);
-    #[allow(clippy::cast_possible_truncation, reason = "less than N")]
-    let entry = entries.get(low as usize).copied();
-    entry.unwrap_or_default()
-}
-
 /// All codes.
 pub(super) struct Codes {
-    /// Step and mask, by [`super::state::State::place_context`].
+    /// Step and mask, by [`super::places::Places::context`].
     pub place: [Code; 17],
-    /// Classes of a quad's residuals, by those of the group's last quad.
-    pub sizes: [Code; 6],
+    /// Classes of a quad's residuals, by mode and by those of the group's last quad in the run.
+    pub sizes: [Code; NOISES * Mode::ALL.len()],
     /// Widths of a first quad's dx, dy, cross and uv.
     pub first: [Code; 4],
     /// Widths of what no class holds.
@@ -122,11 +100,17 @@ pub(super) struct Codes {
 }
 
 /// Number of codes.
-pub(super) const CODES: usize = 17 + 6 + 4 + 1 + 4 + 4 + 4;
+pub(super) const CODES: usize = 17 + NOISES * Mode::ALL.len() + 4 + 1 + 4 + 4 + 4;
 
 static ALL: LazyLock<Codes> = LazyLock::new(|| Codes::new(&LENGTHS));
 
 impl Codes {
+    /// The code of the classes of a quad's residuals.
+    #[inline(always)]
+    pub fn sizes(&self, mode: Mode, noise: usize) -> Option<&Code> {
+        self.sizes.get(mode as usize * NOISES + noise)
+    }
+
     pub fn get() -> &'static Self {
         &ALL
     }

@@ -1,12 +1,16 @@
-//! From bits to records.
+//! From bits to records, in passes of one kind of work each: places, planes, classes, small residuals,
+//! wide ones, sums. None waits for what another one calculates.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::codes::{Code, Codes};
 use super::mode::{Departure, Mode};
+use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
+use super::places::Places;
 use super::plane::{Plane, Quad};
-use super::residual::{Pair, WIDE, add, class_bits, noise, small, sum, unfold};
-use super::state::{State, group_of};
-use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS, STEPS};
+use super::residual::{
+    CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, Pair, WIDE, small_pairs, sum, unfold,
+};
+use super::{GROUPS, SHORT};
 use crate::textrace::bits::{BitReader, PEEK_BITS};
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile};
 use crate::varint::{low_u32, unzigzag};
@@ -14,23 +18,39 @@ use crate::varint::{low_u32, unzigzag};
 /// What was expected where the bits went wrong.
 pub(super) type Outcome<T> = Result<T, &'static str>;
 
-const SHORT: &str = "more bits";
+/// A group of a run.
+#[derive(Clone, Copy)]
+struct First {
+    /// Index of its first record.
+    record: u32,
+    /// Records after that one.
+    others: u32,
+    /// It is the first group of its run.
+    starts_run: bool,
+}
 
-/// Most bits of a place after which the sizes and small residuals of a quad, 11 + 8 + 16 bits, are
-/// sure to lie in the same word.
-const MOST_PLACE_BITS: u32 = PEEK_BITS - 35;
+/// Its plane.
+struct Told {
+    plane: Plane,
+    departure: Departure,
+    noise: usize,
+}
 
-/// Where a record lies, the lanes that it covers, and its group.
-struct Place {
-    morton: u32,
-    mask: u8,
-    group: u8,
+/// A record after the first one of its group in its run.
+#[derive(Clone, Copy)]
+struct Later {
+    record: u32,
+    /// Index of its plane.
+    told: u32,
+    classes: Classes,
 }
 
 pub(super) struct Decoder<'a> {
     bits: BitReader<'a>,
     codes: &'static Codes,
-    state: State,
+    firsts: Vec<First>,
+    told: Vec<Told>,
+    later: Vec<Later>,
 }
 
 impl<'a> Decoder<'a> {
@@ -38,7 +58,9 @@ impl<'a> Decoder<'a> {
         Self {
             bits: BitReader::new(input),
             codes: Codes::get(),
-            state: State::new(),
+            firsts: Vec::new(),
+            told: Vec::new(),
+            later: Vec::new(),
         }
     }
 
@@ -49,37 +71,14 @@ impl<'a> Decoder<'a> {
 
     /// Reads the runs and their records.
     pub fn tile(&mut self, runs: u32, records: u32, tile: &mut Tile) -> Outcome<()> {
-        let mut next_primitive = 0u64;
-        let mut draw = 0;
-        let mut first = 0u32;
-        for _ in 0..runs {
-            let (step, draw_changed) = self.header()?;
-            let primitive = next_primitive + step - 1;
-            let primitive = u32::try_from(primitive).map_err(|_| "a primitive below 2^32")?;
-            if draw_changed {
-                draw = u32::try_from(self.gamma()? - 1).map_err(|_| "a draw below 2^32")?;
-            }
-            let count = u32::try_from(self.number(&self.codes.count)?).unwrap_or(u32::MAX);
-            if count > records - first {
-                return Err("a run of no more records than the index tells");
-            }
-            let run = PrimitiveRun {
-                primitive,
-                draw,
-                first,
-                count,
-            };
-            tile.runs.push(run);
-            self.state.start_run(&run);
-            for _ in 0..count {
-                tile.records.push(self.record(count)?);
-            }
-            first += count;
-            next_primitive = u64::from(primitive) + 1;
-        }
-        if first != records {
-            return Err("runs of as many records as the index tells");
-        }
+        self.firsts.reserve(tile.runs.capacity());
+        self.later.reserve(tile.records.capacity());
+        self.places(runs, records, tile)?;
+        self.planes(&mut tile.records)?;
+        self.classes()?;
+        self.small(&mut tile.records)?;
+        self.wide(&mut tile.records)?;
+        self.sums(&mut tile.records);
         if self.bits.overrun() {
             return Err(SHORT);
         }
@@ -99,21 +98,19 @@ impl<'a> Decoder<'a> {
         Ok(bits & ((1 << count) - 1))
     }
 
+    /// A symbol of a code.
+    #[inline(always)]
+    fn symbol(&mut self, code: &Code) -> Outcome<u32> {
+        let (symbol, length) = code.decode(self.peek()?);
+        self.bits.skip(length);
+        Ok(symbol)
+    }
+
     /// A number from 1 to 2^33 - 1: a code tells its highest bit.
     #[inline]
     fn number(&mut self, code: &Code) -> Outcome<u64> {
-        let (power, length) = code.decode(self.peek()?);
-        self.bits.skip(length);
+        let power = self.symbol(code)?;
         Ok(1 << power | self.take(power)?)
-    }
-
-    /// The step to a run's primitive, and whether its draw is another.
-    #[inline]
-    fn header(&mut self) -> Outcome<(u64, bool)> {
-        let (symbol, length) = self.codes.header.decode(self.peek()?);
-        self.bits.skip(length);
-        let power = symbol >> 1;
-        Ok((1 << power | self.take(power)?, symbol & 1 == 1))
     }
 
     /// A number from 1 to 2^33 - 1 in Elias's gamma code.
@@ -126,125 +123,173 @@ impl<'a> Decoder<'a> {
         Ok(1 << zeros | self.take(zeros)?)
     }
 
+    /// The runs, and places, masks and groups of their records.
+    fn places(&mut self, runs: u32, records: u32, tile: &mut Tile) -> Outcome<()> {
+        let mut places = Places::new();
+        let mut next_primitive = 0u64;
+        let mut draw = 0;
+        let mut first = 0u32;
+        for _ in 0..runs {
+            let header = self.symbol(&self.codes.header)?;
+            let power = header >> 1;
+            let primitive = next_primitive + (1 << power | self.take(power)?) - 1;
+            let primitive = u32::try_from(primitive).map_err(|_| "a primitive below 2^32")?;
+            if header & 1 == 1 {
+                draw = u32::try_from(self.gamma()? - 1).map_err(|_| "a draw below 2^32")?;
+            }
+            let count = u32::try_from(self.number(&self.codes.count)?).unwrap_or(u32::MAX);
+            if count > records - first {
+                return Err("a run of no more records than the index tells");
+            }
+            tile.runs.push(PrimitiveRun {
+                primitive,
+                draw,
+                first,
+                count,
+            });
+            places.start_run(draw);
+            if places.tells_regular() {
+                places.set_regular(self.take(1)? == 1);
+            }
+            self.run(&mut places, first, count, &mut tile.records)?;
+            first += count;
+            next_primitive = u64::from(primitive) + 1;
+        }
+        if first != records {
+            return Err("runs of as many records as the index tells");
+        }
+        Ok(())
+    }
+
+    /// Places of a run.
     #[inline(always)]
-    fn record(&mut self, count: u32) -> Outcome<QuadRecord> {
-        let start = self.peek()?;
-        let (place, used) = self.place(start)?;
-        let Place {
-            morton,
-            mask,
-            group,
-        } = place;
-        let (x, y) = position(morton)?;
-        let quad = if self.state.has_seen(group) {
-            // Place and residuals of most records lie in one word.
-            let bits = if used <= MOST_PLACE_BITS {
-                start >> used
+    fn run(
+        &mut self,
+        places: &mut Places,
+        first: u32,
+        count: u32,
+        records: &mut Vec<QuadRecord>,
+    ) -> Outcome<()> {
+        // Index of the plane of each group.
+        let mut planes = [u32::MAX; GROUPS];
+        // In registers, not in memory.
+        let (mut last, mut bits) = (places.last, self.bits);
+        for number in first..first + count {
+            let word = bits.peek_unpadded().ok_or(SHORT)?;
+            let (place, used) = places.read(&mut last, self.codes, word)?;
+            bits.skip(used);
+            let (x, y) = position(place.morton);
+            records.push(QuadRecord {
+                x,
+                y,
+                mask: place.mask,
+                group: place.group,
+                ..QuadRecord::default()
+            });
+            let plane = planes.get_mut(usize::from(place.group) % GROUPS);
+            let plane = plane.ok_or(SHORT)?;
+            if *plane == u32::MAX {
+                *plane = low_u32(self.firsts.len() as u64);
+                self.firsts.push(First {
+                    record: number,
+                    others: 0,
+                    starts_run: number == first,
+                });
             } else {
-                self.bits.skip(used);
-                self.peek()?
+                if let Some(first) = self.firsts.get_mut(*plane as usize) {
+                    first.others += 1;
+                }
+                self.later.push(Later {
+                    record: number,
+                    told: *plane,
+                    classes: Classes::default(),
+                });
+            }
+        }
+        (places.last, self.bits) = (last, bits);
+        Ok(())
+    }
+
+    /// First quads and planes.
+    fn planes(&mut self, records: &mut [QuadRecord]) -> Outcome<()> {
+        let firsts = std::mem::take(&mut self.firsts);
+        self.told.reserve(firsts.len());
+        let groups = firsts.iter().map(|first| {
+            let record = records.get(first.record as usize);
+            record.map_or(0, |record| record.group)
+        });
+        let mut lineage = Lineage::new(groups);
+        let mut last = Plane::default();
+        for (number, first) in firsts.iter().enumerate() {
+            let record = records.get_mut(first.record as usize).ok_or(SHORT)?;
+            let back = self.number(&self.codes.parent)? - 1;
+            let back = usize::try_from(back).unwrap_or(usize::MAX);
+            let parent = match lineage.parent(record.group, back) {
+                Some(Some(index)) => self.told.get(index).ok_or(SHORT)?.plane,
+                Some(None) => Plane::default(),
+                None => return Err("an earlier run of the group"),
             };
-            let before = if used <= MOST_PLACE_BITS { used } else { 0 };
-            let known = group_of(&mut self.state.groups, group);
-            let expected = known.plane.predict(x, y);
-            let code = self.codes.sizes.get(known.noise).ok_or(SHORT)?;
-            let (classes, length) = sizes(code, bits);
-            known.noise = noise(classes);
-            // A class of 3 is two set bits side by side.
-            let residual = if classes & classes >> 1 & 0x55 == 0 {
-                let (residual, all) = small_pairs(classes, bits >> length);
-                self.bits.skip(before + length + all);
-                residual
-            } else {
-                self.bits.skip(before + length);
-                self.wide(classes)?
-            };
-            let known = group_of(&mut self.state.groups, group);
-            add(&expected, &known.departure.read(x, y, &residual))
+            let of_run = (!first.starts_run).then_some(last);
+            let told = self.first(record, &parent, of_run, first.others)?;
+            last = told.plane;
+            self.told.push(told);
+            lineage.note(record.group, number);
+        }
+        Ok(())
+    }
+
+    /// The first quad of a group in a run, and its plane.
+    #[inline(always)]
+    fn first(
+        &mut self,
+        record: &mut QuadRecord,
+        parent: &Plane,
+        of_run: Option<Plane>,
+        others: u32,
+    ) -> Outcome<Told> {
+        let QuadRecord { x, y, .. } = *record;
+        let mut left = [[0; 2]; 4];
+        let mut width = 0;
+        for (left, code) in left.iter_mut().zip(&self.codes.first) {
+            (width, *left) = self.pair_after(code, width)?;
+        }
+        let (mode, level) = self.level(others)?;
+        let mut by = Quad::default();
+        if level > 0 {
+            for (pair, code) in by.iter_mut().zip(&self.codes.correction) {
+                *pair = self.pair(code)?;
+            }
+        }
+        let [dx, dy, cross, uv] = left;
+        let expected = Expected::new(parent, of_run.as_ref(), x, y);
+        let [of_dx, of_dy] = expected.slopes();
+        let (dx, dy) = (sum(of_dx, dx), sum(of_dy, dy));
+        let cross = sum(expected.cross(dx, dy), cross);
+        let uv = sum(expected.uv(), uv);
+        (record.uv, record.dx, record.dy, record.cross) = (uv, dx, dy, cross);
+        let quad = [uv, dx, dy, cross];
+        let tilt = tilt_of_run(of_run.is_some(), &quad, &expected);
+        let plane = if level == 0 {
+            Plane::through(x, y, &quad, tilt)
         } else {
-            self.bits.skip(used);
-            self.first(group, x, y, count)?
+            Plane::corrected(x, y, &quad, tilt, level, &by)
         };
-        self.state.note_place(morton, mask, group);
-        let [uv, dx, dy, cross] = quad;
-        Ok(QuadRecord {
-            x,
-            y,
-            mask,
-            group,
-            uv,
-            dx,
-            dy,
-            cross,
+        Ok(Told {
+            plane,
+            departure: Departure::start(mode, x, y),
+            noise: first_noise(level),
         })
     }
 
-    /// Place on the Morton curve, mask and group of the next record, and the bits that tell them.
-    #[inline(always)]
-    fn place(&self, mut bits: u64) -> Outcome<(Place, u32)> {
-        let state = &self.state;
-        let follow = state.follow();
-        let mut used = 0;
-        let mut before = state.morton;
-        if state.first_of_run {
-            let (apart, length) = self.codes.start.decode(bits);
-            before = (state.morton_of_start ^ apart).wrapping_sub(1);
-            used = length;
-        } else if follow.same_quad {
-            used = 1;
-            if bits & 1 == 1 {
-                let place = Place {
-                    morton: state.morton,
-                    mask: state.mask,
-                    group: follow.group,
-                };
-                return Ok((place, used));
-            }
-        }
-        bits >>= used;
-        let context = state.place_context();
-        let code = self.codes.place.get(context).ok_or(SHORT)?;
-        let (symbol, length) = code.decode(bits);
-        used += length;
-        bits >>= length;
-        if symbol == ESCAPE_PLACE {
-            let [mask, group] = [low_u32(bits >> 6 & 15), low_u32(bits >> 10 & 15)];
-            let place = Place {
-                morton: before.wrapping_add(low_u32(bits & 63)),
-                mask: mask.to_le_bytes()[0],
-                group: group.to_le_bytes()[0],
-            };
-            return Ok((place, used + 14));
-        }
-        let mut step = 1 + symbol / MASKS;
-        if step == STEPS {
-            step = low_u32(bits & 63);
-            used += 6;
-        }
-        let morton = before.wrapping_add(step);
-        let mask = (1 + symbol % MASKS).to_le_bytes()[0];
-        let place = Place {
-            morton,
-            mask: state.swap_mask(morton, mask),
-            group: follow.group,
+    /// How residuals are told, and how fine the correction of the plane is; a lone record has
+    /// neither.
+    fn level(&mut self, others: u32) -> Outcome<(Mode, u32)> {
+        let Some(context) = level_context(others) else {
+            return Ok((Mode::Plain, 0));
         };
-        Ok((place, used))
-    }
-
-    /// Residuals one of which is wide at least.
-    fn wide(&mut self, classes: u32) -> Outcome<Quad> {
-        let mut next = |class: u32| -> Outcome<Pair> {
-            let class = class & 3;
-            if class == WIDE {
-                return self.pair(&self.codes.later);
-            }
-            let bits = self.take(class_bits(class))?;
-            Ok(small(class, bits))
-        };
-        let dx = next(classes)?;
-        let dy = next(classes >> 2)?;
-        let cross = next(classes >> 4)?;
-        Ok([next(classes >> 6)?, dx, dy, cross])
+        let symbol = self.symbol(self.codes.level.get(context).ok_or(SHORT)?)?;
+        let mode = Mode::of(symbol >> 3).ok_or("one of the modes")?;
+        Ok((mode, symbol & 7))
     }
 
     /// A pair whose width a code tells.
@@ -253,6 +298,17 @@ impl<'a> Decoder<'a> {
         let bits = self.peek()?;
         let (width, length) = code.decode(bits);
         self.numbers(bits, length, width)
+    }
+
+    /// A pair whose width a code tells as the difference from another, zigzag; and its width.
+    #[inline]
+    fn pair_after(&mut self, code: &Code, before: u32) -> Outcome<(u32, Pair)> {
+        let bits = self.peek()?;
+        let (symbol, length) = code.decode(bits);
+        let width = i64::from(before) + unzigzag(symbol.into());
+        let width = u32::try_from(width).ok().filter(|width| *width <= 32);
+        let width = width.ok_or("a width of at most 32 bits")?;
+        Ok((width, self.numbers(bits, length, width)?))
     }
 
     /// Two numbers of a width, after `used` of the next bits.
@@ -268,103 +324,97 @@ impl<'a> Decoder<'a> {
         Ok([unfold(self.take(width)?), unfold(self.take(width)?)])
     }
 
-    /// A pair whose width a code tells as the difference from another, zigzag; and its width.
-    #[inline]
-    fn pair_after(&mut self, code: &Code, before: u32) -> Outcome<(u32, Pair)> {
-        let bits = self.peek()?;
-        let (symbol, length) = code.decode(bits);
-        let width = i64::from(before) + unzigzag(symbol.into());
-        let width = u32::try_from(width).ok().filter(|width| *width <= 32);
-        let width = width.ok_or("a width of at most 32 bits")?;
-        Ok((width, self.numbers(bits, length, width)?))
+    /// Classes of the later records' residuals.
+    fn classes(&mut self) -> Outcome<()> {
+        let mut reader = self.bits;
+        for later in &mut self.later {
+            let told = self.told.get_mut(later.told as usize).ok_or(SHORT)?;
+            let code = self
+                .codes
+                .sizes(told.departure.mode, told.noise)
+                .ok_or(SHORT)?;
+            let bits = reader.peek_unpadded().ok_or(SHORT)?;
+            let (symbol, mut length) = code.decode(bits);
+            later.classes = if symbol == ESCAPE_SIZES {
+                let numbers = bits >> length;
+                length += 4 * CLASS_NUMBER_BITS;
+                let classes = [0, 3, 6, 9].map(|from| low_u32(numbers >> from & 7));
+                if classes.iter().any(|class| *class > WIDE) {
+                    return Err("one of the classes");
+                }
+                Classes::new(classes)
+            } else {
+                Classes::of_symbol(symbol)
+            };
+            reader.skip(length);
+            told.noise = later.classes.noise.into();
+        }
+        self.bits = reader;
+        Ok(())
     }
 
-    /// The first quad of a run in a group, and its plane.
-    #[inline(never)]
-    fn first(&mut self, group: u8, x: u8, y: u8, count: u32) -> Outcome<Quad> {
-        let back = self.number(&self.codes.parent)? - 1;
-        let back = usize::try_from(back).unwrap_or(usize::MAX);
-        let parent = self.state.parent(group, back);
-        let parent = parent.ok_or("an earlier run of the group")?;
-        let expected = self.state.expect(&parent, x, y);
-        let [dx_code, dy_code, cross_code, uv_code] = &self.codes.first;
-        let [dx, dy] = expected.slopes();
-        let (width, left) = self.pair_after(dx_code, 0)?;
-        let dx = sum(dx, left);
-        let (width, left) = self.pair_after(dy_code, width)?;
-        let dy = sum(dy, left);
-        let (width, left) = self.pair_after(cross_code, width)?;
-        let cross = sum(expected.cross(dx, dy), left);
-        let (_, left) = self.pair_after(uv_code, width)?;
-        let uv = sum(expected.uv(), left);
-        let quad = [uv, dx, dy, cross];
-        let tilt = self.state.tilt(x, y, &quad, &expected);
-        let (mode, level) = self.level(count)?;
-        let plane = if level == 0 {
-            Plane::through(x, y, &quad, tilt)
-        } else {
-            let mut by = Quad::default();
-            for (pair, code) in by.iter_mut().zip(&self.codes.correction) {
-                *pair = self.pair(code)?;
+    /// Residuals that are not wide, into the records; wide ones are 0 there.
+    fn small(&mut self, records: &mut [QuadRecord]) -> Outcome<()> {
+        let mut reader = self.bits;
+        for later in &self.later {
+            let record = records.get_mut(later.record as usize).ok_or(SHORT)?;
+            let bits = reader.peek_unpadded().ok_or(SHORT)?;
+            let ([uv, dx, dy, cross], used) = small_pairs(later.classes, bits);
+            reader.skip(used);
+            (record.uv, record.dx, record.dy, record.cross) = (uv, dx, dy, cross);
+        }
+        self.bits = reader;
+        Ok(())
+    }
+
+    /// Wide residuals.
+    fn wide(&mut self, records: &mut [QuadRecord]) -> Outcome<()> {
+        for number in 0..self.later.len() {
+            let Some(later) = self.later.get(number).copied() else {
+                break;
+            };
+            if !later.classes.wide {
+                continue;
             }
-            Plane::corrected(x, y, &quad, tilt, level, &by)
-        };
-        let departure = Departure::start(mode, x, y);
-        self.state
-            .start_plane(group, plane, super::first_noise(level), departure);
-        Ok(quad)
+            let record = records.get_mut(later.record as usize).ok_or(SHORT)?;
+            let pairs = [
+                &mut record.dx,
+                &mut record.dy,
+                &mut record.cross,
+                &mut record.uv,
+            ];
+            for (pair, class) in pairs.into_iter().zip(later.classes.each()) {
+                if class == WIDE {
+                    *pair = self.pair(&self.codes.later)?;
+                }
+            }
+        }
+        Ok(())
     }
 
-    /// How residuals are told, and how fine the correction of the plane is; a lone record has
-    /// neither.
-    fn level(&mut self, count: u32) -> Outcome<(Mode, u32)> {
-        let Some(context) = super::level_context(count) else {
-            return Ok((Mode::Plain, 0));
-        };
-        let code = self.codes.level.get(context).ok_or(SHORT)?;
-        let (symbol, length) = code.decode(self.peek()?);
-        self.bits.skip(length);
-        let mode = Mode::of(symbol >> 3).ok_or("one of three modes")?;
-        Ok((mode, symbol & 7))
+    /// From residuals to records.
+    fn sums(&mut self, records: &mut [QuadRecord]) {
+        for later in &self.later {
+            let record = records.get_mut(later.record as usize);
+            let Some((record, told)) = record.zip(self.told.get_mut(later.told as usize)) else {
+                continue;
+            };
+            let QuadRecord { x, y, .. } = *record;
+            let [uv, dx, dy, cross] = told.plane.predict(x, y);
+            let residual = [record.uv, record.dx, record.dy, record.cross];
+            let [by_uv, by_dx, by_dy, by_cross] = told.departure.read(x, y, &residual);
+            record.uv = sum(uv, by_uv);
+            record.dx = sum(dx, by_dx);
+            record.dy = sum(dy, by_dy);
+            record.cross = sum(cross, by_cross);
+        }
     }
 }
 
-/// The classes of a quad's residuals, and the bits that tell them.
+/// Column and row of a place on the Morton curve, below 64.
 #[inline(always)]
-fn sizes(code: &Code, bits: u64) -> (u32, u32) {
-    let (classes, length) = code.decode(bits);
-    if classes == ESCAPE_SIZES {
-        (low_u32(bits >> length & 255), length + 8)
-    } else {
-        (classes, length)
-    }
-}
-
-/// Residuals none of which is wide, and their bits.
-#[inline(always)]
-fn small_pairs(classes: u32, mut bits: u64) -> (Quad, u32) {
-    let mut used = 0;
-    let mut next = |class: u32| {
-        let pair = small(class & 3, bits);
-        let width = class_bits(class & 3);
-        bits >>= width;
-        used += width;
-        pair
-    };
-    let dx = next(classes);
-    let dy = next(classes >> 2);
-    let cross = next(classes >> 4);
-    let uv = next(classes >> 6);
-    ([uv, dx, dy, cross], used)
-}
-
-/// Column and row of a place on the Morton curve.
-#[inline(always)]
-fn position(morton: u32) -> Outcome<(u8, u8)> {
-    if morton > 63 {
-        return Err("a quad inside the tile");
-    }
+fn position(morton: u32) -> (u8, u8) {
     // Bits 0, 2 and 4 to 0, 1 and 2.
     let gather = |m: u32| (m & 1 | m >> 1 & 2 | m >> 2 & 4).to_le_bytes()[0];
-    Ok((gather(morton), gather(morton >> 1)))
+    (gather(morton), gather(morton >> 1))
 }

@@ -1,12 +1,15 @@
-//! From records to bits.
+//! From records to bits, pass by pass as they are read.
 
+use super::GROUPS;
 use super::codes::{Code, Codes};
 use super::fit::fit;
 use super::mode::{Departure, Mode};
+use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
+use super::places::{Place, Places};
 use super::plane::{Plane, Quad, Units, quad_of};
-use super::residual::{WIDE, class_bits, classify, difference, fold, noise, width};
-use super::state::{Expected, State};
-use super::{ESCAPE_PLACE, ESCAPE_SIZES, MASKS, STEPS, first_noise, level_context};
+use super::residual::{
+    CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, WIDE, class_bits, classify, difference, fold, width,
+};
 use crate::textrace::bits::BitWriter;
 use crate::textrace::{QuadRecord, Tile, quad_morton};
 use crate::varint::{low_u32, zigzag};
@@ -38,44 +41,50 @@ impl Sink for BitWriter {
     }
 }
 
+/// A group of a run.
+struct Told {
+    /// Index of its first record.
+    first: usize,
+    starts_run: bool,
+    /// Indices of its other records.
+    others: Vec<usize>,
+}
+
+/// A plane, and how its quads are told.
+#[derive(Clone, Copy)]
+struct Choice {
+    mode: Mode,
+    level: u32,
+    correction: Quad,
+    plane: Plane,
+}
+
+/// A record after the first one of its group in its run.
+struct Later {
+    record: usize,
+    /// Index of its plane.
+    told: usize,
+    classes: Classes,
+    pairs: [Classified; 4],
+    mode: Mode,
+}
+
 /// Writes a tile.
 pub(super) fn tile(tile: &Tile, codes: &Codes, sink: &mut impl Sink) {
-    let mut encoder = Encoder {
-        sink,
-        codes,
-        state: State::new(),
-    };
-    let mut next_primitive = 0;
-    let mut draw = 0;
-    let mut records = tile.records.as_slice();
-    for run in &tile.runs {
-        let step = u64::from(run.primitive) + 1 - next_primitive;
-        let changed = u32::from(run.draw != draw);
-        let header = step.ilog2() << 1 | changed;
-        encoder.sink.symbol(&codes.header, header, 0);
-        encoder.below_power(step);
-        if run.draw != draw {
-            encoder.gamma(u64::from(run.draw) + 1);
-            draw = run.draw;
-        }
-        encoder.number(&codes.count, run.count.into());
-        encoder.state.start_run(run);
-        let (of_run, rest) = records.split_at(run.count as usize);
-        for at in 0..of_run.len() {
-            encoder.record(&of_run[at..], run.count);
-        }
-        records = rest;
-        next_primitive = u64::from(run.primitive) + 1;
-    }
+    let mut encoder = Encoder { sink, codes };
+    let told = encoder.places(tile);
+    let (mut later, noises) = encoder.planes(tile, &told);
+    later.sort_by_key(|later| later.record);
+    encoder.classes(noises, &later);
+    encoder.residuals(&later);
 }
 
 struct Encoder<'a, S> {
     sink: &'a mut S,
     codes: &'a Codes,
-    state: State,
 }
 
-impl<S: Sink> Encoder<'_, S> {
+impl<'a, S: Sink> Encoder<'a, S> {
     /// A number from 1 on in Elias's gamma code.
     fn gamma(&mut self, number: u64) {
         self.sink.bits(0, number.ilog2());
@@ -95,75 +104,6 @@ impl<S: Sink> Encoder<'_, S> {
         self.sink.bits((number - (1 << power)) as u32, power);
     }
 
-    /// The first of some records of a run of `count`.
-    fn record(&mut self, left: &[QuadRecord], count: u32) {
-        let record = &left[0];
-        let morton = u32::from(quad_morton(record.x, record.y));
-        self.place(record, morton);
-        if self.state.has_seen(record.group) {
-            let expected = self.state.group_mut(record.group).plane;
-            let expected = expected.predict(record.x, record.y);
-            let left = difference(&quad_of(record), &expected);
-            let departure = &mut self.state.group_mut(record.group).departure;
-            let residual = departure.write(record.x, record.y, &left);
-            self.residuals(record.group, &residual);
-        } else {
-            self.first(left, count);
-        }
-        self.state.note_place(morton, record.mask, record.group);
-    }
-
-    fn place(&mut self, record: &QuadRecord, morton: u32) {
-        let state = &self.state;
-        let follow = state.follow();
-        let mut step = morton.wrapping_sub(state.morton);
-        if state.first_of_run {
-            let apart = morton ^ state.morton_of_start;
-            self.sink.symbol(&self.codes.start, apart, 0);
-            step = 1;
-        } else if follow.same_quad {
-            let same =
-                (morton, record.mask, record.group) == (state.morton, state.mask, follow.group);
-            self.sink.bits(same.into(), 1);
-            if same {
-                return;
-            }
-        }
-        let code = &self.codes.place[state.place_context()];
-        let swapped = state.swap_mask(morton, record.mask);
-        let listed = record.group == follow.group && step > 0;
-        let symbol = if listed {
-            (step.min(STEPS) - 1) * MASKS + u32::from(swapped) - 1
-        } else {
-            ESCAPE_PLACE
-        };
-        let known = self.sink.symbol(code, symbol, ESCAPE_PLACE) && symbol != ESCAPE_PLACE;
-        if !known || step >= STEPS {
-            self.sink.bits(step, 6);
-        }
-        if !known {
-            self.sink.bits(record.mask.into(), 4);
-            self.sink.bits(record.group.into(), 4);
-        }
-    }
-
-    fn residuals(&mut self, group: u8, left: &Quad) {
-        let group = self.state.group_mut(group);
-        let code = &self.codes.sizes[group.noise];
-        let (classes, pairs) = classes(left);
-        group.noise = noise(classes);
-        if !self.sink.symbol(code, classes, ESCAPE_SIZES) {
-            self.sink.bits(classes, 8);
-        }
-        for (pair, (class, index)) in pairs {
-            if class == WIDE {
-                self.pair(&self.codes.later, pair);
-            } else {
-                self.sink.bits(index, class_bits(class));
-            }
-        }
-    }
-
     fn pair(&mut self, code: &Code, pair: [i32; 2]) {
         let width = width(pair);
         self.sink.symbol(code, width, 0);
@@ -176,14 +116,104 @@ impl<S: Sink> Encoder<'_, S> {
         }
     }
 
+    /// Runs and places. Tells which groups each run has.
+    fn places(&mut self, tile: &Tile) -> Vec<Told> {
+        let mut all: Vec<Told> = vec![];
+        let mut places = Places::new();
+        let mut next_primitive = 0;
+        let mut draw = 0;
+        for run in &tile.runs {
+            let step = u64::from(run.primitive) + 1 - next_primitive;
+            let changed = u32::from(run.draw != draw);
+            self.sink
+                .symbol(&self.codes.header, step.ilog2() << 1 | changed, 0);
+            self.below_power(step);
+            if run.draw != draw {
+                self.gamma(u64::from(run.draw) + 1);
+                draw = run.draw;
+            }
+            self.number(&self.codes.count, run.count.into());
+            next_primitive = u64::from(run.primitive) + 1;
+            places.start_run(run.draw);
+            if places.tells_regular() {
+                let of_run = &tile.records[run.first as usize..][..run.count as usize];
+                let regular = places.is_regular(of_run.iter().map(place_of));
+                self.sink.bits(regular.into(), 1);
+                places.set_regular(regular);
+            }
+            let mut told: [Option<usize>; GROUPS] = [None; GROUPS];
+            let first = run.first as usize;
+            for index in first..first + run.count as usize {
+                let record = &tile.records[index];
+                places.write(self.codes, place_of(record), self.sink);
+                match told[usize::from(record.group)] {
+                    Some(told) => all[told].others.push(index),
+                    None => {
+                        told[usize::from(record.group)] = Some(all.len());
+                        all.push(Told {
+                            first: index,
+                            starts_run: index == first,
+                            others: vec![],
+                        });
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// First quads and planes. Tells what the planes leave of the other quads, and which code tells the
+    /// classes of the first of them.
+    fn planes(&mut self, tile: &Tile, told: &[Told]) -> (Vec<Later>, Vec<usize>) {
+        let mut lineage = Lineage::new(told.iter().map(|told| tile.records[told.first].group));
+        let mut planes: Vec<Plane> = vec![];
+        let mut later = vec![];
+        let mut noises = vec![];
+        for (number, told) in told.iter().enumerate() {
+            let record = &tile.records[told.first];
+            let of_run = planes.last().copied().filter(|_| !told.starts_run);
+            let others: Vec<QuadRecord> = told.others.iter().map(|i| tile.records[*i]).collect();
+            let choice = self.first(record, &lineage, &planes, of_run, &others);
+            let mut departure = Departure::start(choice.mode, record.x, record.y);
+            for (index, record) in told.others.iter().zip(&others) {
+                let expected = choice.plane.predict(record.x, record.y);
+                let left = difference(&quad_of(record), &expected);
+                let residual = departure.write(record.x, record.y, &left);
+                let (classes, pairs) = classes(&residual);
+                later.push(Later {
+                    record: *index,
+                    told: number,
+                    classes,
+                    pairs,
+                    mode: choice.mode,
+                });
+            }
+            planes.push(choice.plane);
+            lineage.note(record.group, number);
+            noises.push(first_noise(choice.level));
+        }
+        (later, noises)
+    }
+
     /// The first quad of a run in a group, and the plane for the others.
-    fn first(&mut self, left: &[QuadRecord], count: u32) {
-        let QuadRecord { x, y, group, .. } = left[0];
-        let quad = quad_of(&left[0]);
-        let known = self.state.groups[usize::from(group)].planes.len();
+    fn first(
+        &mut self,
+        record: &QuadRecord,
+        lineage: &Lineage,
+        planes: &[Plane],
+        of_run: Option<Plane>,
+        others: &[QuadRecord],
+    ) -> Choice {
+        let QuadRecord { x, y, group, .. } = *record;
+        let quad = quad_of(record);
+        let known = lineage.count(group);
         let candidates = (0..known.min(MOST_PARENTS)).chain([known]);
         let parents = candidates.filter_map(|back| {
-            let expected = self.state.expect(&self.state.parent(group, back)?, x, y);
+            let parent = match lineage.parent(group, back)? {
+                Some(index) => planes[index],
+                None => Plane::default(),
+            };
+            let expected = Expected::new(&parent, of_run.as_ref(), x, y);
             let pairs = first_pairs(&quad, &expected);
             let power = (back as u64 + 1).ilog2();
             let bits = self.codes.parent.length(power, 0) + power + self.first_bits(&pairs);
@@ -199,80 +229,101 @@ impl<S: Sink> Encoder<'_, S> {
             self.numbers(pair, width);
             before = width;
         }
-        let tilt = self.state.tilt(x, y, &quad, &expected);
+        let tilt = tilt_of_run(of_run.is_some(), &quad, &expected);
         let plain = Plane::through(x, y, &quad, tilt);
-        let others: Vec<QuadRecord> = left[1..]
-            .iter()
-            .take(count as usize)
-            .filter(|record| record.group == group)
-            .copied()
-            .collect();
-        let Some(context) = level_context(count) else {
-            let departure = Departure::start(Mode::Plain, x, y);
-            return self
-                .state
-                .start_plane(group, plain, first_noise(0), departure);
+        let Some(context) = level_context(others.len() as u32) else {
+            return Choice::plain(plain);
         };
-        let told = self.best_plane(&quad, &plain, &left[0], &others, context);
-        let (mode, level, by, plane) = told;
-        self.sink
-            .symbol(&self.codes.level[context], (mode as u32) << 3 | level, 0);
-        if level > 0 {
-            for (code, pair) in self.codes.correction.iter().zip(by) {
+        let choice = self.best_plane(&quad, plain, record, others, context);
+        let symbol = (choice.mode as u32) << 3 | choice.level;
+        self.sink.symbol(&self.codes.level[context], symbol, 0);
+        if choice.level > 0 {
+            for (code, pair) in self.codes.correction.iter().zip(choice.correction) {
                 self.pair(code, pair);
             }
         }
-        let departure = Departure::start(mode, x, y);
-        self.state
-            .start_plane(group, plane, first_noise(level), departure);
+        choice
     }
 
-    /// Level, correction and plane with which a run's other records of a group take fewest bits.
+    /// Level, correction, mode and plane with which a group's other records take fewest bits.
     fn best_plane(
         &self,
         quad: &Quad,
-        plain: &Plane,
+        plain: Plane,
         first: &QuadRecord,
         others: &[QuadRecord],
         context: usize,
-    ) -> (Mode, u32, Quad, Plane) {
+    ) -> Choice {
         let code = &self.codes.level[context];
-        let mut best = (Mode::Plain, 0, Quad::default(), *plain);
+        let mut best = Choice::plain(plain);
         let mut least = u32::MAX;
-        let mut try_plane = |level: u32, by: Quad, plane: Plane| {
+        let mut try_plane = |level: u32, correction: Quad, plane: Plane| {
             for mode in Mode::ALL {
                 let mut bits = code.length((mode as u32) << 3 | level, 0);
                 if level > 0 {
-                    bits += self.pairs_bits(&self.codes.correction, &by);
+                    bits += self.pairs_bits(&self.codes.correction, &correction);
                 }
-                bits += self.run_bits(
-                    &plane,
-                    Departure::start(mode, first.x, first.y),
-                    others,
-                    first_noise(level),
-                );
+                let departure = Departure::start(mode, first.x, first.y);
+                bits += self.run_bits(&plane, departure, others, first_noise(level));
                 if bits < least {
-                    (least, best) = (bits, (mode, level, by, plane));
+                    least = bits;
+                    best = Choice {
+                        mode,
+                        level,
+                        correction,
+                        plane,
+                    };
                 }
             }
             least
         };
         // A correction takes some 20 bits.
-        if try_plane(0, Quad::default(), *plain) < 24 {
+        if try_plane(0, Quad::default(), plain) < 24 {
             return best;
         }
-        let Some(fitted) = fit(plain, quad, others) else {
+        let Some(fitted) = fit(&plain, quad, others) else {
             return best;
         };
         let apart = |r: &QuadRecord| r.x.abs_diff(first.x).max(r.y.abs_diff(first.y));
         let extent = others.iter().map(apart).max().unwrap_or(0);
         let likely = u32::from(extent).checked_ilog2().unwrap_or(0) + 2;
         for level in likely.saturating_sub(1).max(1)..=(likely + 2).min(7) {
-            let by = correction(quad, plain, &fitted, level);
+            let by = correction(quad, &plain, &fitted, level);
             let plane = Plane::corrected(first.x, first.y, quad, plain.tilt, level, &by);
             try_plane(level, by, plane);
         }
         best
+    }
+
+    /// Classes of residuals.
+    fn classes(&mut self, mut noises: Vec<usize>, later: &[Later]) {
+        for later in later {
+            let at = &mut noises[later.told];
+            let (code, symbol) = (self.sizes(later.mode, *at), later.classes.symbol());
+            if !self.sink.symbol(code, symbol, ESCAPE_SIZES) {
+                for class in later.classes.each() {
+                    self.sink.bits(class, CLASS_NUMBER_BITS);
+                }
+            }
+            *at = usize::from(later.classes.noise);
+        }
+    }
+
+    /// Residuals: first those of few bits, then the wide ones.
+    fn residuals(&mut self, later: &[Later]) {
+        for (_, (class, index)) in later.iter().flat_map(|later| later.pairs) {
+            self.sink.bits(index, class_bits(class));
+        }
+        for (pair, (class, _)) in later.iter().flat_map(|later| later.pairs) {
+            if class == WIDE {
+                self.pair(&self.codes.later, pair);
+            }
+        }
+    }
+
+    fn sizes(&self, mode: Mode, noise: usize) -> &'a Code {
+        let code = self.codes.sizes(mode, noise);
+        code.expect("a code for each mode and noise")
     }
 
     /// Bits of some records' residuals.
@@ -288,8 +339,11 @@ impl<S: Sink> Encoder<'_, S> {
             let left = difference(&quad_of(record), &plane.predict(record.x, record.y));
             let left = departure.write(record.x, record.y, &left);
             let (classes, pairs) = classes(&left);
-            let code = &self.codes.sizes[at];
-            bits += code.length(classes, code.length(ESCAPE_SIZES, 0) + 8);
+            let code = self.sizes(departure.mode, at);
+            bits += code.length(
+                classes.symbol(),
+                code.length(ESCAPE_SIZES, 0) + 4 * CLASS_NUMBER_BITS,
+            );
             for (pair, (class, _)) in pairs {
                 bits += if class == WIDE {
                     let width = width(pair);
@@ -298,7 +352,7 @@ impl<S: Sink> Encoder<'_, S> {
                     class_bits(class)
                 };
             }
-            at = noise(classes);
+            at = usize::from(classes.noise);
         }
         bits
     }
@@ -320,6 +374,25 @@ impl<S: Sink> Encoder<'_, S> {
             code.length(width, 0) + 2 * width
         };
         codes.iter().zip(pairs).map(of).sum()
+    }
+}
+
+impl Choice {
+    fn plain(plane: Plane) -> Self {
+        Self {
+            mode: Mode::Plain,
+            level: 0,
+            correction: Quad::default(),
+            plane,
+        }
+    }
+}
+
+fn place_of(record: &QuadRecord) -> Place {
+    Place {
+        morton: u32::from(quad_morton(record.x, record.y)),
+        mask: record.mask,
+        group: record.group,
     }
 }
 
@@ -346,14 +419,10 @@ type Classified = ([i32; 2], (u32, u32));
 
 /// Residuals in the order in which they are written, dx, dy, cross, uv, with their classes; the
 /// classes as one number, too.
-fn classes(left: &Quad) -> (u32, [Classified; 4]) {
+fn classes(left: &Quad) -> (Classes, [Classified; 4]) {
     let [uv, dx, dy, cross] = *left;
     let pairs = [dx, dy, cross, uv].map(|pair| (pair, classify(pair)));
-    let joined = pairs
-        .iter()
-        .rev()
-        .fold(0, |joined, (_, (class, _))| joined << 2 | class);
-    (joined, pairs)
+    (Classes::new(pairs.map(|(_, (class, _))| class)), pairs)
 }
 
 /// The correction in the units of `level` that leads nearest to a plane.

@@ -1,8 +1,10 @@
-//! What a residual stands for: how far a quad departs from its plane, told in one of three ways.
+//! What a residual stands for: how far a quad departs from its plane, told in one of several ways.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::plane::Quad;
 use super::residual::{Pair, sum};
+use crate::textrace::delta::predict::{Context, Derivatives};
+use std::num::Wrapping;
 
 /// How a run's residuals are told, whichever is smallest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,14 +14,17 @@ pub(super) enum Mode {
     Plain,
     /// Departures of the four lanes: smaller where each lane was rounded for itself, coarsely.
     Lanes,
-    /// Changes of the departure since the last quad: smaller where the surface is no plane.
+    /// What encoding 1's prediction from the last quad's departure leaves: smaller where the surface
+    /// is curved.
+    Bending,
+    /// The same where the last quad's slopes are expected to stay.
     Following,
 }
 
 impl Mode {
-    pub const ALL: [Self; 3] = [Self::Plain, Self::Lanes, Self::Following];
+    pub const ALL: [Self; 4] = [Self::Plain, Self::Lanes, Self::Bending, Self::Following];
 
-    /// By number; the first one for a number that is none.
+    /// By number.
     pub fn of(number: u32) -> Option<Self> {
         Self::ALL.get(number as usize).copied()
     }
@@ -29,19 +34,25 @@ impl Mode {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Departure {
     pub mode: Mode,
-    x: i32,
-    y: i32,
-    quad: Quad,
+    last: Context,
 }
 
 impl Departure {
     /// That of a run's first quad: none.
     pub fn start(mode: Mode, x: u8, y: u8) -> Self {
-        Self {
-            mode,
-            x: x.into(),
-            y: y.into(),
-            quad: Quad::default(),
+        let mut last = Context::default();
+        let none = [Wrapping(0); 2];
+        last.learn(x.into(), y.into(), none, Derivatives::default(), false);
+        Self { mode, last }
+    }
+
+    /// What is expected of dx, dy and cross.
+    #[inline(always)]
+    fn guess(&self, x: i32, y: i32) -> Derivatives {
+        if self.mode == Mode::Bending {
+            self.last.derivatives(x, y)
+        } else {
+            self.last.last()
         }
     }
 
@@ -55,12 +66,17 @@ impl Departure {
                 let rest = minus(sum(cross, uv), sum(dx, dy));
                 [uv, minus(dx, uv), minus(dy, uv), rest]
             }
-            Mode::Following => {
-                let [last_uv, last_dx, last_dy, last_cross] = self.quad;
-                let (dx, dy) = (sum(last_dx, dx), sum(last_dy, dy));
-                let step = self.step(x, y, dx, dy);
-                let uv = sum(sum(last_uv, step), uv);
-                self.note(x, y, [uv, dx, dy, sum(last_cross, cross)])
+            Mode::Bending | Mode::Following => {
+                let (x, y) = (x.into(), y.into());
+                let guess = self.guess(x, y);
+                let now = Derivatives {
+                    dx: plus(guess.dx, dx),
+                    dy: plus(guess.dy, dy),
+                    cross: plus(guess.cross, cross),
+                };
+                let uv = plus(self.last.uv(x, y, &now), uv);
+                self.last.learn(x, y, uv, now, true);
+                [uv, now.dx, now.dy, now.cross].map(|pair| pair.map(|number| number.0))
             }
         }
     }
@@ -74,43 +90,28 @@ impl Departure {
                 let (dx, dy) = (sum(dx, uv), sum(dy, uv));
                 [uv, dx, dy, minus(sum(cross, sum(dx, dy)), uv)]
             }
-            Mode::Following => {
-                let [last_uv, last_dx, last_dy, last_cross] = self.quad;
-                let step = self.step(x, y, dx, dy);
-                self.note(x, y, *quad);
+            Mode::Bending | Mode::Following => {
+                let (x, y) = (x.into(), y.into());
+                let guess = self.guess(x, y);
+                let [as_uv, dx, dy, cross] = quad.map(|pair| pair.map(Wrapping));
+                let now = Derivatives { dx, dy, cross };
+                let guess_uv = self.last.uv(x, y, &now);
+                self.last.learn(x, y, as_uv, now, true);
+                let plain = |pair: [Wrapping<i32>; 2]| pair.map(|number| number.0);
                 [
-                    minus(minus(uv, last_uv), step),
-                    minus(dx, last_dx),
-                    minus(dy, last_dy),
-                    minus(cross, last_cross),
+                    minus(uv, plain(guess_uv)),
+                    minus(plain(dx), plain(guess.dx)),
+                    minus(plain(dy), plain(guess.dy)),
+                    minus(plain(cross), plain(guess.cross)),
                 ]
             }
         }
     }
+}
 
-    /// How uv changes from the last quad, two pixels each, by the trapezoid rule.
-    #[inline(always)]
-    fn step(&self, x: u8, y: u8, dx: Pair, dy: Pair) -> Pair {
-        let [_, last_dx, last_dy, _] = self.quad;
-        let right = i32::from(x) - self.x;
-        let down = i32::from(y) - self.y;
-        let times = |n: i32, pair: Pair| pair.map(|d| d.wrapping_mul(n));
-        sum(
-            times(right, sum(last_dx, dx)),
-            times(down, sum(last_dy, dy)),
-        )
-    }
-
-    #[inline(always)]
-    fn note(&mut self, x: u8, y: u8, quad: Quad) -> Quad {
-        *self = Self {
-            mode: self.mode,
-            x: x.into(),
-            y: y.into(),
-            quad,
-        };
-        quad
-    }
+#[inline(always)]
+fn plus([a, b]: [Wrapping<i32>; 2], [c, d]: Pair) -> [Wrapping<i32>; 2] {
+    [a + Wrapping(c), b + Wrapping(d)]
 }
 
 #[inline(always)]

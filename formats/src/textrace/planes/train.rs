@@ -10,7 +10,8 @@
 use super::codes::{CODES, Code, Codes, MOST_BITS};
 use super::encode::{self, Sink};
 use super::lengths::LENGTHS;
-use super::{ESCAPE_PLACE, ESCAPE_SIZES};
+use super::places::ESCAPE_PLACE;
+use super::residual::ESCAPE_SIZES;
 use crate::textrace::{Textrace, Tile};
 use std::path::Path;
 
@@ -121,12 +122,12 @@ fn train() {
                 }
                 let escape = match code {
                     0..17 => Some(ESCAPE_PLACE as usize),
-                    17..23 => Some(ESCAPE_SIZES as usize),
+                    17..41 => Some(ESCAPE_SIZES as usize),
                     _ => None,
                 };
                 let total: u64 = counts.iter().sum();
                 if let Some(escape) = escape {
-                    let rare = total >> 11;
+                    let rare = total >> MOST_BITS;
                     for symbol in (0..counts.len()).filter(|s| *s != escape) {
                         if counts[symbol] < rare {
                             counts[escape] += std::mem::take(&mut counts[symbol]);

@@ -1,0 +1,315 @@
+//! Where records lie, the lanes that they cover, and their groups: what is remembered from record
+//! to record, in both directions alike.
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+use super::codes::Codes;
+use super::encode::Sink;
+use super::{GROUPS, SHORT};
+use crate::varint::low_u32;
+
+/// Steps along the curve that have symbols, 1 to this; the last one stands for all from here on,
+/// and the step follows. Symbols are `16 * (step - 1) + mask`.
+const STEPS: u32 = 7;
+/// The symbol after which step, mask and group follow as numbers: no step has a mask of 0.
+pub(super) const ESCAPE_PLACE: u32 = 0;
+
+const OUTSIDE: &str = "a quad inside the tile";
+
+/// Place on the Morton curve, covered lanes, group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub morton: u32,
+    pub mask: u8,
+    pub group: u8,
+}
+
+/// What came after a group's record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Follow {
+    group: u8,
+    /// It was of the same quad and had the same mask.
+    same_quad: bool,
+}
+
+/// What is remembered from one record to the next.
+#[derive(Clone, Copy)]
+pub(super) struct Last {
+    /// The run's last record; before the first one 0, 0 and the last run's group.
+    place: Place,
+    /// Its mask was the likeliest one.
+    likeliest: bool,
+    /// It came right after the one before it on the curve.
+    stepped_one: bool,
+    /// Place of the first record of the run, or of the last one's before its first record.
+    start: u32,
+    first_of_run: bool,
+    /// Whatever is expected in the same quad comes: nothing tells it.
+    regular: bool,
+}
+
+impl Last {
+    /// Which code tells step and mask.
+    #[inline(always)]
+    fn context(&self) -> usize {
+        if self.first_of_run {
+            16
+        } else {
+            let corner = usize::from(self.place.morton.to_le_bytes()[0] & 3);
+            corner << 2 | usize::from(self.likeliest) << 1 | usize::from(self.stepped_one)
+        }
+    }
+}
+
+/// What is remembered through a tile.
+#[derive(Clone)]
+pub(super) struct Places {
+    follows: [Follow; GROUPS],
+    /// Lanes of each quad that the draw has covered.
+    covered: [u8; 64],
+    draw: u32,
+    pub last: Last,
+}
+
+impl Places {
+    pub fn new() -> Self {
+        Self {
+            follows: follow_themselves(),
+            covered: [0; 64],
+            draw: 0,
+            last: Last {
+                place: Place {
+                    morton: 0,
+                    mask: 0,
+                    group: 0,
+                },
+                likeliest: false,
+                stepped_one: false,
+                start: 0,
+                first_of_run: true,
+                regular: false,
+            },
+        }
+    }
+
+    pub fn start_run(&mut self, draw: u32) {
+        if draw != self.draw {
+            self.draw = draw;
+            self.covered = [0; 64];
+            self.follows = follow_themselves();
+            self.last.place.group = 0;
+        }
+        self.last.place.morton = 0;
+        self.last.place.mask = 0;
+        self.last.first_of_run = true;
+        self.last.regular = false;
+    }
+
+    /// Some group is followed by another one in the same quad, so a run tells whether it is regular.
+    pub fn tells_regular(&self) -> bool {
+        self.follows.iter().any(|follow| follow.same_quad)
+    }
+
+    /// Sets whether the run is regular.
+    pub fn set_regular(&mut self, regular: bool) {
+        self.last.regular = regular;
+    }
+
+    /// A run of these records, which starts now, is regular.
+    pub fn is_regular(&self, mut run: impl Iterator<Item = Place>) -> bool {
+        let mut places = self.clone();
+        run.all(|place| {
+            let follow = places.follow(places.last.place.group);
+            let expected = Place {
+                group: follow.group,
+                ..places.last.place
+            };
+            let holds = places.last.first_of_run || !follow.same_quad || place == expected;
+            places.note_at(place);
+            holds
+        })
+    }
+
+    /// What is expected after a record of a group.
+    #[inline(always)]
+    fn follow(&self, group: u8) -> Follow {
+        let found = self.follows.get(usize::from(group) % GROUPS);
+        found.copied().unwrap_or(Follow {
+            group: 0,
+            same_quad: false,
+        })
+    }
+
+    /// Swaps a quad's full mask with the one that leaves no lane of it to other primitives of the
+    /// draw, or undoes it: a mesh covers every lane once, so 15 stands for the likeliest mask.
+    #[inline(always)]
+    fn swap_mask(&self, morton: u32, mask: u8) -> u8 {
+        let covered = self.covered.get(morton as usize & 63).copied();
+        let rest = 15 & !covered.unwrap_or_default();
+        // Without branches, which would be hard to predict.
+        let swaps = (rest != 0) & ((mask == 15) | (mask == rest));
+        mask ^ ((15 ^ rest) * u8::from(swaps))
+    }
+
+    /// Takes in a record.
+    fn note_at(&mut self, place: Place) {
+        let likeliest = self.swap_mask(place.morton, place.mask) == 15;
+        let mut last = self.last;
+        self.note(&mut last, place, likeliest);
+        self.last = last;
+    }
+
+    /// Takes in a record; `last` is the caller's, so that it can stay in registers.
+    #[inline(always)]
+    fn note(&mut self, last: &mut Last, place: Place, likeliest: bool) {
+        let same_quad = !last.first_of_run
+            & (place.morton == last.place.morton)
+            & (place.mask == last.place.mask);
+        self.note_other(last, place, likeliest, same_quad);
+    }
+
+    #[inline(always)]
+    fn note_other(&mut self, last: &mut Last, place: Place, likeliest: bool, same_quad: bool) {
+        if let Some(follow) = self.follows.get_mut(usize::from(last.place.group) % GROUPS) {
+            *follow = Follow {
+                group: place.group,
+                same_quad,
+            };
+        }
+        if let Some(covered) = self.covered.get_mut(place.morton as usize & 63) {
+            *covered |= place.mask;
+        }
+        if !same_quad {
+            last.likeliest = likeliest;
+            last.stepped_one = !last.first_of_run & (place.morton == last.place.morton + 1);
+        }
+        if last.first_of_run {
+            last.start = place.morton;
+        }
+        last.place = place;
+        last.first_of_run = false;
+    }
+
+    /// The next record after `last`, from at least 57 bits; and how many of them tell it.
+    #[inline(always)]
+    pub fn read(
+        &mut self,
+        last: &mut Last,
+        codes: &Codes,
+        mut bits: u64,
+    ) -> Result<(Place, u32), &'static str> {
+        let follow = self.follow(last.place.group);
+        let mut used = 0;
+        let mut before = last.place.morton;
+        if last.first_of_run {
+            let (apart, length) = codes.start.decode(bits);
+            before = (last.start ^ apart).wrapping_sub(1);
+            used = length;
+        } else if follow.same_quad {
+            used = u32::from(!last.regular);
+            if last.regular | (bits & 1 == 1) {
+                let place = Place {
+                    group: follow.group,
+                    ..last.place
+                };
+                self.note(last, place, last.likeliest);
+                return Ok((place, used));
+            }
+        }
+        bits >>= used;
+        let code = codes.place.get(last.context()).ok_or(SHORT)?;
+        let (symbol, length) = code.decode(bits);
+        used += length;
+        bits >>= length;
+        if symbol == ESCAPE_PLACE {
+            used += 14;
+            let place = Place {
+                morton: before.wrapping_add(low_u32(bits & 63)),
+                mask: low_u32(bits >> 6 & 15).to_le_bytes()[0],
+                group: low_u32(bits >> 10 & 15).to_le_bytes()[0],
+            };
+            if place.morton > 63 {
+                return Err(OUTSIDE);
+            }
+            let likeliest = self.swap_mask(place.morton, place.mask) == 15;
+            self.note(last, place, likeliest);
+            return Ok((place, used));
+        }
+        let mask = (symbol & 15).to_le_bytes()[0];
+        let mut step = 1 + (symbol >> 4);
+        if step == STEPS {
+            step = low_u32(bits & 63);
+            used += 6;
+        }
+        let morton = before.wrapping_add(step);
+        if morton > 63 {
+            return Err(OUTSIDE);
+        }
+        let place = Place {
+            morton,
+            mask: self.swap_mask(morton, mask),
+            group: follow.group,
+        };
+        if step == 0 {
+            self.note(last, place, mask == 15);
+        } else {
+            // The context of the next code does not wait for the mask.
+            self.note_other(last, place, mask == 15, false);
+        }
+        Ok((place, used))
+    }
+
+    /// Writes the next record.
+    pub fn write(&mut self, codes: &Codes, place: Place, sink: &mut impl Sink) {
+        self.put(codes, place, sink);
+        self.note_at(place);
+    }
+
+    fn put(&self, codes: &Codes, place: Place, sink: &mut impl Sink) {
+        let last = &self.last;
+        let follow = self.follow(last.place.group);
+        let mut step = place.morton.wrapping_sub(last.place.morton);
+        if last.first_of_run {
+            let apart = place.morton ^ last.start;
+            sink.symbol(&codes.start, apart, 0);
+            step = 1;
+        } else if follow.same_quad {
+            let expected = Place {
+                group: follow.group,
+                ..last.place
+            };
+            if !last.regular {
+                sink.bits((place == expected).into(), 1);
+            }
+            if place == expected {
+                return;
+            }
+        }
+        #[allow(clippy::indexing_slicing, reason = "the context is one of 17")]
+        let code = &codes.place[last.context()];
+        let swapped = self.swap_mask(place.morton, place.mask);
+        let symbol = if place.group == follow.group && step > 0 {
+            (step.min(STEPS) - 1) << 4 | u32::from(swapped)
+        } else {
+            ESCAPE_PLACE
+        };
+        let known = sink.symbol(code, symbol, ESCAPE_PLACE) && symbol != ESCAPE_PLACE;
+        if !known || step >= STEPS {
+            sink.bits(step, 6);
+        }
+        if !known {
+            sink.bits(place.mask.into(), 4);
+            sink.bits(place.group.into(), 4);
+        }
+    }
+}
+
+fn follow_themselves() -> [Follow; GROUPS] {
+    let mut group = 0;
+    std::array::from_fn(|_| {
+        group += 1;
+        Follow {
+            group: group - 1,
+            same_quad: false,
+        }
+    })
+}
