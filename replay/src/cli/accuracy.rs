@@ -29,8 +29,8 @@ const FILES: [&str; 5] = [
 /// Arguments of `replay accuracy`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Everything runs one after another on one thread, so that times can be compared; they are in
-times.csv and on the page, and nowhere else. errors.csv has the form of the table that reports show.
+    after_help = "Everything runs one after another on one thread, and times are what that thread has worked, so that they can be
+compared; they are in times.csv and on the page, and nowhere else. errors.csv has the form of the table that reports show.
 
 Examples:
   replay accuracy crytek.textrace atrium.textrace -o out/accuracy

@@ -122,8 +122,8 @@ impl Measured {
         let unit = if error.unit.is_empty() { "" } else { ", " };
         Some(ScatterChart {
             title: self.study.title.to_owned(),
-            x: Axis::linear(&format!("time of {}, \u{d7}", self.study.time)),
-            y: Axis::linear(&format!("{}{unit}{}, mean", error.name, error.unit)),
+            x: Axis::linear(format!("time of {}, \u{d7}", self.study.time)),
+            y: Axis::linear(format!("{}{unit}{}, mean", error.name, error.unit)),
             kinds: [
                 "no other beats it".to_owned(),
                 "another is as good in both".to_owned(),
