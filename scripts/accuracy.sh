@@ -19,7 +19,7 @@ timed() {
     name=$1
     shift
     from=$(date +%s.%N)
-    "$@"
+    "$@" || return
     echo "$name,$(date +%s.%N | awk -v from="$from" '{ print $1 - from }')" >> "$seconds"
 }
 

@@ -84,7 +84,7 @@ pub const MODE: Study = Study {
     time: REPLAY_TIME,
     reference: "timed",
     recommended: "timed",
-    reason: "functional replay is quicker and gives bytes, rates and savings within a per cent, but for scenes that thrash the caches (foliage), where requests that are merged in flight count",
+    reason: "functional replay is quicker and close in rooms, but far off on foliage; which kind a scene is shows only in a timed replay",
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let variants = [variant(
@@ -129,7 +129,7 @@ pub const LOOP: Study = Study {
     time: REPLAY_TIME,
     reference: "64 cycles",
     recommended: "64 cycles",
-    reason: "the middle of what fits; the ends move utilisation by up to two points, and bytes by a per cent where the caches thrash",
+    reason: "the middle of what fits; the ends move utilisation by up to two points, and bytes by a per cent on foliage",
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let calibration = Some(Contribution::Calibration);
@@ -167,7 +167,7 @@ pub const FIRST_MISS_LOOP: Study = Study {
     time: REPLAY_TIME,
     reference: "24 cycles",
     recommended: "24 cycles",
-    reason: "found by search on half of the paper's scenes; where the caches thrash its neighbours move bytes by some per cent",
+    reason: "found by search on half of the paper's scenes; on foliage its neighbours move bytes by some per cent",
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let variants = [

@@ -1,5 +1,6 @@
 //! The headline figures, and how far those of one replay are from another's.
 
+use super::stopwatch::Stopwatch;
 use super::study::{Figure, figure};
 use crate::config::{Order, RunConfig};
 use crate::engine::{ReplayError, replay};
@@ -7,7 +8,7 @@ use crate::experiment::Subject;
 use crate::result::RunResult;
 use crate::stream::TileSource;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Headline figures of texture traces.
 pub const TEXTURE_FIGURES: [Figure; 6] = [
@@ -68,7 +69,7 @@ impl Replayed {
     /// # Errors
     /// See [`replay`].
     pub fn new(trace: &dyn TileSource, config: RunConfig) -> Result<Self, ReplayError> {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let of = |order| replay(trace, &RunConfig { order, ..config });
         let results = [of(Order::MORTON)?, of(Order::Z2_STA)?];
         Ok(Self {

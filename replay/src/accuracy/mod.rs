@@ -13,6 +13,7 @@ mod inputs;
 mod interval;
 mod reprojection;
 mod samples;
+mod stopwatch;
 mod study;
 mod techniques;
 #[cfg(test)]

@@ -3,10 +3,11 @@
 use super::clusters::{Counts, Part, cluster_count, counts, frames};
 use super::inputs::{Inputs, time_ratio};
 use super::interval::{Judged, Random, drawn, interval, judged};
+use super::stopwatch::Stopwatch;
 use super::study::{Choice, Figure, Study, StudyError, figure};
 use crate::config::{Mode, Order, RunConfig};
 use crate::experiment::Subject;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const FIGURES: [Figure; 4] = [
     figure("error_pct", "error of external bytes (RMS)", "%"),
@@ -96,7 +97,7 @@ fn replayed(
     config: &RunConfig,
     part: &Part<'_>,
 ) -> Result<(Counts, Duration), StudyError> {
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let found = counts(subject.source, config, Order::MORTON, part)?;
     Ok((found, start.elapsed()))
 }
@@ -221,10 +222,11 @@ mod tests {
     /// The same view so many times.
     fn repeated(trace: &MemoryTrace, times: u32) -> MemoryTrace {
         let mut out = trace.clone();
-        (out.tables.passes.clear(), out.tiles.clear());
+        out.tables.passes.clear();
+        out.tiles.clear();
         for frame in 0..times {
             for (pass, tiles) in trace.tables.passes.iter().zip(&trace.tiles) {
-                let mut pass = pass.clone();
+                let mut pass = *pass;
                 pass.frame = frame;
                 out.tables.passes.push(pass);
                 out.tiles.push(tiles.clone());

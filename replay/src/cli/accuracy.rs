@@ -29,8 +29,8 @@ const FILES: [&str; 5] = [
 /// Arguments of `replay accuracy`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Everything runs one after another on one thread, so that times can be compared; they are in
-times.csv and on the page, and nowhere else. errors.csv has the form of the table that reports show.
+    after_help = "Everything runs one after another on one thread, and times are what that thread has worked, so that they can be
+compared; they are in times.csv and on the page, and nowhere else. errors.csv has the form of the table that reports show.
 
 Examples:
   replay accuracy crytek.textrace atrium.textrace -o out/accuracy
@@ -217,4 +217,63 @@ fn write(report: &AccuracyReport, size: &dyn Fn(&str) -> String, folder: &Path) 
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::testing::file_of;
+    use crate::stream::synthetic::Synthetic;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn run_on(folder: &Path, traversal: &str) -> Result<ExitCode> {
+        let trace = Synthetic {
+            size_px: [48, 48],
+            ..Synthetic::default()
+        }
+        .generate();
+        let at = |name: &str| folder.join(name).display().to_string();
+        std::fs::copy(file_of(&trace).path(), at("a.textrace"))?;
+        std::fs::write(at("p.json"), traversal)?;
+        let line = ["accuracy", &at("a.textrace"), "--traversal", &at("p.json")];
+        let line = line.into_iter().map(str::to_owned);
+        let line = line.chain(["-o".to_owned(), at("out")]);
+        run(&Line::try_parse_from(line)?.args)
+    }
+
+    const ROWS: &str = r#"{"schema": "tracegen.precision/1", "rows": [
+        {"arithmetic": "single precision", "at_m": 1e5, "wrong_pct": 0.3, "distance_ppm": 9.0, "time_ratio": 0.9}]}"#;
+
+    #[test]
+    fn every_file_is_written_and_results_have_no_times() {
+        let folder = tempfile::tempdir().unwrap();
+        run_on(folder.path(), ROWS).unwrap();
+        let read =
+            |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+        let [page, json, choices, errors, times] = FILES.map(read);
+        assert!(page.contains("Precision of the ray traversal"), "{page}");
+        assert!(json.contains(crate::report::accuracy::ACCURACY_SCHEMA));
+        assert!(choices.contains("a sphere at 1e5 m"), "{choices}");
+        assert!(errors.contains("a 48x48"), "{errors}");
+        assert!(times.contains("single precision"), "{times}");
+        assert!(!json.contains("time_ratio") && !choices.contains("time_ratio"));
+        assert!(read("pareto-lod.svg").contains("<svg"));
+    }
+
+    #[test]
+    fn a_file_of_another_schema_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = ROWS.replace("precision/1", "precision/9");
+        let error = run_on(folder.path(), &text).unwrap_err().to_string();
+        assert!(
+            error.contains("p.json: schema: expected tracegen.precision/1, found"),
+            "{error}"
+        );
+    }
 }

@@ -110,7 +110,8 @@ impl ScatterChart {
             let widths: Vec<f64> = self
                 .points
                 .iter()
-                .map(|p| theme::text_width_px(&p.style.name, theme::TICK_PX))
+                // Some fonts are wider than is thought.
+                .map(|p| 1.07 * theme::text_width_px(&p.style.name, theme::TICK_PX))
                 .collect();
             let room = Rect {
                 left: f64::from(LEFT_PX) + 4.0,
