@@ -11,7 +11,7 @@ use formats::texture::{ColorSpace, Filter, MipFilter, Sampler};
 use formats::view::{Eye, FrameViews, Hmd, Lens, TILE_SIZE_PX};
 use glam::{Affine3A, DVec2, Vec2, Vec3, Vec4};
 use raster::backend::{CaptureBackend, Fragments, View, Work};
-use raster::capture::CaptureJob;
+use raster::capture::{CaptureJob, CapturedFrame};
 use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
 use raster::lavapipe::{Lavapipe, device};
