@@ -167,7 +167,10 @@ pub(super) fn capture_skipping(
     if let Some(depths) = &depths
         && fragments == Fragments::DepthTested
     {
-        assert!(unshaded.depths(&mut backend, &frame)? == *depths, "unshaded");
+        assert!(
+            unshaded.depths(&mut backend, &frame)? == *depths,
+            "unshaded"
+        );
     }
     let reader = Textrace::from_bytes(trace.clone()).unwrap();
     let tiles = (0..tables.passes.len())
