@@ -56,7 +56,7 @@ fn shoot(folder: &Path, scene: &str, options: &[&str]) -> Shot {
             size_px: SIZE_PX,
             pixels: image.pixels().map(|pixel| pixel.0).collect(),
         },
-        fragments: number("fragments") as u64,
+        fragments: number("fragments (") as u64,
         quads: number("quads") as u64,
         predicted: before(&summary, "of the pixels are open").map(|percent| percent / 100.0),
     }
