@@ -123,9 +123,15 @@ impl Reader<'_> {
             material,
             ..Mesh::default()
         };
-        self.check_length("NORMAL", mesh.normals.len(), count)?;
-        self.check_length("TANGENT", mesh.tangents.len(), count)?;
-        self.check_length("COLOR_0", mesh.colors.len(), count)?;
+        // What is not there, or empty, is made.
+        let given = [
+            ("NORMAL", mesh.normals.len()),
+            ("TANGENT", mesh.tangents.len()),
+            ("COLOR_0", mesh.colors.len()),
+        ];
+        for (what, found) in given.into_iter().filter(|(_, found)| *found > 0) {
+            self.check_length(what, found, count)?;
+        }
         compact(&mut mesh, &mut indices);
         mesh.indices = indices;
         complete(&mut mesh, uses.normal_map_uv);
@@ -185,9 +191,9 @@ impl Reader<'_> {
         ))
     }
 
-    /// An attribute that is there must have one value a position.
+    /// An attribute must have one value a position.
     fn check_length(&self, what: &str, found: usize, count: usize) -> Result<(), SceneError> {
-        if found == 0 || found == count {
+        if found == count {
             return Ok(());
         }
         Err(self.buffers.origin.invalid(
