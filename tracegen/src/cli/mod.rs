@@ -7,6 +7,7 @@ pub mod precision;
 mod prepared;
 pub mod raster;
 mod raster_auto;
+mod raster_summary;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;

@@ -2,34 +2,29 @@
 
 use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
+use super::raster_summary::{Summary, worked_since};
 use super::scene_args::{SceneArgs, SceneSetup};
 use super::technique_args::TechniqueArgs;
 use crate::doubtful::Doubtful;
 use crate::picture;
 use crate::study::auto::Budget;
-use crate::study::{memory, processor};
+use crate::study::processor;
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use formats::textrace::{Encoding, Pass, Tables, TextraceWriter, TraceMeta};
-use formats::view::{Eye, FrameViews};
-use raster::backend::{CaptureBackend, Fragments, Work};
+use formats::view::Eye;
+use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
 use raster::drivers::Driver;
-use raster::error::RasterError;
-use raster::frame::Frame;
 use raster::lighting::Lighting;
-use raster::skips::Skipped;
-use record::CaptureCounts;
 use scene::{LoadOptions, Scene};
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-use techniques::layer::Predicted;
+use std::time::Instant;
 use techniques::skips::Skip;
 use techniques::{Planner, Skips};
 use textures::TextureSet;
-use visibility::Occlusion;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
 const CASCADES: u32 = 4;
@@ -494,167 +489,6 @@ pub(super) fn tables(
         draws: draw_table,
         passes,
     }
-}
-
-#[derive(Default)]
-struct Summary {
-    shadows: Duration,
-    plain: Duration,
-    captured: Duration,
-    /// Processors' time of the plain renders and of the captures; zero where the system does not tell.
-    plain_work: Duration,
-    captured_work: Duration,
-    sorting: Duration,
-    counts: CaptureCounts,
-    predicted: Vec<Predicted>,
-    /// Of the first frame.
-    doubtful: Option<Doubtful>,
-    /// What is the same with and without capture.
-    compared: Option<&'static str>,
-    looking: Duration,
-    culling: Duration,
-    cull_tests: u64,
-    occlusion: Occlusion,
-    occlusion_tests: u64,
-    occluded: u64,
-    skipped: Skipped,
-}
-
-impl Summary {
-    /// Finds what a frame draws.
-    fn look(
-        &mut self,
-        job: &CaptureJob<'_>,
-        backend: &mut dyn CaptureBackend,
-        views: &FrameViews,
-    ) -> Result<Frame, RasterError> {
-        let start = Instant::now();
-        let mut frame = job.frame(views)?;
-        if job.planner.settings().occlusion {
-            job.occlude(backend, &mut frame, &mut self.occlusion)?;
-        }
-        self.looking += start.elapsed();
-        self.skipped += frame.skipped;
-        self.cull_tests += frame.cull_tests;
-        self.occlusion_tests += frame.occlusion_tests;
-        self.occluded += frame.occluded;
-        self.culling += frame.cull_time;
-        Ok(frame)
-    }
-
-    fn print(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64, work: &Work) {
-        let CaptureCounts {
-            quads,
-            fragments,
-            records,
-            masked_lanes_killed,
-            not_finite,
-            tile_bytes,
-            empty_tiles,
-        } = self.counts;
-        let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
-        let pixels = (views * frames) as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
-        note(&format!(
-            "{frames} frame(s), {views} x {}x{}: {quads} quads, {fragments} fragments ({:.2} a pixel), {records} records",
-            size_px[0],
-            size_px[1],
-            fragments as f64 / pixels
-        ));
-        let mean = |share: fn(&Predicted) -> Option<f32>| {
-            let shares: Option<Vec<f32>> = self.predicted.iter().map(share).collect();
-            shares.map(|shares| shares.iter().sum::<f32>() / shares.len().max(1) as f32)
-        };
-        if let (Some(rate), Some(shaded)) = (mean(|p| p.rate_share), mean(|p| p.shaded_share)) {
-            note(&format!(
-                "{:.2} % of the pixels are open to be shaded: {:.2} % by their rates, the rest for reconstruction",
-                shaded * 100.0,
-                rate * 100.0
-            ));
-        }
-        if masked_lanes_killed > 0 {
-            note(&format!(
-                "{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw"
-            ));
-        }
-        if not_finite > 0 {
-            shell::warn(&format!(
-                "{not_finite} records with texture coordinates that are not finite were left out"
-            ));
-        }
-        note(&format!(
-            "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record ({} raw)",
-            per(tile_bytes, quads),
-            per(tile_bytes, records),
-            record::RECORD_BYTES
-        ));
-        note(&format!(
-            "{} draws in {} draw calls, {} regions, {} shadow maps in {:.3} s, {} pipelines, {} samplers",
-            work.draws,
-            work.calls,
-            work.regions,
-            work.shadow_maps,
-            self.shadows.as_secs_f64(),
-            work.pipelines,
-            work.samplers
-        ));
-        note(&format!(
-            "culling        {} boxes tested, {} more against depth that hides {} draws, in {:.3} ms a frame",
-            self.cull_tests,
-            self.occlusion_tests,
-            self.occluded,
-            self.culling.as_secs_f64() * 1e3 / frames as f64
-        ));
-        note(&format!(
-            "never drawn    {empty_tiles} empty tiles, {} draws without a triangle in view, {} shadow cascades that nobody sees (draws found in {:.3} s)",
-            self.skipped.draws,
-            self.skipped.cascades,
-            self.looking.as_secs_f64()
-        ));
-        let captured = self.captured.as_secs_f64();
-        let includes = "all views";
-        if !self.plain.is_zero() {
-            let plain = self.plain.as_secs_f64();
-            note(&format!(
-                "plain render   {plain:.3} s ({includes}, reading the pictures back)"
-            ));
-            note(&format!(
-                "with capture   {captured:.3} s ({includes}, draining, and {:.3} s of sorting, encoding and writing the trace): {:.2} x plain",
-                self.sorting.as_secs_f64(),
-                captured / plain
-            ));
-            let (plain, captured) = (
-                self.plain_work.as_secs_f64(),
-                self.captured_work.as_secs_f64(),
-            );
-            if plain > 0.0 {
-                note(&format!(
-                    "processors     {plain:.3} s plain, {captured:.3} s with capture: {:.2} x plain",
-                    captured / plain
-                ));
-            }
-            if let Some(what) = self.compared {
-                note(&format!("{what} with and without capture: identical"));
-            }
-        } else {
-            note(&format!(
-                "with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace)"
-            ));
-        }
-        if let Some(bytes) = memory::peak_bytes() {
-            note(&format!(
-                "peak memory    {:.0} MiB",
-                bytes as f64 / f64::from(1 << 20)
-            ));
-        }
-    }
-}
-
-/// Processors' time since `before`.
-fn worked_since(before: Option<Duration>) -> Duration {
-    let since = before
-        .zip(processor::time())
-        .map(|(before, now)| now.saturating_sub(before));
-    since.unwrap_or_default()
 }
 
 /// Bytes in MiB.
