@@ -5,15 +5,13 @@ use formats::Trace;
 use formats::footprint::SamplingOptions;
 use formats::interop::{Expander, Granularity, Origin, ray_samples};
 use formats::layout::{Layout, LayoutConfig};
-use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
+use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
 use formats::view::Eye;
 use replay::config::{Mode, RunConfig};
 use replay::sgrt::compose::Reuse;
 use replay::sgrt::config::SgrtConfig;
-use replay::sgrt::frame::RaySource;
 use replay::sgrt::loaded::LoadedTrace;
-use std::error::Error;
 
 /// Reads a file and does with it what the commands do; true if it is valid.
 ///
@@ -79,23 +77,6 @@ fn expand(trace: &Textrace) {
     }
 }
 
-struct Source<'a>(&'a Raytrace);
-
-impl RaySource for Source<'_> {
-    fn tables(&self) -> &RaytraceTables {
-        self.0.tables()
-    }
-
-    fn tile(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        Ok(self.0.decode_tile(eye, index, tile)?)
-    }
-}
-
 fn reproject(trace: &Raytrace) {
     let tables = trace.tables();
     let mut tile = RayTile::default();
@@ -111,8 +92,7 @@ fn reproject(trace: &Raytrace) {
             })
             .expect("nothing fails here");
     }
-    let source = Source(trace);
-    let Ok(loaded) = LoadedTrace::load(&source) else {
+    let Ok(loaded) = LoadedTrace::load(trace) else {
         return;
     };
     for rule in ["none", replay::sgrt::DEFAULT_RULE] {

@@ -1,7 +1,6 @@
 //! `replay accuracy`: run time against error, measured.
 
 use super::ConfigArgs;
-use super::ray_files::TraceFile;
 use super::subjects::Traces;
 use crate::accuracy::{Inputs, Rays, Replays, STUDIES, TraversalRow};
 use crate::config::{Mode, RunConfig};
@@ -90,11 +89,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let [traces, truths, captures] =
         [&args.traces, &args.truth, &args.capture].map(|paths| Traces::open(paths));
     let (traces, truths, captures) = (traces?, truths?, captures?);
-    let rays = args
-        .rays
-        .iter()
-        .map(|path| Ok(TraceFile(Raytrace::open(path)?)));
-    let rays = rays.collect::<Result<Vec<TraceFile>>>()?;
+    let rays = args.rays.iter().map(|path| Raytrace::open(path));
+    let rays = rays.collect::<Result<Vec<_>, _>>()?;
     let folders = args.techniques.iter().map(|path| Folder::open(path));
     let folders = folders.collect::<Result<Vec<_>, _>>()?;
     let traversal = args.traversal.as_deref().map(read_traversal).transpose()?;

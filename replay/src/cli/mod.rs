@@ -13,7 +13,6 @@ pub mod info;
 mod locality;
 mod paper;
 mod parquet_arg;
-mod ray_files;
 mod report;
 mod reproject;
 mod run;

@@ -2,7 +2,6 @@
 //! image for the right one.
 
 use super::parquet_arg::ParquetArg;
-use super::ray_files::TraceFile;
 use crate::files::{self, write_atomically};
 use crate::paper::sgrt as paper;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
@@ -148,7 +147,7 @@ fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
 }
 
 fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
-    let file = TraceFile(Raytrace::open(path)?);
+    let file = Raytrace::open(path)?;
     let in_file = || path.display().to_string();
     let loaded = LoadedTrace::load(&file).with_context(in_file)?;
     let ours = loaded
@@ -167,7 +166,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         tool: TOOL.to_owned(),
         trace: TraceId {
             scene: scene.to_owned(),
-            checksum: format!("{:08x}", file.0.file_checksum()),
+            checksum: format!("{:08x}", file.file_checksum()),
         },
         scene_triangles: meta.trace.scene_triangles,
         eye_size_px: loaded.frame().size_px,

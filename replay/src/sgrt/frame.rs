@@ -2,7 +2,7 @@
 
 use super::work::PixelWork;
 use formats::raytrace::camera::sample_position_px;
-use formats::raytrace::{RayTile, RaytraceTables};
+use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::{Eye, TILE_SIZE_PX};
 use rayon::prelude::*;
 use std::error::Error;
@@ -25,6 +25,21 @@ pub trait RaySource: Sync {
         index: u32,
         tile: &mut RayTile,
     ) -> Result<(), Box<dyn Error + Send + Sync>>;
+}
+
+impl RaySource for Raytrace {
+    fn tables(&self) -> &RaytraceTables {
+        Self::tables(self)
+    }
+
+    fn tile(
+        &self,
+        eye: Eye,
+        index: u32,
+        tile: &mut RayTile,
+    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+        Ok(self.decode_tile(eye, index, tile)?)
+    }
 }
 
 /// A frame that could not be put together.
