@@ -26,6 +26,10 @@ const SHARE: f64 = 0.002;
 /// Vertices of triangles that may lie upon one another are less than this apart.
 const SAME_PLACE_PX: f64 = 1.0 / 16.0;
 
+/// Triangles of one place that another is held against. Foliage and decals lie a few deep; behind so many
+/// depths a further one goes unnoticed, where the time for a stack would grow with the square of its height.
+const MOST_DEPTHS: usize = 64;
+
 /// What a view shows of a kind of doubtful triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Kind {
@@ -50,6 +54,17 @@ pub struct Doubtful {
     coincident: Kind,
 }
 
+/// How a triangle lies to one at the same place on the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Against {
+    /// Another place, or depth tells them apart.
+    Apart,
+    /// The same to the bit and wound alike: the first one is seen.
+    Same,
+    /// Rounding decides which of both is seen.
+    Upon,
+}
+
 /// A triangle on the screen.
 struct Shown {
     /// Pixels, and depth from 0 to 1.
@@ -63,7 +78,7 @@ impl Doubtful {
     pub fn look(&mut self, scene: &Scene, draws: &DrawList, view: &EyeView, size_px: [u32; 2]) {
         let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
         let clip_from_world = wide(&view.eye_to_clip) * wide(&view.world_to_eye);
-        let mut places: HashMap<[[i32; 2]; 3], Vec<Shown>> = HashMap::new();
+        let mut places = Places::default();
         for call in &draws.calls {
             let of_draw = on_screen(scene, call, clip_from_world, size_px);
             for (shown, area_px) in of_draw {
@@ -75,11 +90,9 @@ impl Doubtful {
                 if call.mode == DrawMode::Blended {
                     continue;
                 }
-                let others = places.entry(shown.place()).or_default();
-                if others.iter().any(|other| shown.is_upon(other)) {
+                if places.add(shown.placed()) == Against::Upon {
                     self.coincident.add(area_px, shown.mesh);
                 }
-                others.push(shown);
             }
         }
     }
@@ -186,29 +199,59 @@ impl Shown {
             .product()
     }
 
-    /// Corners in an order that does not depend on where they start nor how they wind.
-    fn sorted(&self) -> [DVec3; 3] {
+    fn placed(&self) -> Placed {
         let mut corners = self.corners;
         let at = |v: &DVec3| (place(v), v.z);
         corners.sort_by(|a, b| at(a).0.cmp(&at(b).0).then(at(a).1.total_cmp(&at(b).1)));
-        corners
+        Placed {
+            corners,
+            wound_up: self.signed_area_px() > 0.0,
+            double_sided: self.double_sided,
+        }
     }
+}
 
+/// A triangle among those of its place.
+struct Placed {
+    /// In an order that does not depend on where they start nor how they wind.
+    corners: [DVec3; 3],
+    wound_up: bool,
+    double_sided: bool,
+}
+
+impl Placed {
     fn place(&self) -> [[i32; 2]; 3] {
-        self.sorted().map(|corner| place(&corner))
+        self.corners.map(|corner| place(&corner))
     }
 
-    /// Whether it cannot be told from another one at the same place. One that is the same to the bit and
-    /// wound alike can: the first one is seen.
-    fn is_upon(&self, other: &Self) -> bool {
-        let wound_alike = (self.signed_area_px() > 0.0) == (other.signed_area_px() > 0.0);
-        let (ours, theirs) = (self.sorted(), other.sorted());
-        if ours == theirs && wound_alike {
-            return false;
+    fn against(&self, other: &Self) -> Against {
+        let wound_alike = self.wound_up == other.wound_up;
+        if self.corners == other.corners && wound_alike {
+            return Against::Same;
         }
         debug_assert!(wound_alike || (self.double_sided && other.double_sided));
         let near = |(a, b): (&DVec3, &DVec3)| (a.z - b.z).abs() <= DEPTH_STEPS * DEPTH_STEP;
-        ours.iter().zip(&theirs).all(near)
+        match self.corners.iter().zip(&other.corners).all(near) {
+            true => Against::Upon,
+            false => Against::Apart,
+        }
+    }
+}
+
+/// Triangles by their place.
+#[derive(Default)]
+struct Places(HashMap<[[i32; 2]; 3], Vec<Placed>>);
+
+impl Places {
+    /// Adds a triangle: how it lies to those that are there.
+    fn add(&mut self, new: Placed) -> Against {
+        let others = self.0.entry(new.place()).or_default();
+        let against = others.iter().map(|other| new.against(other)).max();
+        let against = against.unwrap_or(Against::Apart);
+        if against == Against::Apart && others.len() < MOST_DEPTHS {
+            others.push(new);
+        }
+        against
     }
 }
 
@@ -234,18 +277,33 @@ mod tests {
 
     #[test]
     fn a_triangle_is_upon_another_unless_depth_or_place_tells_them_apart() {
-        let one = shown([A, B, C]);
-        let lifted = |by: f64| shown([A, B, C].map(|[x, y, z]| [x, y, z + by]));
-        assert!(
-            !shown([B, C, A]).is_upon(&one),
-            "wound alike, the same bits"
-        );
-        assert!(shown([A, C, B]).is_upon(&one), "wound the other way");
-        assert!(lifted(3.0 * DEPTH_STEP).is_upon(&one));
-        assert!(!lifted(100.0 * DEPTH_STEP).is_upon(&one));
-        let aside = shown([A, B, C].map(|[x, y, z]| [x + 0.2, y, z]));
+        let placed = |corners| shown(corners).placed();
+        let one = placed([A, B, C]);
+        let lifted = |by: f64| placed([A, B, C].map(|[x, y, z]| [x, y, z + by]));
+        assert_eq!(placed([B, C, A]).against(&one), Against::Same);
+        let other_way = placed([A, C, B]);
+        assert_eq!(other_way.against(&one), Against::Upon);
+        assert_eq!(lifted(3.0 * DEPTH_STEP).against(&one), Against::Upon);
+        assert_eq!(lifted(100.0 * DEPTH_STEP).against(&one), Against::Apart);
+        let aside = placed([A, B, C].map(|[x, y, z]| [x + 0.2, y, z]));
         assert_ne!(aside.place(), one.place());
         assert_eq!(lifted(1e-6).place(), one.place());
+    }
+
+    #[test]
+    fn stacks_of_any_height_keep_few_triangles() {
+        let mut places = Places::default();
+        let place = shown([A, B, C]).placed().place();
+        for _ in 0..1_000 {
+            places.add(shown([A, B, C]).placed());
+        }
+        assert_eq!(places.0[&place].len(), 1);
+        for layer in 1..1_000 {
+            let apart = shown([A, B, C].map(|[x, y, z]| [x, y, z + 1e-4 * f64::from(layer)]));
+            assert_eq!(places.add(apart.placed()), Against::Apart);
+        }
+        assert_eq!(places.0[&place].len(), MOST_DEPTHS);
+        assert_eq!(places.add(shown([A, C, B]).placed()), Against::Upon);
     }
 
     #[test]
