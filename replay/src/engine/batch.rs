@@ -226,6 +226,14 @@ impl Pass<'_> {
         self.points.iter().map(of).collect()
     }
 
+    /// The fewest sets of an L1, if all are LRU caches in which a footprint's lines cannot crowd each other
+    /// out: its repeats find all of them then.
+    fn least_sets(&self) -> Option<u32> {
+        let l1 = self.geometries()?.into_iter().map(|(l1, _)| l1);
+        let sets = l1.map(|(sets, ways)| (ways >= 4).then_some(sets));
+        sets.min().flatten()
+    }
+
     fn build(&self, expander: &Expander<'_>) -> Result<Box<dyn Machine>, ReplayError> {
         let config = self.config();
         let bins = expander.bins();
@@ -272,7 +280,11 @@ impl Wave<'_> {
         let expander = Expander::new(&shaded, passes[0].config())?;
         let instant = |pass: &Pass<'_>| pass.config().tmu.l1_penalty_cycles == 0;
         let expander = match passes[0].config().mode {
-            Mode::Functional | Mode::FirstMiss => expander,
+            Mode::Functional => match passes.iter().map(Pass::least_sets).min() {
+                Some(Some(sets)) => expander.without_idle_accesses(sets),
+                _ => expander,
+            },
+            Mode::FirstMiss => expander,
             // Where a miss fills at once, the timed machine looks footprints up one by one.
             Mode::Timed if passes.iter().any(instant) => expander.with_distinct_lines(true),
             Mode::Timed => expander.only_distinct_lines(),

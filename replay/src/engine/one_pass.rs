@@ -59,8 +59,7 @@ impl Tally {
             if missing > 0 {
                 self.lines[cell * classes + usize::from(missing) - 1] += 1;
                 of.most = of.most.max(missing);
-                of.lines[usize::from(of.count & 3)] = missing;
-                of.count += 1;
+                of.lines = of.lines << 8 | u32::from(missing);
             }
         }
         if of.most > 0 {
@@ -103,11 +102,23 @@ impl Tally {
 }
 
 /// How many associativities the missing lines of a footprint miss.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 struct FootprintTally {
     most: u8,
-    lines: [u8; 4],
-    count: u8,
+    /// A byte each, so that all of it lies in a register.
+    lines: u32,
+}
+
+impl FootprintTally {
+    #[inline(always)]
+    fn lines(self) -> impl Iterator<Item = u8> {
+        let mut left = self.lines;
+        std::iter::from_fn(move || {
+            let missing = left as u8;
+            left >>= 8;
+            (missing > 0).then_some(missing)
+        })
+    }
 }
 
 /// All caches of a level that see the same lines.
@@ -277,7 +288,7 @@ impl OnePass {
             // Larger numbers of sets have all lines on top.
             for (tree, tally) in under.level.tallies[..searched].iter_mut().enumerate() {
                 let of = tally.count(cell, depths.iter().skip(tree).step_by(l2_trees).copied());
-                for &missing in of.lines.iter().take(of.count.into()) {
+                for missing in of.lines() {
                     tally.tile(tile, missing);
                 }
             }

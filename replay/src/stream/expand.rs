@@ -7,6 +7,7 @@
 
 use super::distinct::Distinct;
 use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
+use super::last_used::LastUsed;
 use super::lines::{QuadEnd, QuadRun, Tag, TileLines};
 use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, feed};
 use crate::config::RunConfig;
@@ -53,6 +54,8 @@ pub struct Expander<'a> {
     touched: LineSet,
     distinct: bool,
     all: bool,
+    /// Sets of the cache whose last lines are not listed again.
+    idle_sets: Option<u32>,
 }
 
 /// Memory for the expansion of a tile, kept from tile to tile, and what was counted.
@@ -62,6 +65,7 @@ pub(super) struct Work {
     scratch: Scratch,
     counts: TraceCounts,
     distinct: Option<Distinct>,
+    idle: Option<LastUsed>,
     /// The last tile's lines.
     pub(super) lines: TileLines,
 }
@@ -81,6 +85,7 @@ impl<'a> Expander<'a> {
             source,
             distinct: false,
             all: true,
+            idle_sets: None,
         })
     }
 
@@ -96,6 +101,16 @@ impl<'a> Expander<'a> {
         Self {
             distinct: true,
             all: false,
+            ..self
+        }
+    }
+
+    /// Leaves out accesses that change nothing in a cache of so many sets (a power of two) or more, see
+    /// [`LastUsed`].
+    #[must_use]
+    pub fn without_idle_accesses(self, sets: u32) -> Self {
+        Self {
+            idle_sets: Some(sets),
             ..self
         }
     }
@@ -162,6 +177,7 @@ impl<'a> Expander<'a> {
             scratch: self.footprints.scratch(),
             counts: TraceCounts::without_tiles(&self.bins),
             distinct: self.distinct.then(Distinct::default),
+            idle: self.idle_sets.map(LastUsed::new),
             lines: TileLines::default(),
         }
     }
@@ -174,12 +190,16 @@ impl<'a> Expander<'a> {
             scratch,
             counts,
             distinct,
+            idle,
             lines,
         } = work;
         lines.begin(self.bins.place(at));
         let first_cell = self.bins.first_cell(at);
         let mut sums = TileSums::default();
         for run in &tile.runs {
+            if let Some(idle) = idle {
+                idle.begin();
+            }
             for records in feed::quads(tile, run) {
                 let lanes = feed::lanes(records);
                 counts.quads += 1;
@@ -189,9 +209,13 @@ impl<'a> Expander<'a> {
                 self.footprints
                     .for_quad(run.draw, records, scratch, |sample, bundle| {
                         let cell = self.bins.cell(sample.texture, bundle.level);
-                        let before = lines.lines.len();
-                        let (hash, lookups) = self.append(cell, sample, bundle, lines);
-                        debug_assert!(lines.lines.len() > before || bundle.count == 0);
+                        let (hash, lookups) = match idle {
+                            Some(idle) => {
+                                let is_idle = |line| idle.uses_again(line);
+                                self.append(cell, sample, bundle, is_idle, lines)
+                            }
+                            None => self.append(cell, sample, bundle, |_| false, lines),
+                        };
                         counts.hash = counts.hash.wrapping_add(hash);
                         let cell = &mut counts.cells[first_cell + cell as usize];
                         cell.footprints += u64::from(bundle.count);
@@ -224,13 +248,15 @@ impl<'a> Expander<'a> {
         sums.checked(at)
     }
 
-    /// Appends the footprints of a bundle; the sum of their [`access_hash`] and of their lines.
+    /// Appends the footprints of a bundle without lines whose access is idle; the sum of the footprints'
+    /// [`access_hash`] and of their lines.
     #[inline(always)]
     fn append(
         &self,
         cell: u32,
         sample: SampleRef,
         bundle: &Bundle,
+        mut is_idle: impl FnMut(u32) -> bool,
         out: &mut TileLines,
     ) -> (u64, u32) {
         let (mut hash, mut lookups) = (0_u64, 0);
@@ -248,11 +274,14 @@ impl<'a> Expander<'a> {
             let relative = bundle.lines_of(index);
             for relative in relative {
                 let line = sample.base_line + relative;
+                once = once.wrapping_add(access_hash(line));
+                if is_idle(line) {
+                    continue;
+                }
                 out.lines.push(line);
                 out.tags.push(tag);
                 tag = other;
                 self.touched.insert(line);
-                once = once.wrapping_add(access_hash(line));
             }
             hash = hash.wrapping_add(once.wrapping_mul(times.into()));
             lookups += relative.len() as u32 * times;

@@ -15,6 +15,7 @@ mod feed;
 mod footprint;
 mod hsr;
 mod interleave;
+mod last_used;
 mod line_set;
 mod lines;
 mod source;
