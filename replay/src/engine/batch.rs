@@ -7,17 +7,17 @@
 use super::counts::CacheCounts;
 use super::first_miss::FirstMiss;
 use super::functional::Functional;
+use super::in_turn::in_turn;
 use super::one_pass::{LevelGeometry, OnePass, geometry};
-use super::summary::summary;
 use super::timed::Timed;
+use super::wave::Wave;
 use super::{Machine, ReplayError};
 use crate::cache::Levels;
-use crate::config::{BetweenFrames, CacheConfig, Mode, Order, RunConfig, TmuConfig};
-use crate::order::{self, Phase};
+use crate::config::{CacheConfig, Mode, RunConfig, TmuConfig};
 use crate::result::{RunResult, TmuResult};
-use crate::stream::{Cores, Expander, LineMemory, TileSource, TraceCounts, shaded};
-use rayon::prelude::*;
+use crate::stream::{Expander, LineMemory, TileSource};
 use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
 
 /// Passes whose machines are kept from frame to frame; beyond them a stream is expanded again.
 const WAVE: usize = 256;
@@ -83,52 +83,121 @@ impl From<CacheCounts> for Outcome {
     }
 }
 
-/// Replays `trace` under every configuration, in parallel; `finished` is told each result, by the
-/// index of its configuration, as soon as it is there.
+/// Configurations to replay a trace under.
+#[derive(Clone, Copy)]
+pub struct Job<'a> {
+    /// The trace.
+    pub trace: &'a dyn TileSource,
+    /// The configurations.
+    pub configs: &'a [RunConfig],
+    /// Is told each result, by the index of its configuration, as soon as it is there.
+    pub finished: &'a (dyn Fn(usize, RunResult) + Sync),
+}
+
+/// Replays `trace` under every configuration, as one job.
 ///
 /// # Errors
-/// An impossible configuration or a trace that cannot be read, with the index of the first
-/// configuration that it concerns.
+/// As [`replay_jobs`].
 pub fn replay_all(
     trace: &dyn TileSource,
     configs: &[RunConfig],
     memory: &LineMemory,
     finished: &(dyn Fn(usize, RunResult) + Sync),
 ) -> Result<Work, (usize, ReplayError)> {
-    for (index, config) in configs.iter().enumerate() {
+    let job = Job {
+        trace,
+        configs,
+        finished,
+    };
+    let answers = replay_jobs(&[job], memory);
+    answers
+        .into_iter()
+        .next()
+        .unwrap_or_else(|| Ok(Work::default()))
+}
+
+/// Replays all jobs, in parallel: what each shared.
+///
+/// # Errors
+/// Of each job: an impossible configuration or a trace that cannot be read, with the index of the first
+/// configuration that it concerns.
+pub fn replay_jobs(
+    jobs: &[Job<'_>],
+    memory: &LineMemory,
+) -> Vec<Result<Work, (usize, ReplayError)>> {
+    let mut answers: Vec<Result<Work, _>> = jobs.iter().map(checked).collect();
+    let mut waves = Vec::new();
+    for (job, answer) in (0..).zip(&mut answers) {
+        let Ok(work) = answer else {
+            continue;
+        };
+        let tiles = tiles_of_a_frame(jobs[job].trace);
+        for wave in of_job(&jobs[job]) {
+            work.passes += wave.len();
+            work.expansions += 1;
+            waves.push((tiles, (waves.len(), job, wave)));
+        }
+    }
+    // A stream's tiles are expanded by all threads: what has fewer leaves some of them idle.
+    let enough = Expander::CHUNK * rayon::current_num_threads();
+    let failed = Mutex::new(Vec::new());
+    let run = |(index, job, passes): (usize, usize, Vec<Pass<'_>>),
+               expanded: &(dyn Fn() + Sync)| {
+        let first = passes[0].points[0];
+        let wave = Wave {
+            job: jobs[job],
+            memory,
+            expanded,
+        };
+        if let Err(error) = wave.run(passes) {
+            let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);
+            failed.push((index, job, first, error));
+        }
+    };
+    in_turn(waves, enough, || memory.half_is_left(), run);
+    let mut failed = failed.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // The first of a job is what is told.
+    failed.sort_by_key(|(index, ..)| std::cmp::Reverse(*index));
+    for (_, job, first, error) in failed {
+        answers[job] = Err((first, error));
+    }
+    answers
+}
+
+/// What is shared of a job so far: nothing.
+fn checked(job: &Job<'_>) -> Result<Work, (usize, ReplayError)> {
+    for (index, config) in job.configs.iter().enumerate() {
         config.validate().map_err(|error| (index, error.into()))?;
     }
+    Ok(Work {
+        replays: job.configs.len(),
+        ..Work::default()
+    })
+}
+
+/// The passes of a job, those of a wave together.
+fn of_job<'a>(job: &Job<'a>) -> Vec<Vec<Pass<'a>>> {
+    let configs = job.configs;
     let streams = grouped(0..configs.len(), |&index| stream_key(&configs[index]));
-    let waves: Vec<Vec<Pass>> = streams
-        .into_iter()
-        .flat_map(|stream| {
-            let mut passes = passes(configs, stream);
-            let mut waves = Vec::new();
-            while !passes.is_empty() {
-                let rest = passes.split_off(passes.len().min(WAVE));
-                waves.push(std::mem::replace(&mut passes, rest));
-            }
-            waves
-        })
-        .collect();
-    let work = Work {
-        replays: configs.len(),
-        passes: waves.iter().map(Vec::len).sum(),
-        expansions: waves.len(),
+    let waves = |stream| {
+        let mut passes = passes(configs, stream);
+        let mut waves = Vec::new();
+        while !passes.is_empty() {
+            let rest = passes.split_off(passes.len().min(WAVE));
+            waves.push(std::mem::replace(&mut passes, rest));
+        }
+        waves
     };
-    let run = |wave: Vec<Pass>| {
-        let first = wave[0].points[0];
-        let done = Wave {
-            trace,
-            configs,
-            memory,
-            finished,
-        };
-        done.run(wave).map_err(|error| (first, error))
-    };
-    let outcomes: Vec<_> = waves.into_par_iter().map(run).collect();
-    outcomes.into_iter().collect::<Result<(), _>>()?;
-    Ok(work)
+    streams.into_iter().flat_map(waves).collect()
+}
+
+/// Tiles of the largest frame.
+fn tiles_of_a_frame(trace: &dyn TileSource) -> usize {
+    let mut tiles: HashMap<u32, usize> = HashMap::new();
+    for pass in &trace.tables().passes {
+        *tiles.entry(pass.frame).or_default() += pass.tile_count() as usize;
+    }
+    tiles.into_values().max().unwrap_or(0)
 }
 
 /// Who shares what: by stream, the passes that its configurations, by index, are answered in.
@@ -186,11 +255,11 @@ fn pass_key(config: &RunConfig) -> RunConfig {
 }
 
 /// Configurations, by index, that one machine answers together.
-struct Pass<'a> {
-    points: Vec<usize>,
+pub(super) struct Pass<'a> {
+    pub(super) points: Vec<usize>,
     configs: &'a [RunConfig],
     /// Built when it first runs.
-    machine: Option<Box<dyn Machine>>,
+    pub(super) machine: Option<Box<dyn Machine>>,
 }
 
 /// The passes of a stream's configurations.
@@ -217,7 +286,7 @@ fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
 
 impl Pass<'_> {
     /// What all its configurations agree on.
-    fn config(&self) -> &RunConfig {
+    pub(super) fn config(&self) -> &RunConfig {
         &self.configs[self.points[0]]
     }
 
@@ -228,13 +297,13 @@ impl Pass<'_> {
 
     /// The fewest sets of an L1, if all are LRU caches in which a footprint's lines cannot crowd each other
     /// out: its repeats find all of them then.
-    fn least_sets(&self) -> Option<u32> {
+    pub(super) fn least_sets(&self) -> Option<u32> {
         let l1 = self.geometries()?.into_iter().map(|(l1, _)| l1);
         let sets = l1.map(|(sets, ways)| (ways >= 4).then_some(sets));
         sets.min().flatten()
     }
 
-    fn build(&self, expander: &Expander<'_>) -> Result<Box<dyn Machine>, ReplayError> {
+    pub(super) fn build(&self, expander: &Expander<'_>) -> Result<Box<dyn Machine>, ReplayError> {
         let config = self.config();
         let bins = expander.bins();
         let counts = || CacheCounts::new(bins, config.tile_maps);
@@ -261,102 +330,5 @@ impl Pass<'_> {
             (Mode::Functional, Ok(levels)) => Box::new(Functional::new(levels, counts())),
             (Mode::Functional, Err(levels)) => Box::new(Functional::new(levels, counts())),
         })
-    }
-}
-
-/// What the passes of a wave need.
-struct Wave<'a> {
-    trace: &'a dyn TileSource,
-    configs: &'a [RunConfig],
-    memory: &'a LineMemory,
-    finished: &'a (dyn Fn(usize, RunResult) + Sync),
-}
-
-impl Wave<'_> {
-    /// Runs the passes, frame after frame.
-    fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
-        let trace_passes = &self.trace.tables().passes;
-        let shaded = shaded(self.trace, passes[0].config().hsr)?;
-        let expander = Expander::new(&shaded, passes[0].config())?;
-        let instant = |pass: &Pass<'_>| pass.config().tmu.l1_penalty_cycles == 0;
-        let expander = match passes[0].config().mode {
-            Mode::Functional => match passes.iter().map(Pass::least_sets).min() {
-                Some(Some(sets)) => expander.without_idle_accesses(sets),
-                _ => expander,
-            },
-            Mode::FirstMiss => expander,
-            // Where a miss fills at once, the timed machine looks footprints up one by one.
-            Mode::Timed if passes.iter().any(instant) => expander.with_distinct_lines(true),
-            Mode::Timed => expander.only_distinct_lines(),
-        };
-        let mut counts = TraceCounts::new(expander.bins());
-        let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
-        frames.sort_unstable();
-        frames.dedup();
-        let mut orders: Vec<(Order, u64)> = Vec::new();
-        for pass in &passes {
-            let order = (pass.config().order, pass.config().seed);
-            if !orders.contains(&order) {
-                orders.push(order);
-            }
-        }
-        for &number in &frames {
-            let frame = expander.frame(number, self.memory, &mut counts)?;
-            let plan = |&(order, seed): &(Order, u64)| -> Vec<Phase> {
-                order::plan_frame(&*order.build(seed), trace_passes, number)
-            };
-            let plans: Vec<Vec<Phase>> = orders.par_iter().map(plan).collect();
-            let last = frames.last() == Some(&number);
-            passes.par_iter_mut().with_max_len(1).try_for_each(|pass| {
-                let config = *pass.config();
-                let order = (config.order, config.seed);
-                let phases = orders.iter().position(|o| *o == order).map(|i| &plans[i]);
-                let mut machine = match pass.machine.take() {
-                    Some(mut machine) => {
-                        if config.between_frames == BetweenFrames::Flush {
-                            machine.flush();
-                        }
-                        machine
-                    }
-                    None => pass.build(&expander)?,
-                };
-                let mut cores = Cores::new(&frame, config.cores as usize);
-                machine.run(&mut cores, phases.map_or(&[], |p| &**p), config.assign)?;
-                if last {
-                    self.finish(pass, &*machine, &expander, &counts);
-                } else {
-                    pass.machine = Some(machine);
-                }
-                Ok::<(), ReplayError>(())
-            })?;
-        }
-        if frames.is_empty() {
-            for pass in &passes {
-                self.finish(pass, &*pass.build(&expander)?, &expander, &counts);
-            }
-        }
-        Ok(())
-    }
-
-    fn finish(
-        &self,
-        pass: &Pass<'_>,
-        machine: &dyn Machine,
-        expander: &Expander<'_>,
-        counts: &TraceCounts,
-    ) {
-        let tables = self.trace.tables();
-        for &index in &pass.points {
-            let config = &self.configs[index];
-            let outcome = machine.outcome(config);
-            let (tmu, cycles) = (outcome.tmu, outcome.cycles);
-            let result = RunResult {
-                tmu,
-                cycles,
-                first_lookups: machine.first_lookups(),
-                ..summary(tables, expander.bins(), counts, &outcome.counts, config)
-            };
-            (self.finished)(index, result);
-        }
     }
 }

@@ -4,13 +4,15 @@ mod batch;
 mod counts;
 mod first_miss;
 mod functional;
+mod in_turn;
 mod one_pass;
 mod summary;
 #[cfg(test)]
 mod tests;
 mod timed;
+mod wave;
 
-pub use batch::{Work, replay_all, sharing};
+pub use batch::{Job, Work, replay_all, replay_jobs, sharing};
 
 use crate::config::{Assign, ConfigError, RunConfig};
 use crate::order::Phase;

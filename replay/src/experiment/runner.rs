@@ -3,7 +3,7 @@
 use super::store::Absent;
 use super::{Outcome, Plan, Point, Store, Subject, point_key};
 use crate::config::RunConfig;
-use crate::engine::{ReplayError, Work, replay_all};
+use crate::engine::{Job, ReplayError, Work, replay_jobs};
 use crate::result::RunResult;
 use crate::stream::LineMemory;
 use rayon::prelude::*;
@@ -41,9 +41,8 @@ pub fn run<'a>(
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<Outcome<'a>, RunError> {
     let groups = groups(&plan.points);
-    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-    let one = |subject| replayed(plan, &groups, subject, store, &memory, done);
-    let answers: Vec<Result<_, RunError>> = subjects.par_iter().map(one).collect();
+    let part = |subject| Part::new(plan, subject, groups.clone(), store, done);
+    let answers = replayed(subjects.iter().map(part).collect());
     let mut results = Vec::with_capacity(subjects.len());
     let mut work = Work::default();
     for answer in answers {
@@ -67,15 +66,14 @@ pub fn run_part(
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<Work, RunError> {
     let all = groups(&plan.points);
-    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-    let one = |(subject, wanted): (_, &Vec<usize>)| {
-        let groups: Vec<Vec<usize>> = wanted.iter().map(|&group| all[group].clone()).collect();
-        replayed(plan, &groups, subject, Some(store), &memory, done).map(|(_, work)| work)
+    let part = |(subject, wanted): (_, &Vec<usize>)| {
+        let groups = wanted.iter().map(|&group| all[group].clone()).collect();
+        Part::new(plan, subject, groups, Some(store), done)
     };
-    let answers: Vec<Result<Work, RunError>> = subjects.par_iter().zip(wanted).map(one).collect();
+    let answers = replayed(subjects.iter().zip(wanted).map(part).collect());
     let mut work = Work::default();
     for answer in answers {
-        work.add(&answer?);
+        work.add(&answer?.1);
     }
     Ok(work)
 }
@@ -189,50 +187,99 @@ pub(super) fn groups(points: &[Point]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// A result for each group of points, from the store or from the engine.
-fn replayed(
-    plan: &Plan,
-    groups: &[Vec<usize>],
-    subject: &Subject,
-    store: Option<&Store>,
-    memory: &LineMemory,
-    done: &(dyn Fn(u64) + Sync),
-) -> Result<(Vec<RunResult>, Work), RunError> {
-    let config = |group: &Vec<usize>| plan.points[group[0]].config;
-    let load = |group| store.and_then(|store| store.find(&subject.id, &config(group)).ok());
-    let kept: Vec<Option<RunResult>> = groups.par_iter().map(load).collect();
-    let missing: Vec<usize> = (0..groups.len()).filter(|&g| kept[g].is_none()).collect();
-    let points = |groups: &mut dyn Iterator<Item = &Vec<usize>>| -> u64 {
-        groups.map(|group| group.len() as u64).sum()
-    };
-    let answered = groups.iter().zip(&kept).filter(|(_, kept)| kept.is_some());
-    done(points(&mut answered.map(|(group, _)| group)));
+/// Groups of points of a trace that are wanted: what the store has of them, and what the engine finds.
+struct Part<'p> {
+    plan: &'p Plan,
+    subject: &'p Subject<'p>,
+    groups: Vec<Vec<usize>>,
+    store: Option<&'p Store>,
+    done: &'p (dyn Fn(u64) + Sync),
+    /// Groups that the store lacks, and their configurations.
+    missing: Vec<usize>,
+    configs: Vec<RunConfig>,
+    /// By group.
+    results: Mutex<Vec<Option<RunResult>>>,
+    unkept: Mutex<Option<anyhow::Error>>,
+}
 
-    let configs: Vec<RunConfig> = missing.iter().map(|&g| config(&groups[g])).collect();
-    let results = Mutex::new(kept);
-    let unkept = Mutex::new(None);
-    let finished = |index: usize, mut result: RunResult| {
-        let group = missing[index];
-        if let Some(store) = store {
-            match store.save(&subject.id, &configs[index], &result) {
+impl<'p> Part<'p> {
+    /// Takes what the store has.
+    fn new(
+        plan: &'p Plan,
+        subject: &'p Subject<'p>,
+        groups: Vec<Vec<usize>>,
+        store: Option<&'p Store>,
+        done: &'p (dyn Fn(u64) + Sync),
+    ) -> Self {
+        let config = |group: &Vec<usize>| plan.points[group[0]].config;
+        let load = |group| store.and_then(|store| store.find(&subject.id, &config(group)).ok());
+        let kept: Vec<Option<RunResult>> = groups.par_iter().map(load).collect();
+        let answered = groups.iter().zip(&kept).filter(|(_, kept)| kept.is_some());
+        done(answered.map(|(group, _)| group.len() as u64).sum());
+        let missing: Vec<usize> = (0..groups.len()).filter(|&g| kept[g].is_none()).collect();
+        Self {
+            configs: missing.iter().map(|&g| config(&groups[g])).collect(),
+            missing,
+            plan,
+            subject,
+            groups,
+            store,
+            done,
+            results: Mutex::new(kept),
+            unkept: Mutex::new(None),
+        }
+    }
+
+    /// Keeps what the engine found.
+    fn finished(&self, index: usize, mut result: RunResult) {
+        let group = self.missing[index];
+        if let Some(store) = self.store {
+            match store.save(&self.subject.id, &self.configs[index], &result) {
                 Ok(saved) => result = saved,
-                Err(error) => *locked(&unkept) = Some(error),
+                Err(error) => *locked(&self.unkept) = Some(error),
             }
         }
-        locked(&results)[group] = Some(result);
-        done(groups[group].len() as u64);
-    };
-    let replayed = replay_all(subject.source, &configs, memory, &finished);
-    let work = replayed.map_err(|(index, error)| RunError::Replay {
-        label: subject.label.clone(),
-        point: plan.points[groups[missing[index]][0]].title(),
-        source: Box::new(error),
-    })?;
-    if let Some(error) = locked(&unkept).take() {
-        return Err(RunError::Store(error));
+        locked(&self.results)[group] = Some(result);
+        (self.done)(self.groups[group].len() as u64);
     }
-    let results = std::mem::take(&mut *locked(&results));
-    Ok((results.into_iter().flatten().collect(), work))
+
+    /// A result for each group.
+    fn end(
+        self,
+        replayed: Result<Work, (usize, ReplayError)>,
+    ) -> Result<(Vec<RunResult>, Work), RunError> {
+        let work = replayed.map_err(|(index, error)| RunError::Replay {
+            label: self.subject.label.clone(),
+            point: self.plan.points[self.groups[self.missing[index]][0]].title(),
+            source: Box::new(error),
+        })?;
+        if let Some(error) = locked(&self.unkept).take() {
+            return Err(RunError::Store(error));
+        }
+        let results = std::mem::take(&mut *locked(&self.results));
+        Ok((results.into_iter().flatten().collect(), work))
+    }
+}
+
+/// What the engine finds of each part, beside what the store has.
+fn replayed(parts: Vec<Part<'_>>) -> Vec<Result<(Vec<RunResult>, Work), RunError>> {
+    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+    let tell = |part| move |index, result| Part::finished(part, index, result);
+    let finished: Vec<_> = parts.iter().map(tell).collect();
+    let mut jobs: Vec<Job<'_>> = Vec::with_capacity(parts.len());
+    for (part, finished) in parts.iter().zip(&finished) {
+        jobs.push(Job {
+            trace: part.subject.source,
+            configs: &part.configs,
+            finished,
+        });
+    }
+    let answers = replay_jobs(&jobs, &memory);
+    parts
+        .into_iter()
+        .zip(answers)
+        .map(|(part, answer)| part.end(answer))
+        .collect()
 }
 
 /// A thread that panicked while it held the lock ends the whole run; until then nothing is lost.

@@ -19,6 +19,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Memory for the lines of all frames that are replayed at the same time.
 #[derive(Debug)]
 pub struct LineMemory {
+    bytes: u64,
     left_bytes: AtomicU64,
 }
 
@@ -31,8 +32,15 @@ impl LineMemory {
     #[must_use]
     pub fn new(bytes: u64) -> Self {
         Self {
+            bytes,
             left_bytes: AtomicU64::new(bytes),
         }
+    }
+
+    /// Whether half of it is left: room for more frames at the same time.
+    #[must_use]
+    pub fn half_is_left(&self) -> bool {
+        self.left_bytes.load(Ordering::Relaxed) >= self.bytes / 2
     }
 
     fn take(&self, bytes: u64) -> bool {
@@ -71,6 +79,9 @@ pub(super) struct Work {
 }
 
 impl<'a> Expander<'a> {
+    /// Tiles that a thread expands at a time.
+    pub const CHUNK: usize = 64;
+
     /// An expander for a trace. Of the configuration it needs sampling, layout and line size.
     ///
     /// # Errors
@@ -137,8 +148,6 @@ impl<'a> Expander<'a> {
         memory: &'e LineMemory,
         counts: &mut TraceCounts,
     ) -> Result<Frame<'e>, StreamError> {
-        /// Tiles that a thread expands at a time.
-        const CHUNK: usize = 64;
         let passes = &self.source.tables().passes;
         let of_frame = (0..).zip(passes).filter(|(_, pass)| pass.frame == number);
         let tiles: Vec<TileRef> = of_frame
@@ -154,7 +163,8 @@ impl<'a> Expander<'a> {
             }
             Ok((work.counts, expanded))
         };
-        let chunks: Result<Vec<_>, StreamError> = tiles.par_chunks(CHUNK).map(chunk).collect();
+        let chunks: Result<Vec<_>, StreamError> =
+            tiles.par_chunks(Self::CHUNK).map(chunk).collect();
         let mut frame = Frame {
             expander: self,
             memory,

@@ -1,0 +1,150 @@
+//! The passes of one stream, frame after frame.
+
+use super::batch::{Job, Pass};
+use super::summary::summary;
+use super::{Machine, ReplayError};
+use crate::config::{BetweenFrames, Mode, Order, RunConfig};
+use crate::order::{self, Phase};
+use crate::result::RunResult;
+use crate::stream::{Cores, Expander, LineMemory, TraceCounts, shaded};
+use rayon::prelude::*;
+
+/// What passes that read the same lines need.
+pub(super) struct Wave<'a> {
+    pub(super) job: Job<'a>,
+    pub(super) memory: &'a LineMemory,
+    /// Is told when a frame's lines are in memory.
+    pub(super) expanded: &'a (dyn Fn() + Sync),
+}
+
+impl Wave<'_> {
+    /// Runs the passes, of which there is one at least. While a frame is replayed, the next one is expanded, if
+    /// there is memory for it.
+    pub(super) fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
+        let trace_passes = &self.job.trace.tables().passes;
+        let shaded = shaded(self.job.trace, passes[0].config().hsr)?;
+        let expander = expander_for(Expander::new(&shaded, passes[0].config())?, &passes);
+        let mut counts = TraceCounts::new(expander.bins());
+        let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        let orders = Orders::of(&passes);
+        let mut ahead = None;
+        for (index, &number) in frames.iter().enumerate() {
+            let frame = match ahead.take() {
+                Some(frame) => frame,
+                None => expander.frame(number, self.memory, &mut counts)?,
+            };
+            (self.expanded)();
+            let plans = orders.plans(trace_passes, number);
+            let replay = |pass: &mut Pass<'_>| -> Result<Box<dyn Machine>, ReplayError> {
+                let config = *pass.config();
+                let mut machine = match pass.machine.take() {
+                    Some(mut machine) => {
+                        if config.between_frames == BetweenFrames::Flush {
+                            machine.flush();
+                        }
+                        machine
+                    }
+                    None => pass.build(&expander)?,
+                };
+                let mut cores = Cores::new(&frame, config.cores as usize);
+                machine.run(&mut cores, orders.plan(&plans, &config), config.assign)?;
+                Ok(machine)
+            };
+            let all = passes.par_iter_mut().with_max_len(1);
+            let Some(&next) = frames.get(index + 1) else {
+                return all.try_for_each(|pass| {
+                    let machine = replay(pass)?;
+                    self.finish(pass, &*machine, &expander, &counts);
+                    Ok(())
+                });
+            };
+            let keep = || {
+                all.try_for_each(|pass| {
+                    pass.machine = Some(replay(pass)?);
+                    Ok::<(), ReplayError>(())
+                })
+            };
+            let expand = || {
+                let room = self.memory.half_is_left();
+                room.then(|| expander.frame(next, self.memory, &mut counts))
+            };
+            let (kept, expanded) = rayon::join(keep, expand);
+            kept?;
+            ahead = expanded.transpose()?;
+        }
+        // No frames at all.
+        for pass in &passes {
+            self.finish(pass, &*pass.build(&expander)?, &expander, &counts);
+        }
+        Ok(())
+    }
+
+    fn finish(
+        &self,
+        pass: &Pass<'_>,
+        machine: &dyn Machine,
+        expander: &Expander<'_>,
+        counts: &TraceCounts,
+    ) {
+        let tables = self.job.trace.tables();
+        for &index in &pass.points {
+            let config = &self.job.configs[index];
+            let outcome = machine.outcome(config);
+            let (tmu, cycles) = (outcome.tmu, outcome.cycles);
+            let result = RunResult {
+                tmu,
+                cycles,
+                first_lookups: machine.first_lookups(),
+                ..summary(tables, expander.bins(), counts, &outcome.counts, config)
+            };
+            (self.job.finished)(index, result);
+        }
+    }
+}
+
+/// Lists what the passes read.
+fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a> {
+    let instant = |pass: &Pass<'_>| pass.config().tmu.l1_penalty_cycles == 0;
+    match passes[0].config().mode {
+        Mode::Functional => match passes.iter().map(Pass::least_sets).min() {
+            Some(Some(sets)) => expander.without_idle_accesses(sets),
+            _ => expander,
+        },
+        Mode::FirstMiss => expander,
+        // Where a miss fills at once, the timed machine looks footprints up one by one.
+        Mode::Timed if passes.iter().any(instant) => expander.with_distinct_lines(true),
+        Mode::Timed => expander.only_distinct_lines(),
+    }
+}
+
+/// The orders of some passes, each once.
+struct Orders(Vec<(Order, u64)>);
+
+impl Orders {
+    fn of(passes: &[Pass<'_>]) -> Self {
+        let mut orders = Vec::new();
+        for pass in passes {
+            let order = (pass.config().order, pass.config().seed);
+            if !orders.contains(&order) {
+                orders.push(order);
+            }
+        }
+        Self(orders)
+    }
+
+    /// What each does with a frame.
+    fn plans(&self, trace_passes: &[formats::textrace::Pass], frame: u32) -> Vec<Vec<Phase>> {
+        let plan = |&(order, seed): &(Order, u64)| {
+            order::plan_frame(&*order.build(seed), trace_passes, frame)
+        };
+        self.0.par_iter().map(plan).collect()
+    }
+
+    fn plan<'p>(&self, plans: &'p [Vec<Phase>], config: &RunConfig) -> &'p [Phase] {
+        let order = (config.order, config.seed);
+        let index = self.0.iter().position(|other| *other == order);
+        index.map_or(&[], |index| &plans[index])
+    }
+}
