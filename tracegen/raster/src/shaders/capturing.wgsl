@@ -41,7 +41,7 @@ fn fragment_record(in: Fragment, place: Place) -> @location(0) vec4<f32> {
 @fragment @early_depth_test(force)
 fn fragment_masked_record(in: Fragment, place: Place) -> @location(0) vec4<f32> {
     var lane = lane_of(in, place);
-    lane.passing |= quad_mask(lane, base_color(in).a >= material.specular.w);
+    lane.passing |= quad_mask(lane, base_alpha(in) >= material.specular.w);
     let index = record_lit(lane, in, place.front);
     record_depth(lane, index, in.position.z);
     return vec4(0.0);
@@ -67,5 +67,5 @@ fn fragment_mark(in: Fragment) {
 
 @fragment @early_depth_test(force)
 fn fragment_mark_masked(in: Fragment) {
-    if base_color(in).a >= material.specular.w { mark(in); }
+    if base_alpha(in) >= material.specular.w { mark(in); }
 }

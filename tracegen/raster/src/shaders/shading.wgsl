@@ -18,6 +18,14 @@ fn base_color(in: Fragment) -> vec4<f32> {
     return color;
 }
 
+// Alpha of base_color() alone, bit for bit.
+fn base_alpha(in: Fragment) -> f32 {
+    var alpha = material.base_color.a;
+    if (TEXTURES & (1u << BASE_COLOR)) != 0u { alpha *= texel_alpha(texture_uv(BASE_COLOR, in.uv)); }
+    if COLORED { alpha *= in.color.a; }
+    return alpha;
+}
+
 fn surface_normal(in: Fragment, front: bool) -> vec3<f32> {
     let n = safe_normalize(in.normal);
     var normal = n;
