@@ -8,7 +8,7 @@ fn capture_and_shade(in: Fragment, place: Place) -> vec4<f32> {
     if CAPTURE {
         let lane = lane_of(in, place);
         _ = record_material(lane, in);
-        if CASCADES > 0u { record_shadow(lane, found, in.world, geometric); }
+        if CASCADES > 0u { record_shadow(lane, found); }
     }
     return shade(in, front, base_color(in), found);
 }
@@ -18,7 +18,7 @@ fn record_lit(lane: Lane, in: Fragment, front: bool) -> u32 {
     let index = record_material(lane, in);
     if CASCADES > 0u {
         let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
-        record_shadow(lane, find_cascade(in.world, geometric), in.world, geometric);
+        record_shadow(lane, find_cascade(in.world, geometric));
     }
     return index;
 }
