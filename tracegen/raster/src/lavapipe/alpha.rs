@@ -134,3 +134,168 @@ fn copy(
     }
     to.create_view(&Default::default())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::device;
+    use super::super::readback::Readback;
+    use super::*;
+    use wgpu::TextureFormat::{Bc1RgbaUnormSrgb, Bc3RgbaUnormSrgb, Rgba8UnormSrgb};
+    use wgpu::util::DeviceExt;
+
+    const SIDE_PX: u32 = 256;
+    const PAIR: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
+    /// Alpha of the texture and of its copy, at places from far above one texel a pixel to far below.
+    const BOTH: &str = "
+@group(0) @binding(0) var color: texture_2d<f32>;
+@group(0) @binding(1) var alpha: texture_2d<f32>;
+@group(0) @binding(2) var linear: sampler;
+
+@vertex
+fn vertex_whole(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
+    let ndc = vec2(f32((index << 1u) & 2u), f32(index & 2u)) * 2.0 - 1.0;
+    return vec4(ndc, 0.0, 1.0);
+}
+
+@fragment
+fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f32> {
+    let at = position.xy / 256.0;
+    let uv = vec2(at.x * exp2(6.0 * at.y), at.y * at.y * 7.3) - 1.7;
+    return vec2(textureSample(color, linear, uv).a, textureSample(alpha, linear, uv).r);
+}";
+
+    /// A texture of `side` texels with all its levels, of whatever bytes.
+    fn texture(gpu: &Gpu, format: wgpu::TextureFormat, side: u32) -> wgpu::TextureView {
+        let block_bytes = format.block_copy_size(None).unwrap();
+        let edge = format.block_dimensions().0;
+        let levels = side.ilog2() + 1;
+        let bytes = (0..levels).map(|level| (side >> level).div_ceil(edge).pow(2) * block_bytes);
+        let mut state = 1_u32;
+        let noise: Vec<u8> = (0..bytes.sum::<u32>())
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                state.to_le_bytes()[3]
+            })
+            .collect();
+        let descriptor = wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d {
+                width: side,
+                height: side,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: levels,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        };
+        let order = wgpu::util::TextureDataOrder::LayerMajor;
+        gpu.device
+            .create_texture_with_data(&gpu.queue, &descriptor, order, &noise)
+            .create_view(&Default::default())
+    }
+
+    /// What a shader gets of a texture's alpha and of the copy's, pixel by pixel.
+    fn sampled(
+        gpu: &Gpu,
+        texture: wgpu::TextureView,
+        sampler: &wgpu::SamplerDescriptor<'_>,
+    ) -> Vec<[f32; 2]> {
+        let textures = [texture];
+        let copies = copies(gpu, &BTreeSet::from([0]), &textures).unwrap();
+        let module = gpu
+            .device
+            .create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: None,
+                source: wgpu::ShaderSource::Wgsl(BOTH.into()),
+            });
+        let view = bindings::texture(wgpu::TextureSampleType::Float { filterable: true });
+        let filters = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+        let layout = bindings::fragment_layout(gpu, "both", [(0, view), (1, view), (2, filters)]);
+        let whole = Whole {
+            module: &module,
+            layout: &bindings::pipeline_layout(gpu, &[&layout]),
+            vertex: "vertex_whole",
+            multiview_mask: None,
+        };
+        let resources = [
+            wgpu::BindingResource::TextureView(&textures[0]),
+            wgpu::BindingResource::TextureView(&copies[&0]),
+            wgpu::BindingResource::Sampler(&gpu.device.create_sampler(sampler)),
+        ];
+        let bindings = bindings::group(gpu, "both", &layout, (0..).zip(resources));
+        let usage = wgpu::TextureUsages::COPY_SRC;
+        let target = attachment(gpu, [SIDE_PX; 2], 1, 1, PAIR, usage);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target.create_view(&Default::default()),
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations::default(),
+            })],
+            ..Default::default()
+        });
+        pass.set_pipeline(&whole.over_picture(gpu, "fragment_both", PAIR));
+        pass.set_bind_group(0, &bindings, &[]);
+        pass.draw(0..3, 0..1);
+        drop(pass);
+        gpu.queue.submit([encoder.finish()]);
+        Readback::default().texels(gpu, &target).unwrap()
+    }
+
+    #[test]
+    fn a_copy_is_sampled_as_the_alpha_that_it_was_made_of_bit_for_bit() {
+        let gpu = device::open(None).unwrap_or_else(|e| panic!("{e}"));
+        assert!((gpu.device.features()).contains(wgpu::Features::FLOAT32_FILTERABLE));
+        use wgpu::{AddressMode, FilterMode, MipmapFilterMode};
+        let samplers = [
+            (
+                AddressMode::Repeat,
+                FilterMode::Linear,
+                MipmapFilterMode::Linear,
+            ),
+            (
+                AddressMode::MirrorRepeat,
+                FilterMode::Linear,
+                MipmapFilterMode::Nearest,
+            ),
+            (
+                AddressMode::ClampToEdge,
+                FilterMode::Nearest,
+                MipmapFilterMode::Linear,
+            ),
+        ];
+        for format in [Bc1RgbaUnormSrgb, Bc3RgbaUnormSrgb, Rgba8UnormSrgb] {
+            for (wrap, filter, mip) in samplers {
+                let sampler = wgpu::SamplerDescriptor {
+                    address_mode_u: wrap,
+                    address_mode_v: wrap,
+                    mag_filter: filter,
+                    min_filter: filter,
+                    mipmap_filter: mip,
+                    ..Default::default()
+                };
+                let pairs = sampled(&gpu, texture(&gpu, format, 64), &sampler);
+                let mut values: Vec<u32> = pairs.iter().map(|[alpha, _]| alpha.to_bits()).collect();
+                for [alpha, copy] in &pairs {
+                    assert_eq!(alpha.to_bits(), copy.to_bits(), "{format:?} {sampler:?}");
+                }
+                values.sort_unstable();
+                values.dedup();
+                let fewest = if filter == FilterMode::Linear {
+                    1000
+                } else {
+                    2
+                };
+                assert!(
+                    values.len() >= fewest,
+                    "{format:?}: {} values",
+                    values.len()
+                );
+            }
+        }
+    }
+}
