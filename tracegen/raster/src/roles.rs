@@ -17,11 +17,9 @@ pub(crate) enum Role {
     Masked,
     /// Records of an alpha-masked draw; writes neither colour nor depth.
     MaskedRecord,
-    /// Late depth of an alpha-masked draw; writes no colour.
-    MaskedDepth,
-    /// Records and early depth of an opaque draw; writes no colour.
+    /// Records and early depth of an opaque draw.
     OpaqueRecord,
-    /// Records of what lies before the depth there; writes neither colour nor depth.
+    /// Records of what lies before the depth there; writes no depth.
     Record,
     /// Depth of a shadow caster.
     Shadow,
@@ -54,7 +52,7 @@ impl Role {
             Self::MaskedRecord => Some("fragment_masked_record"),
             Self::Record | Self::OpaqueRecord => Some("fragment_record"),
             Self::Shadow | Self::Depth => None,
-            Self::ShadowMasked | Self::DepthMasked | Self::MaskedDepth => Some("fragment_shadow"),
+            Self::ShadowMasked | Self::DepthMasked => Some("fragment_shadow"),
             Self::Mark => Some("fragment_mark"),
             Self::MarkMasked => Some("fragment_mark_masked"),
             Self::Count | Self::CountBlended => Some("fragment_count"),
@@ -68,18 +66,15 @@ impl Role {
         matches!(self, Self::Shadow | Self::ShadowMasked)
     }
 
-    /// There is no colour attachment.
-    pub fn colorless(self) -> bool {
+    /// There is never a colour attachment.
+    fn colorless(self) -> bool {
         let alone = [Self::Depth, Self::DepthMasked, Self::Mark, Self::MarkMasked];
         self.casts() || alone.contains(&self)
     }
 
-    /// It leaves the colour as it is.
+    /// It leaves the colour as it is, where there is any.
     pub fn keeps_color(self) -> bool {
-        matches!(
-            self,
-            Self::Record | Self::MaskedRecord | Self::MaskedDepth | Self::OpaqueRecord
-        )
+        self == Self::MaskedRecord
     }
 
     /// It writes texels and primitives in place of the picture.
@@ -138,7 +133,7 @@ pub(crate) enum Purpose {
 }
 
 impl Purpose {
-    /// What a region is rendered for, one after the other.
+    /// What a region is rendered for, one pass after the other.
     pub fn of(recording: Option<&Recording<'_, '_>>) -> &'static [Self] {
         match recording.map(|recording| (recording.fragments, recording.picture)) {
             None => &[Self::Plain],
@@ -148,6 +143,12 @@ impl Purpose {
             Some((Fragments::All, true)) => &[Self::Record, Self::Plain],
             Some((Fragments::All, false)) => &[Self::Record],
         }
+    }
+
+    /// There is a picture to draw. A pass without one has no colour attachment: llvmpipe would load,
+    /// convert and store the colour of every pixel even of draws that leave it alone.
+    pub fn has_picture(self) -> bool {
+        matches!(self, Self::Plain | Self::Capture)
     }
 }
 
@@ -159,7 +160,7 @@ pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
         (DrawMode::Masked, Purpose::Plain) => &[Role::Masked],
         (DrawMode::Masked, Purpose::Capture) => &[Role::MaskedRecord, Role::Masked],
         (DrawMode::Opaque, Purpose::Trace) => &[Role::OpaqueRecord],
-        (DrawMode::Masked, Purpose::Trace) => &[Role::MaskedRecord, Role::MaskedDepth],
+        (DrawMode::Masked, Purpose::Trace) => &[Role::MaskedRecord, Role::DepthMasked],
         (DrawMode::Blended, Purpose::Trace) | (_, Purpose::Record) => &[Role::Record],
         (DrawMode::Opaque, Purpose::Shadow) => &[Role::Shadow],
         (DrawMode::Masked, Purpose::Shadow) => &[Role::ShadowMasked],
@@ -203,6 +204,8 @@ pub(crate) struct PipelineKey {
     pub role: Role,
     /// Records are written.
     pub capture: bool,
+    /// There is no colour attachment.
+    pub colorless: bool,
     /// Bit per texture.
     pub textures: u32,
     /// Bit per texture that leads its uv group.
@@ -242,11 +245,12 @@ impl PipelineKey {
     ) -> Self {
         // The second role of a masked draw records nothing.
         let records = matches!(purpose, Purpose::Capture | Purpose::Trace | Purpose::Record);
-        let capture = records && !matches!(role, Role::Masked | Role::MaskedDepth);
+        let capture = records && !matches!(role, Role::Masked | Role::DepthMasked);
         let lit = capture || role == Role::Masked || purpose == Purpose::Plain;
         Self {
             role,
             capture,
+            colorless: role.colorless() || matches!(purpose, Purpose::Trace | Purpose::Record),
             textures: if role.is_plain() {
                 0
             } else {

@@ -23,6 +23,26 @@ pub(crate) const MATERIAL_BINDING: u32 = 0;
 pub(crate) const TEXTURES_BINDING: u32 = 1;
 /// First of the sampler bindings in group 1, in the order of the textures.
 pub(crate) const SAMPLERS_BINDING: u32 = TEXTURES_BINDING + MATERIAL_TEXTURES as u32;
+/// Binding of the copy that alpha tests sample in group 1, where there are copies.
+pub(crate) const ALPHA_BINDING: u32 = SAMPLERS_BINDING + MATERIAL_TEXTURES as u32;
+
+/// What alpha tests sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum AlphaSource {
+    /// The base colour.
+    Color,
+    /// A copy of its alpha.
+    Copy,
+}
+
+impl AlphaSource {
+    fn part(self) -> &'static str {
+        match self {
+            Self::Color => include_str!("shaders/alpha_of_color.wgsl"),
+            Self::Copy => include_str!("shaders/alpha_of_copy.wgsl"),
+        }
+    }
+}
 
 /// How fragments are recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +86,7 @@ impl Granularity {
 }
 
 /// The whole WGSL module, with what records.
-pub(crate) fn source(granularity: Granularity) -> String {
+pub(crate) fn source(granularity: Granularity, alpha: AlphaSource) -> String {
     let mut text = String::new();
     if granularity.by_index() {
         text += "enable primitive_index;\n\n";
@@ -83,6 +103,7 @@ pub(crate) fn source(granularity: Granularity) -> String {
     constant("MATERIAL_BINDING", MATERIAL_BINDING.into());
     constant("TEXTURES_BINDING", TEXTURES_BINDING.into());
     constant("SAMPLERS_BINDING", SAMPLERS_BINDING.into());
+    constant("ALPHA_BINDING", ALPHA_BINDING.into());
     constant("MATERIAL_TEXTURES", MATERIAL_TEXTURES as u64);
     constant("MAX_CASCADES", MAX_CASCADES as u64);
     constant("MAX_POINT_LIGHTS", MAX_POINT_LIGHTS as u64);
@@ -92,7 +113,7 @@ pub(crate) fn source(granularity: Granularity) -> String {
     for (number, [x, y]) in SHADOW_TAPS.iter().enumerate() {
         text += &format!("const SHADOW_TAP_{number}: vec2<i32> = vec2<i32>({x}, {y});\n");
     }
-    let before = [include_str!("shaders/interface.wgsl")];
+    let before = [include_str!("shaders/interface.wgsl"), alpha.part()];
     let after = [
         include_str!("shaders/shading.wgsl"),
         include_str!("shaders/passes.wgsl"),
@@ -107,7 +128,7 @@ pub(crate) fn source(granularity: Granularity) -> String {
 /// The module for pictures of two views at once: the view is one of two, by the number that each entry
 /// point is told.
 pub(crate) fn of_two_views() -> String {
-    let one = source(Granularity::None);
+    let one = source(Granularity::None, AlphaSource::Color);
     let declaration = "var<uniform> view: View;";
     let two = "var<uniform> views: array<View, 2>;\nvar<private> view_number: u32;";
     assert!(one.contains(declaration), "the shader declares its view");
@@ -144,7 +165,10 @@ mod tests {
 
     #[test]
     fn every_entry_point_for_two_views_is_told_its_view() {
-        let (one, two) = (source(Granularity::None), of_two_views());
+        let (one, two) = (
+            source(Granularity::None, AlphaSource::Color),
+            of_two_views(),
+        );
         let entries = one.matches("@vertex").count() + one.matches("@fragment").count();
         assert!(entries >= 6, "{entries}");
         assert_eq!(two.matches("@builtin(view_index)").count(), entries);

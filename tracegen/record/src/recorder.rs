@@ -85,19 +85,20 @@ impl<'a> Recorder<'a> {
         records: RawRecords<'_>,
     ) -> Result<(Vec<EncodedTile>, CaptureCounts), RecordError> {
         let bins = Bins::new(records.quads, rect);
-        let encoded: Vec<(EncodedTile, CaptureCounts)> = (0..rect.count())
+        let mut encoded: Vec<(usize, EncodedTile, CaptureCounts)> = (rect.by_blocks())
             .into_par_iter()
-            .map_init(Scratch::default, |scratch, tile| {
-                let mut counts = self.rules.build(records, &bins, tile, scratch)?;
-                let encoded = encode_tile_as(encoding, self.tables, &scratch.tile)?;
-                counts.tile_bytes = encoded.size_bytes() as u64;
-                Ok((encoded, counts))
+            .map_init(Scratch::default, |scratch, number| {
+                let mut counts = self.rules.build(records, &bins, number, scratch)?;
+                let tile = encode_tile_as(encoding, self.tables, &scratch.tile)?;
+                counts.tile_bytes = tile.size_bytes() as u64;
+                Ok((number, tile, counts))
             })
             .collect::<Result<_, RecordError>>()?;
+        encoded.sort_unstable_by_key(|(number, ..)| *number);
         let mut counts = CaptureCounts::default();
         let tiles = encoded
             .into_iter()
-            .map(|(tile, of_tile)| {
+            .map(|(_, tile, of_tile)| {
                 counts += of_tile;
                 tile
             })

@@ -10,6 +10,10 @@ use super::error::RecordError;
 use super::raw::{RawRecord, RawRecords};
 use formats::view::TILE_SIZE_PX;
 
+/// Tiles along an edge of the squares that llvmpipe draws one after the other, and so hands over the
+/// records of: a square's records stay in the processor's cache while its tiles are built.
+const BLOCK_TILES: u32 = 64 / TILE_SIZE_PX;
+
 /// A rectangle of tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TileRect {
@@ -32,6 +36,16 @@ impl TileRect {
             self.origin[0] + index % self.size[0],
             self.origin[1] + index / self.size[0],
         ]
+    }
+
+    /// All tiles, those of a [`BLOCK_TILES`] square one after the other.
+    pub fn by_blocks(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.count()).collect();
+        order.sort_by_key(|&index| {
+            let [column, row] = self.tile(index).map(|at| at / BLOCK_TILES);
+            [row, column]
+        });
+        order
     }
 
     /// Position of the tile that holds a record's quad, or `None` where it is outside.
@@ -138,6 +152,20 @@ mod tests {
             let all: Vec<[u32; 2]> = (0..rect.count()).map(|i| rect.tile(i)).collect();
             assert_eq!(tiles, all);
         }
+    }
+
+    #[test]
+    fn blocks_hold_every_tile_once_and_squares_together() {
+        let rect = TileRect {
+            origin: [3, 4],
+            size: [6, 5],
+        };
+        let order = rect.by_blocks();
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..rect.count()).collect::<Vec<_>>());
+        let blocks: Vec<[u32; 2]> = order.iter().map(|&i| rect.tile(i).map(|t| t / 4)).collect();
+        assert_eq!(blocks.chunk_by(|a, b| a == b).count(), 3 * 2);
     }
 
     #[test]

@@ -2,8 +2,9 @@
 
 use super::bindings;
 use super::device::Gpu;
+use super::pipelines::COLOR_FORMAT;
 use super::targets::{ColorTarget, LayerTarget};
-use super::whole::Whole;
+use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use formats::view::TILE_SIZE_PX;
 use techniques::Mask;
@@ -15,7 +16,7 @@ pub struct Composer {
     mask_layout: wgpu::BindGroupLayout,
     part_layout: wgpu::BindGroupLayout,
     /// Writes the nearest depth wherever a layer's mask is not set.
-    pub mask: wgpu::RenderPipeline,
+    pub mask: OverLayer,
     filters: [(Filter, wgpu::RenderPipeline); 3],
     /// Stands for the mask of a layer and the tiles of a part that have none.
     absent: wgpu::TextureView,
@@ -54,20 +55,17 @@ impl Composer {
             };
             let mask_layout = layout(&[flags]);
             let part_layout = layout(&[bindings::uniform(), color, flags]);
-            let whole = |groups: &[&wgpu::BindGroupLayout], writes_depth, fragment| {
-                let layout = bindings::pipeline_layout(gpu, groups);
-                let whole = Whole {
-                    module: &module,
-                    layout: &layout,
-                    vertex: "vertex_whole",
-                    writes_depth,
-                    multiview_mask: None,
-                };
-                whole.pipeline(gpu, fragment)
+            let layer = bindings::pipeline_layout(gpu, &[&mask_layout]);
+            let part = bindings::pipeline_layout(gpu, &[&mask_layout, &part_layout]);
+            let whole = |layout| Whole {
+                module: &module,
+                layout,
+                vertex: "vertex_whole",
+                multiview_mask: None,
             };
-            let compose = |fragment| whole(&[&mask_layout, &part_layout], false, fragment);
+            let compose = |fragment| whole(&part).over_picture(gpu, fragment, COLOR_FORMAT);
             Self {
-                mask: whole(&[&mask_layout], true, "fragment_mask"),
+                mask: whole(&layer).over_layer(gpu, "fragment_mask"),
                 filters: [
                     (Filter::Copy, compose("fragment_copy")),
                     (Filter::Bilinear, compose("fragment_bilinear")),

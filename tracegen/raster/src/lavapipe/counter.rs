@@ -29,7 +29,8 @@ impl Lavapipe {
         );
         let every: Vec<u32> = (0..draws.calls.len() as u32).collect();
         let plan = self.plan(draws, &every, Purpose::Count)?;
-        let texture = |format, usage| attachment(&self.gpu, view.layer.size_px, 1, format, usage);
+        let texture =
+            |format, usage| attachment(&self.gpu, view.layer.size_px, 1, 1, format, usage);
         let counts = texture(wgpu::TextureFormat::R16Float, wgpu::TextureUsages::COPY_SRC);
         let depth = texture(DEPTH_FORMAT, wgpu::TextureUsages::empty());
         let data = ViewData::of_eye(view, self.buffers.capacity);

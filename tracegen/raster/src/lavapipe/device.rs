@@ -82,7 +82,8 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
             what: what.clone(),
         });
     }
-    let wanted_too = wgpu::Features::MULTIVIEW | wgpu::Features::SUBGROUP;
+    let wanted_too =
+        wgpu::Features::MULTIVIEW | wgpu::Features::SUBGROUP | wgpu::Features::FLOAT32_FILTERABLE;
     let extra = adapter.features() & wanted_too;
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         label: None,

@@ -1,5 +1,6 @@
 //! Capture through lavapipe, Mesa's Vulkan driver on llvmpipe.
 
+mod alpha;
 mod bindings;
 mod compose;
 mod counter;
@@ -21,7 +22,7 @@ use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
 use super::frame::Frame;
 use super::roles::{MaterialState, PipelineKey, Purpose, roles};
-use super::shader::{Granularity, VIEW_BINDINGS};
+use super::shader::{AlphaSource, Granularity, VIEW_BINDINGS};
 use super::uniforms::ViewData;
 use compose::Composer;
 use device::Gpu;
@@ -111,8 +112,14 @@ impl Lavapipe {
         view_size_px: [u32; 2],
         record_budget_bytes: u64,
     ) -> Result<Self, RasterError> {
-        let pipelines = Pipelines::new(&gpu)?;
-        let buffers = SceneBuffers::new(&gpu, &pipelines.layouts, scene, draws, textures)?;
+        let copies = alpha::planned(&gpu, scene, draws, textures);
+        let source = if copies.is_empty() {
+            AlphaSource::Color
+        } else {
+            AlphaSource::Copy
+        };
+        let pipelines = Pipelines::new(&gpu, source)?;
+        let buffers = SceneBuffers::new(&gpu, &pipelines.layouts, scene, draws, textures, &copies)?;
         let masked = draws.calls.iter().any(|c| c.mode == DrawMode::Masked);
         targets::check_size(&gpu, view_size_px)?;
         let record_buffers = RecordBuffers::new(&gpu, record_budget_bytes, masked)?;
@@ -249,6 +256,44 @@ impl Lavapipe {
                 Some(starts.composed(gpu, composition, nearer, farther))
             }
         })
+    }
+
+    /// Starts a pass over a region of a layer: what the layer holds before its draws, and its mask.
+    fn layer_pass<'e>(
+        &self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        target: &LayerTarget,
+        region: Region,
+        start: Option<&Drawn<'_>>,
+        picture: bool,
+    ) -> wgpu::RenderPass<'e> {
+        let mut pass = target.pass(encoder, picture);
+        pass.set_scissor_rect(
+            region.origin_px[0],
+            region.origin_px[1],
+            region.size_px[0],
+            region.size_px[1],
+        );
+        pass.set_bind_group(0, &self.eye_bindings, &[]);
+        if let Some(any) = self.scene.materials.first() {
+            pass.set_bind_group(1, any, &[]);
+        }
+        if start.is_none_or(|start| start.over_sky) {
+            pass.set_pipeline(self.pipelines.background.of(picture));
+            pass.draw(0..3, 0..1);
+        }
+        if let Some(start) = start {
+            pass.set_pipeline(start.pipeline.of(picture));
+            pass.set_bind_group(0, &start.bindings, &[]);
+            pass.draw(0..3, 0..1);
+        }
+        if let (Some(mask), Some(composer)) = (&target.mask, &self.composer) {
+            pass.set_pipeline(composer.mask.of(picture));
+            pass.set_bind_group(0, &mask.bindings, &[]);
+            pass.draw(0..3, 0..1);
+        }
+        pass.set_bind_group(0, &self.eye_bindings, &[]);
+        pass
     }
 
     /// Issues a plan, setting only the state that changes.
@@ -424,10 +469,9 @@ impl CaptureBackend for Lavapipe {
         let Some(region) = self.target(view.target)?.open_part(region) else {
             return Ok(Captured::Complete);
         };
-        let plan = (Purpose::of(recording.as_ref()).iter())
-            .map(|purpose| self.plan(draws, view.visible, *purpose))
-            .collect::<Result<Vec<_>, _>>()?
-            .concat();
+        let plans = (Purpose::of(recording.as_ref()).iter())
+            .map(|purpose| Ok((*purpose, self.plan(draws, view.visible, *purpose)?)))
+            .collect::<Result<Vec<_>, RasterError>>()?;
         self.work.regions += 1;
         self.work.bytes_uploaded += size_of::<ViewData>() as u64 + 4;
         if view.layer.start != Start::Sky && self.starts.is_none() {
@@ -442,59 +486,17 @@ impl CaptureBackend for Lavapipe {
         gpu.queue.write_buffer(&buffers.counter, 0, &[0; 4]);
         gpu.checked("rendering a layer", || {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                // Regions add up to a picture: everything is loaded, and the background clears
-                // what the scissor leaves open.
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &target.color.view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Load,
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &target.depth_view,
-                    depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Load,
-                        store: wgpu::StoreOp::Store,
-                    }),
-                    stencil_ops: None,
-                }),
-                ..Default::default()
-            });
-            pass.set_scissor_rect(
-                region.origin_px[0],
-                region.origin_px[1],
-                region.size_px[0],
-                region.size_px[1],
-            );
-            pass.set_bind_group(0, &self.eye_bindings, &[]);
-            if let Some(any) = self.scene.materials.first() {
-                pass.set_bind_group(1, any, &[]);
+            for (purpose, plan) in &plans {
+                let start = start_drawn.as_ref();
+                let picture = purpose.has_picture();
+                let mut pass = self.layer_pass(&mut encoder, target, region, start, picture);
+                self.issue(&mut pass, draws, plan);
             }
-            if start_drawn.as_ref().is_none_or(|start| start.over_sky) {
-                pass.set_pipeline(&self.pipelines.background);
-                pass.draw(0..3, 0..1);
-            }
-            if let Some(start) = &start_drawn {
-                pass.set_pipeline(start.pipeline);
-                pass.set_bind_group(0, &start.bindings, &[]);
-                pass.draw(0..3, 0..1);
-                pass.set_bind_group(0, &self.eye_bindings, &[]);
-            }
-            if let (Some(mask), Some(composer)) = (&target.mask, &self.composer) {
-                pass.set_pipeline(&composer.mask);
-                pass.set_bind_group(0, &mask.bindings, &[]);
-                pass.draw(0..3, 0..1);
-                pass.set_bind_group(0, &self.eye_bindings, &[]);
-            }
-            self.issue(&mut pass, draws, &plan);
-            drop(pass);
             gpu.queue.submit([encoder.finish()]);
         })?;
-        self.work.state_changes += state_changes(draws, &plan);
+        self.work.state_changes += (plans.iter())
+            .map(|(_, plan)| state_changes(draws, plan))
+            .sum::<u64>();
         let Some(Recording {
             fragments, sink, ..
         }) = recording

@@ -177,7 +177,7 @@ impl Lavapipe {
             if let Some(any) = self.scene.materials.first() {
                 pass.set_bind_group(1, any, &[]);
             }
-            pass.set_pipeline(&self.pipelines.background);
+            pass.set_pipeline(self.pipelines.background.of(true));
             pass.draw(0..3, 0..1);
             self.issue(&mut pass, draws, &plan);
             drop(pass);
@@ -246,7 +246,7 @@ impl Multiview {
 
 impl Targets {
     fn new(gpu: &Gpu, size_px: [u32; 2]) -> Self {
-        let texture = |format, usage| attachment(gpu, size_px, VIEW_COUNT, format, usage);
+        let texture = |format, usage| attachment(gpu, size_px, VIEW_COUNT, 1, format, usage);
         let view = |texture: &wgpu::Texture| {
             texture.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2Array),

@@ -2,10 +2,12 @@
 
 use super::bindings;
 use super::device::Gpu;
-use super::whole::Whole;
+use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use crate::roles::{PipelineKey, Role};
-use crate::shader::{self, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
+use crate::shader::{
+    self, ALPHA_BINDING, AlphaSource, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING,
+};
 use crate::vertices::{COLOR_STRIDE, VERTEX_STRIDE};
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
@@ -50,7 +52,7 @@ pub struct Pipelines {
     /// Bind group layouts.
     pub layouts: Layouts,
     /// Draws the background and clears the region's depth.
-    pub background: wgpu::RenderPipeline,
+    pub background: OverLayer,
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
     multiview_mask: Option<NonZeroU32>,
@@ -62,8 +64,8 @@ impl Pipelines {
     ///
     /// # Errors
     /// Driver and validation errors.
-    pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
-        Self::compile(gpu, &shader::source(gpu.granularity()), None)
+    pub fn new(gpu: &Gpu, alpha: AlphaSource) -> Result<Self, RasterError> {
+        Self::compile(gpu, &shader::source(gpu.granularity(), alpha), None)
     }
 
     /// Compiles the shader for pictures of two views at once.
@@ -95,10 +97,9 @@ impl Pipelines {
                 module: &module,
                 layout: &layout,
                 vertex: "vertex_background",
-                writes_depth: true,
                 multiview_mask,
             };
-            let background = background.pipeline(gpu, "fragment_background");
+            let background = background.over_layer(gpu, "fragment_background");
             Self {
                 layouts,
                 background,
@@ -160,7 +161,7 @@ impl Pipelines {
                 attributes: &color,
             }));
         }
-        let (shadow, colorless) = (key.role.casts(), key.role.colorless());
+        let shadow = key.role.casts();
         let entry_point = key.role.fragment_entry_point();
         let (format, blend) = match key.role {
             Role::Blended => (COLOR_FORMAT, Some(wgpu::BlendState::ALPHA_BLENDING)),
@@ -179,7 +180,7 @@ impl Pipelines {
         })];
         if key.role.writes_texels() {
             targets.push(Some(PRIMITIVE_FORMAT.into()));
-        } else if colorless {
+        } else if key.colorless {
             targets.clear();
         }
         gpu.device
@@ -270,4 +271,5 @@ fn material_bindings() -> impl Iterator<Item = (u32, wgpu::BindingType)> {
         .into_iter()
         .chain(textures.map(move |binding| (binding, texture)))
         .chain(samplers.map(move |binding| (binding, sampler)))
+        .chain([(ALPHA_BINDING, texture)])
 }

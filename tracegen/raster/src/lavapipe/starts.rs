@@ -3,7 +3,7 @@
 use super::bindings;
 use super::device::Gpu;
 use super::targets::LayerTarget;
-use super::whole::Whole;
+use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use glam::{Mat3, Mat4};
 use techniques::start::{Composition, Opening};
@@ -18,7 +18,7 @@ pub struct Starts {
 
 /// A pipeline over the whole target, with the layout of its only group.
 struct Pipeline {
-    pipeline: wgpu::RenderPipeline,
+    pipeline: OverLayer,
     layout: wgpu::BindGroupLayout,
     /// Bindings of its textures.
     textures: Vec<u32>,
@@ -27,7 +27,7 @@ struct Pipeline {
 /// A start with what it is drawn with.
 pub struct Drawn<'a> {
     /// Over the whole target.
-    pub pipeline: &'a wgpu::RenderPipeline,
+    pub pipeline: &'a OverLayer,
     /// Its group 0.
     pub bindings: wgpu::BindGroup,
     /// The sky is drawn before it.
@@ -138,10 +138,9 @@ impl Pipeline {
             module,
             layout: &bindings::pipeline_layout(gpu, &[&layout]),
             vertex: "vertex_whole",
-            writes_depth: true,
             multiview_mask: None,
         };
-        let pipeline = whole.pipeline(gpu, entry_point);
+        let pipeline = whole.over_layer(gpu, entry_point);
         Self {
             pipeline,
             layout,

@@ -49,6 +49,7 @@ impl LayerTarget {
                 gpu,
                 size_px,
                 1,
+                1,
                 DEPTH_FORMAT,
                 wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
             );
@@ -75,6 +76,37 @@ impl LayerTarget {
         is_open.then(|| Region {
             origin_px,
             size_px: [0, 1].map(|axis: usize| end_px[axis] - origin_px[axis]),
+        })
+    }
+
+    /// Starts a pass into the depth, and the picture if it is asked for. Regions add up to a layer:
+    /// everything is loaded.
+    pub fn pass<'e>(
+        &self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        picture: bool,
+    ) -> wgpu::RenderPass<'e> {
+        let color = wgpu::RenderPassColorAttachment {
+            view: &self.color.view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Load,
+                store: wgpu::StoreOp::Store,
+            },
+        };
+        let colors: Vec<_> = picture.then_some(Some(color)).into_iter().collect();
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &colors,
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth_view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Load,
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
         })
     }
 
@@ -132,7 +164,7 @@ impl ColorTarget {
             let usage = wgpu::TextureUsages::COPY_SRC
                 | wgpu::TextureUsages::COPY_DST
                 | wgpu::TextureUsages::TEXTURE_BINDING;
-            let texture = attachment(gpu, size_px, 1, COLOR_FORMAT, usage);
+            let texture = attachment(gpu, size_px, 1, 1, COLOR_FORMAT, usage);
             Self {
                 size_px,
                 view: texture.create_view(&Default::default()),
@@ -158,6 +190,7 @@ impl ShadowMaps {
             gpu,
             [size; 2],
             cascades.max(1),
+            1,
             DEPTH_FORMAT,
             wgpu::TextureUsages::TEXTURE_BINDING,
         );
@@ -181,11 +214,12 @@ impl ShadowMaps {
     }
 }
 
-/// A texture that is rendered into.
+/// A texture of so many layers and levels that is rendered into.
 pub fn attachment(
     gpu: &Gpu,
     size_px: [u32; 2],
     layers: u32,
+    levels: u32,
     format: wgpu::TextureFormat,
     usage: wgpu::TextureUsages,
 ) -> wgpu::Texture {
@@ -196,7 +230,7 @@ pub fn attachment(
             height: size_px[1],
             depth_or_array_layers: layers,
         },
-        mip_level_count: 1,
+        mip_level_count: levels,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,

@@ -19,7 +19,7 @@ impl Lavapipe {
     ) -> Result<Texels, RasterError> {
         let plan = self.plan(draws, view.visible, Purpose::Texel)?;
         let gpu = &self.gpu;
-        let texture = |format, usage| attachment(gpu, view.layer.size_px, 1, format, usage);
+        let texture = |format, usage| attachment(gpu, view.layer.size_px, 1, 1, format, usage);
         let copied = wgpu::TextureUsages::COPY_SRC;
         let (colors, primitives) = (
             texture(TEXEL_FORMAT, copied),

@@ -1,15 +1,18 @@
 //! The scene in the driver's memory: vertex and index buffers, textures, materials, instances.
 
+use super::alpha;
 use super::bindings;
 use super::device::Gpu;
 use super::pipelines::Layouts;
 use crate::draws::DrawList;
 use crate::error::RasterError;
-use crate::shader::{MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
+use crate::groups::MATERIAL_TEXTURES;
+use crate::shader::{ALPHA_BINDING, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
 use crate::uniforms::MaterialData;
 use crate::vertices::{self, InstanceData, VERTEX_STRIDE};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
 use scene::{Material, Mesh, Scene, TextureRef};
+use std::collections::{BTreeMap, BTreeSet};
 use textures::{CompressedTexture, TextureSet};
 use wgpu::util::DeviceExt;
 
@@ -52,6 +55,7 @@ impl SceneBuffers {
         scene: &Scene,
         draws: &DrawList,
         textures: &TextureSet,
+        alpha_copies: &BTreeSet<usize>,
     ) -> Result<Self, RasterError> {
         let mut used = vec![false; scene.meshes.len()];
         for call in &draws.calls {
@@ -72,11 +76,13 @@ impl SceneBuffers {
                 _ => upload_texture(gpu, t),
             })
             .collect::<Result<Vec<_>, _>>()?;
+        let copies = alpha::copies(gpu, alpha_copies, &views)?;
         let mut samplers = Samplers::default();
-        let materials = scene
-            .materials
-            .iter()
-            .map(|m| bind_material(gpu, layouts, m, textures, &views, &absent, &mut samplers))
+        let materials = (scene.materials.iter())
+            .map(|material| {
+                let views = MaterialViews::new(material, textures, &views, &copies, &absent);
+                views.bind(gpu, layouts, material, &mut samplers)
+            })
             .collect();
         let instances = vertices::instances(draws);
         let instances = gpu
@@ -224,36 +230,60 @@ fn upload_texture(
     })
 }
 
-fn bind_material(
-    gpu: &Gpu,
-    layouts: &Layouts,
-    material: &Material,
-    set: &TextureSet,
-    views: &[wgpu::TextureView],
-    absent: &wgpu::TextureView,
-    samplers: &mut Samplers,
-) -> wgpu::BindGroup {
-    let textures = material.textures();
-    let samplers = textures
-        .map(|t| samplers.index(gpu, &t.map_or(Sampler::TRILINEAR_REPEAT, |t| t.sampler)))
-        .map(|index| &samplers.made[index].1);
-    let data = MaterialData::new(material);
-    let uniform = gpu
-        .device
-        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("material"),
-            contents: bytemuck::bytes_of(&data),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
-    let of_texture = |texture: &Option<TextureRef>| {
-        let view = texture.and_then(|t| (*set.of_image.get(t.image)?).and_then(|i| views.get(i)));
-        wgpu::BindingResource::TextureView(view.unwrap_or(absent))
-    };
-    let bound = [(MATERIAL_BINDING, uniform.as_entire_binding())]
-        .into_iter()
-        .chain((TEXTURES_BINDING..).zip(textures.iter().map(of_texture)))
-        .chain((SAMPLERS_BINDING..).zip(samplers.map(wgpu::BindingResource::Sampler)));
-    bindings::group(gpu, "material", &layouts.material, bound)
+/// What a material samples.
+struct MaterialViews<'a> {
+    textures: [&'a wgpu::TextureView; MATERIAL_TEXTURES],
+    alpha: &'a wgpu::TextureView,
+}
+
+impl<'a> MaterialViews<'a> {
+    /// `absent` stands for what there is not.
+    fn new(
+        material: &Material,
+        set: &TextureSet,
+        views: &'a [wgpu::TextureView],
+        copies: &'a BTreeMap<usize, wgpu::TextureView>,
+        absent: &'a wgpu::TextureView,
+    ) -> Self {
+        let of_texture = |texture: Option<TextureRef>| {
+            let view =
+                texture.and_then(|t| (*set.of_image.get(t.image)?).and_then(|i| views.get(i)));
+            view.unwrap_or(absent)
+        };
+        let copy = alpha::of_material(material, set).and_then(|index| copies.get(&index));
+        Self {
+            textures: material.textures().map(of_texture),
+            alpha: copy.unwrap_or(absent),
+        }
+    }
+
+    fn bind(
+        &self,
+        gpu: &Gpu,
+        layouts: &Layouts,
+        material: &Material,
+        samplers: &mut Samplers,
+    ) -> wgpu::BindGroup {
+        let samplers = (material.textures())
+            .map(|t| samplers.index(gpu, &t.map_or(Sampler::TRILINEAR_REPEAT, |t| t.sampler)))
+            .map(|index| &samplers.made[index].1);
+        let data = MaterialData::new(material);
+        let uniform = gpu
+            .device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("material"),
+                contents: bytemuck::bytes_of(&data),
+                usage: wgpu::BufferUsages::UNIFORM,
+            });
+        let textures = self.textures.map(wgpu::BindingResource::TextureView);
+        let alpha = wgpu::BindingResource::TextureView(self.alpha);
+        let bound = [(MATERIAL_BINDING, uniform.as_entire_binding())]
+            .into_iter()
+            .chain((TEXTURES_BINDING..).zip(textures))
+            .chain((SAMPLERS_BINDING..).zip(samplers.map(wgpu::BindingResource::Sampler)))
+            .chain([(ALPHA_BINDING, alpha)]);
+        bindings::group(gpu, "material", &layouts.material, bound)
+    }
 }
 
 /// The samplers made so far, one a state.

@@ -71,7 +71,7 @@ impl Lavapipe {
 
     fn depth_texture(&self, view: &View<'_>) -> wgpu::Texture {
         let usage = wgpu::TextureUsages::COPY_SRC;
-        attachment(&self.gpu, view.layer.size_px, 1, DEPTH_FORMAT, usage)
+        attachment(&self.gpu, view.layer.size_px, 1, 1, DEPTH_FORMAT, usage)
     }
 
     /// Draws without colour: depth is cleared first, unless there are marks to be made against it,

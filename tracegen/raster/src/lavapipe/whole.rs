@@ -4,6 +4,23 @@ use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
 use std::num::NonZeroU32;
 
+/// What is drawn over a layer before its draws.
+pub struct OverLayer {
+    pictured: wgpu::RenderPipeline,
+    depth_alone: wgpu::RenderPipeline,
+}
+
+impl OverLayer {
+    /// The pipeline for passes with a picture, or for those of depth alone.
+    pub fn of(&self, picture: bool) -> &wgpu::RenderPipeline {
+        if picture {
+            &self.pictured
+        } else {
+            &self.depth_alone
+        }
+    }
+}
+
 /// What such a pipeline is made of.
 pub struct Whole<'a> {
     /// The shader.
@@ -12,15 +29,40 @@ pub struct Whole<'a> {
     pub layout: &'a wgpu::PipelineLayout,
     /// The entry point that makes the triangle.
     pub vertex: &'a str,
-    /// There is a depth buffer, which it writes whatever it holds.
-    pub writes_depth: bool,
     /// Views that are drawn at once.
     pub multiview_mask: Option<NonZeroU32>,
 }
 
 impl Whole<'_> {
-    /// Makes the pipeline of a fragment entry point.
-    pub fn pipeline(&self, gpu: &Gpu, fragment: &str) -> wgpu::RenderPipeline {
+    /// A fragment entry point that writes depth, whatever is there, and colour where there is a picture.
+    pub fn over_layer(&self, gpu: &Gpu, fragment: &str) -> OverLayer {
+        OverLayer {
+            pictured: self.pipeline(gpu, fragment, Some(COLOR_FORMAT), true),
+            depth_alone: self.pipeline(gpu, fragment, None, true),
+        }
+    }
+
+    /// A fragment entry point that writes colour alone.
+    pub fn over_picture(
+        &self,
+        gpu: &Gpu,
+        fragment: &str,
+        format: wgpu::TextureFormat,
+    ) -> wgpu::RenderPipeline {
+        self.pipeline(gpu, fragment, Some(format), false)
+    }
+
+    fn pipeline(
+        &self,
+        gpu: &Gpu,
+        fragment: &str,
+        color: Option<wgpu::TextureFormat>,
+        writes_depth: bool,
+    ) -> wgpu::RenderPipeline {
+        let targets: Vec<_> = color
+            .map(|format| Some(format.into()))
+            .into_iter()
+            .collect();
         let depth_stencil = wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
             depth_write_enabled: Some(true),
@@ -39,13 +81,13 @@ impl Whole<'_> {
                     buffers: &[],
                 },
                 primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: self.writes_depth.then_some(depth_stencil),
+                depth_stencil: writes_depth.then_some(depth_stencil),
                 multisample: wgpu::MultisampleState::default(),
                 fragment: Some(wgpu::FragmentState {
                     module: self.module,
                     entry_point: Some(fragment),
                     compilation_options: Default::default(),
-                    targets: &[Some(COLOR_FORMAT.into())],
+                    targets: &targets,
                 }),
                 multiview_mask: self.multiview_mask,
                 cache: None,

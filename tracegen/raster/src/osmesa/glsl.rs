@@ -3,7 +3,8 @@
 use crate::error::RasterError;
 use crate::groups::MATERIAL_TEXTURES;
 use crate::shader::{
-    self, Granularity, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING, VIEW_BINDINGS,
+    self, AlphaSource, Granularity, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING,
+    VIEW_BINDINGS,
 };
 use naga::ShaderStage;
 use naga::back::PipelineConstants;
@@ -33,7 +34,7 @@ impl Module {
     /// # Errors
     /// What is wrong with it.
     pub fn new() -> Result<Self, RasterError> {
-        let source = shader::source(Granularity::NumberedFragments);
+        let source = shader::source(Granularity::NumberedFragments, AlphaSource::Color);
         let module = naga::front::wgsl::parse_str(&source)
             .map_err(|e| failed("reading the shader", e.emit_to_string(&source)))?;
         let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());

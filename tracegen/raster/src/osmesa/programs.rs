@@ -100,7 +100,7 @@ fn state(key: &PipelineKey) -> State {
             glow::LESS
         },
         writes_depth: !role.keeps_depth(),
-        writes_color: !role.keeps_color(),
+        writes_color: !(key.colorless || role.keeps_color()),
         blends: role == Role::Blended,
         culls: !key.double_sided,
         clockwise: key.mirrored,

@@ -8,7 +8,7 @@ fn capture_and_shade(in: Fragment, place: Place) -> vec4<f32> {
     if CAPTURE {
         let lane = lane_of(in, place);
         _ = record_material(lane, in);
-        if CASCADES > 0u { record_shadow(lane, found, in.world, geometric); }
+        if CASCADES > 0u { record_shadow(lane, found); }
     }
     return shade(in, front, base_color(in), found);
 }
@@ -18,7 +18,7 @@ fn record_lit(lane: Lane, in: Fragment, front: bool) -> u32 {
     let index = record_material(lane, in);
     if CASCADES > 0u {
         let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
-        record_shadow(lane, find_cascade(in.world, geometric), in.world, geometric);
+        record_shadow(lane, find_cascade(in.world, geometric));
     }
     return index;
 }
@@ -41,7 +41,7 @@ fn fragment_record(in: Fragment, place: Place) -> @location(0) vec4<f32> {
 @fragment @early_depth_test(force)
 fn fragment_masked_record(in: Fragment, place: Place) -> @location(0) vec4<f32> {
     var lane = lane_of(in, place);
-    lane.passing |= quad_mask(lane, base_color(in).a >= material.specular.w);
+    lane.passing |= quad_mask(lane, base_alpha(in) >= material.specular.w);
     let index = record_lit(lane, in, place.front);
     record_depth(lane, index, in.position.z);
     return vec4(0.0);
@@ -67,5 +67,5 @@ fn fragment_mark(in: Fragment) {
 
 @fragment @early_depth_test(force)
 fn fragment_mark_masked(in: Fragment) {
-    if base_color(in).a >= material.specular.w { mark(in); }
+    if base_alpha(in) >= material.specular.w { mark(in); }
 }

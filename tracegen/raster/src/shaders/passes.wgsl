@@ -33,8 +33,8 @@ fn fragment_background(in: Background) -> @location(0) vec4<f32> {
     return vec4(tone_map(background(direction)), 1.0);
 }
 
-// Alpha-masked casters.
+// Depth of alpha-masked draws alone.
 @fragment
 fn fragment_shadow(in: Fragment) {
-    if base_color(in).a < material.specular.w { discard; }
+    if base_alpha(in) < material.specular.w { discard; }
 }

@@ -95,12 +95,16 @@ fn record_depth(lane: Lane, index: u32, depth: f32) {
     }
 }
 
-fn record_shadow(lane: Lane, found: ShadowLookup, world: vec3<f32>, normal: vec3<f32>) {
+fn record_shadow(lane: Lane, found: ShadowLookup) {
     let first = countOneBits(LEADERS);
     let cascades = cascades_near(found.cascade);
     for (var k = cascades.x; k <= cascades.y; k++) {
-        let p = shadow_coordinates(u32(k), world, normal);
-        _ = record_uv(lane, first + u32(k), found.cascade == k, p.xy);
+        var uv = vec2(0.0);
+        // With constants for indices the array stays in registers.
+        for (var c = 0u; c < CASCADES; c++) {
+            uv = select(uv, found.uv[c], u32(k) == c);
+        }
+        _ = record_uv(lane, first + u32(k), found.cascade == k, uv);
     }
     // Lanes outside every cascade sample nothing; without a texture they still count.
     if LEADERS == 0u {

@@ -18,6 +18,14 @@ fn base_color(in: Fragment) -> vec4<f32> {
     return color;
 }
 
+// Alpha of base_color() alone, bit for bit.
+fn base_alpha(in: Fragment) -> f32 {
+    var alpha = material.base_color.a;
+    if (TEXTURES & (1u << BASE_COLOR)) != 0u { alpha *= texel_alpha(texture_uv(BASE_COLOR, in.uv)); }
+    if COLORED { alpha *= in.color.a; }
+    return alpha;
+}
+
 fn surface_normal(in: Fragment, front: bool) -> vec3<f32> {
     let n = safe_normalize(in.normal);
     var normal = n;
@@ -53,6 +61,8 @@ fn in_cascade(p: vec3<f32>) -> bool {
 struct ShadowLookup {
     coordinates: vec3<f32>,
     cascade: i32,
+    // Shadow uv in every cascade.
+    uv: array<vec2<f32>, MAX_CASCADES>,
 }
 
 // The finest cascade that holds the position. Which one does not depend on the eye.
@@ -61,6 +71,7 @@ fn find_cascade(world: vec3<f32>, normal: vec3<f32>) -> ShadowLookup {
     found.cascade = -1;
     for (var k = 0u; k < CASCADES; k++) {
         let p = shadow_coordinates(k, world, normal);
+        found.uv[k] = p.xy;
         if found.cascade < 0 && in_cascade(p) {
             found.coordinates = p;
             found.cascade = i32(k);
