@@ -7,7 +7,8 @@
 use parallax_tests::traces::Random;
 use parallax_tests::writers::{self, Files, Writer, run_to_the_end};
 use std::fs;
-use std::os::unix::process::CommandExt;
+use std::io::Read;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -159,4 +160,42 @@ fn a_sharded_sweep_of_which_a_worker_is_killed_merges_to_one_machines_bytes() {
         fs::remove_dir_all(folder.path()).expect("removable");
     }
     println!("{killed} workers of {rounds} sweeps killed in time");
+}
+
+/// As `kill` and `timeout` do, which know nothing of children.
+#[test]
+fn a_signal_to_a_sweep_of_captures_alone_ends_the_capture_that_it_runs() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let manifest = folder.path().join("captures.toml");
+    let out = folder.path().join("out");
+    // Minutes, were nobody to end it.
+    let long = "[[captures]]\ncommand = \"rays\"\nscene = \"atrium\"\nsize = \"4096x4096\"\n";
+    fs::write(&manifest, long).expect("writable");
+    let mut sweep = parallax_tests::program("tracegen");
+    sweep.arg("sweep").arg(&manifest).arg("--output").arg(&out);
+    sweep.stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut sweep = sweep.spawn().expect("the program starts");
+    let unfinished = || Files::below(folder.path()).unfinished;
+    let start = Instant::now();
+    while unfinished().is_empty() {
+        assert!(
+            start.elapsed() < Duration::from_secs(60),
+            "nothing is captured"
+        );
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let kill = format!("kill -TERM {}", sweep.id());
+    let sent = Command::new("sh").args(["-c", &kill]).status();
+    assert!(sent.expect("a shell").success());
+    let status = sweep.wait().expect("it ends");
+    assert_eq!(status.signal(), Some(15));
+    assert_eq!(unfinished(), [""; 0]);
+    // The pipe ends when nobody has it any more.
+    let mut rest = String::new();
+    let mut pipe = sweep.stderr.take().expect("a pipe");
+    pipe.read_to_string(&mut rest).expect("text");
+    assert!(
+        start.elapsed() < Duration::from_secs(60),
+        "the capture went on"
+    );
 }

@@ -2,6 +2,7 @@
 //! outputs, signals, threads, completions and manual pages, and work split over many machines.
 
 mod arguments;
+mod children;
 mod documents;
 mod message;
 mod outputs;
@@ -12,6 +13,7 @@ mod signals;
 mod slurm;
 
 pub use arguments::{Threads, lasting_arguments};
+pub use children::run_child;
 pub use documents::Documents;
 pub use formats::container::is_stdout;
 pub use message::{error, note, print, warn};

@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM and SIGHUP leave no unfinished file behind.
+//! Ctrl-C, SIGTERM and SIGHUP leave no unfinished file and no child behind.
 
 use anyhow::Context;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -22,6 +22,7 @@ pub(crate) fn discard_unfinished_on_exit() -> anyhow::Result<()> {
         .name("signals".to_owned())
         .spawn(move || {
             for signal in signals.forever() {
+                super::children::end_with(signal);
                 formats::container::discard_unfinished();
                 // Does not return for these three.
                 let _impossible = emulate_default_handler(signal);

@@ -193,7 +193,8 @@ fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
         if let Some(threads) = args.threads.count {
             process.args(["--threads", &threads.to_string()]);
         }
-        let status = process.current_dir(folder).stdin(Stdio::null()).status();
+        process.current_dir(folder).stdin(Stdio::null());
+        let status = shell::run_child(&mut process);
         if status.context("the program itself")?.success() {
             let line = p.capture.recipe() + "\n";
             AtomicFile::write_whole(&recipe, line.as_bytes())

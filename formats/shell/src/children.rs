@@ -1,0 +1,69 @@
+//! Programs that this one runs: a signal that ends it ends them first.
+
+use std::collections::BTreeSet;
+use std::io;
+use std::process::{Command, ExitStatus};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// A child that has not ended so long after a signal is left alone.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+struct Children {
+    running: BTreeSet<u32>,
+    /// The program is ending: nothing more is started.
+    ending: bool,
+}
+
+static CHILDREN: Mutex<Children> = Mutex::new(Children {
+    running: BTreeSet::new(),
+    ending: false,
+});
+static ONE_ENDED: Condvar = Condvar::new();
+
+fn children() -> MutexGuard<'static, Children> {
+    CHILDREN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs a program to its end.
+///
+/// # Errors
+/// It cannot be started or waited for.
+pub fn run_child(command: &mut Command) -> io::Result<ExitStatus> {
+    let mut child = {
+        let mut children = children();
+        if children.ending {
+            return Err(io::ErrorKind::Interrupted.into());
+        }
+        let child = command.spawn()?;
+        children.running.insert(child.id());
+        child
+    };
+    let status = child.wait();
+    children().running.remove(&child.id());
+    ONE_ENDED.notify_all();
+    status
+}
+
+/// Sends a signal to all children and waits until they have ended. Nothing is started after it.
+pub(crate) fn end_with(signal: i32) {
+    let mut now = children();
+    now.ending = true;
+    for &child in &now.running {
+        send(child, signal);
+    }
+    let _ended = ONE_ENDED.wait_timeout_while(now, PATIENCE, |now| !now.running.is_empty());
+}
+
+#[cfg(unix)]
+fn send(child: u32, signal: i32) {
+    use rustix::process::{Pid, Signal, kill_process};
+    let pid = i32::try_from(child).ok().and_then(Pid::from_raw);
+    if let (Some(pid), Some(signal)) = (pid, Signal::from_named_raw(signal)) {
+        // One that has ended by itself needs no signal.
+        let _gone = kill_process(pid, signal);
+    }
+}
+
+#[cfg(not(unix))]
+fn send(_child: u32, _signal: i32) {}
