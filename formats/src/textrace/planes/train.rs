@@ -92,7 +92,8 @@ fn train() {
                     trace.decode_tile(pass, index, &mut tile).unwrap();
                     records += tile.records.len();
                     counts.last = CODES - 1;
-                    encode::tile(&tile, &codes, &mut counts);
+                    encode::tile(&tile, &codes, &mut counts, &mut back);
+                    counts.add(&mut back);
                 }
             }
             let by_code: Vec<String> = counts
