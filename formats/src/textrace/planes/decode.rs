@@ -5,7 +5,7 @@
 use super::codes::{Code, Codes, sizes_context};
 use super::mode::{Departure, Mode};
 use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
-use super::places::Places;
+use super::places::{Last, Places};
 use super::plane::{Plane, Quad};
 use super::residual::{
     CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, Pair, WIDE, small_pairs, sum, unfold,
@@ -21,6 +21,7 @@ pub(super) type Outcome<T> = Result<T, &'static str>;
 /// A group of a run.
 #[derive(Clone, Copy)]
 struct Told {
+    group: u8,
     plane: Plane,
     departure: Departure,
     noise: usize,
@@ -146,38 +147,99 @@ impl<'a> Decoder<'a> {
             let (place, used) = places.read(&mut last, self.codes, self.peek()?)?;
             self.front.skip(used);
             let mut record = place.record();
-            let index = known.get_mut(usize::from(place.group) % GROUPS);
-            let index = index.ok_or(SHORT)?;
-            if let Some(told) = self.told.get_mut(*index) {
+            let known_as = known.get_mut(usize::from(place.group) % GROUPS);
+            let known_as = known_as.ok_or(SHORT)?;
+            if let Some(told) = self.told.get_mut(*known_as) {
                 later(&mut self.back, self.codes, &mut record, told)?;
             } else {
-                *index = self.told.len();
+                *known_as = self.told.len();
                 let told = self.first(&mut record, of_run, left)?;
                 of_run = Some(told.plane);
                 self.told.push(told);
             }
             records.push(record);
-            if places.is_alone(place.group) && left > 0 {
-                let told = self.told.get_mut(*index).ok_or(SHORT)?;
-                // In registers, not in memory.
-                let (mut front, mut back, mut now) = (self.front, self.back, *told);
-                while left > 0 {
-                    let word = front.peek_unpadded().ok_or(SHORT)?;
-                    let read = places.read_alone(&mut last, self.codes, word)?;
-                    let Some((place, used)) = read else {
-                        break;
-                    };
-                    front.skip(used);
-                    let mut record = place.record();
-                    later(&mut back, self.codes, &mut record, &mut now)?;
-                    records.push(record);
-                    left -= 1;
-                }
-                (self.front, self.back, *told) = (front, back, now);
+            let index = *known_as;
+            if let Some(before) = places.pair_of(&last) {
+                left = if before == place.group {
+                    self.quads_of_one(places, &mut last, index, left, records)?
+                } else {
+                    let before = known.get(usize::from(before) % GROUPS).copied();
+                    let both = [before.unwrap_or(usize::MAX), index];
+                    self.quads_of_two(places, &mut last, both, left, records)?
+                };
             }
             places.last = last;
         }
         Ok(())
+    }
+
+    /// Quads of a group that follows itself, for as long as no other comes. Gives back how many records of the
+    /// run are left.
+    #[inline(always)]
+    fn quads_of_one(
+        &mut self,
+        places: &mut Places,
+        last: &mut Last,
+        index: usize,
+        mut left: u32,
+        records: &mut Vec<QuadRecord>,
+    ) -> Outcome<u32> {
+        let told = self.told.get_mut(index).ok_or(SHORT)?;
+        // In registers, not in memory.
+        let (mut front, mut back, mut now) = (self.front, self.back, *told);
+        while left > 0 {
+            let word = front.peek_unpadded().ok_or(SHORT)?;
+            let Some((place, used)) = places.read_next_quad(last, self.codes, word)? else {
+                break;
+            };
+            front.skip(used);
+            let mut record = place.record();
+            later(&mut back, self.codes, &mut record, &mut now)?;
+            records.push(record);
+            left -= 1;
+        }
+        (self.front, self.back, *told) = (front, back, now);
+        Ok(left)
+    }
+
+    /// The same of two groups in the same quads, in their order.
+    #[inline(always)]
+    fn quads_of_two(
+        &mut self,
+        places: &mut Places,
+        last: &mut Last,
+        [first, second]: [usize; 2],
+        mut left: u32,
+        records: &mut Vec<QuadRecord>,
+    ) -> Outcome<u32> {
+        let Some((one, two)) = self.told.get(first).zip(self.told.get(second)) else {
+            return Ok(left);
+        };
+        let group = last.place.group;
+        let (mut one, mut two) = (*one, *two);
+        let (mut front, mut back) = (self.front, self.back);
+        while left > 1 {
+            let word = front.peek_unpadded().ok_or(SHORT)?;
+            let Some((place, used)) = places.read_next_quad(last, self.codes, word)? else {
+                break;
+            };
+            front.skip(used);
+            let mut record = place.record();
+            record.group = one.group;
+            later(&mut back, self.codes, &mut record, &mut one)?;
+            records.push(record);
+            record.group = group;
+            later(&mut back, self.codes, &mut record, &mut two)?;
+            records.push(record);
+            left -= 2;
+        }
+        (self.front, self.back) = (front, back);
+        for (index, now) in [(first, one), (second, two)] {
+            if let Some(told) = self.told.get_mut(index) {
+                *told = now;
+            }
+        }
+        Ok(left)
     }
 
     /// The first quad of a group in a run, and its plane.
@@ -220,6 +282,7 @@ impl<'a> Decoder<'a> {
         };
         self.lineage.note(group, plane);
         Ok(Told {
+            group,
             plane,
             departure: Departure::start(mode, x, y),
             noise: first_noise(level),

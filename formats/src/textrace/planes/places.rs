@@ -4,7 +4,7 @@
 
 use super::codes::Codes;
 use super::encode::Sink;
-use super::{GROUPS, SHORT};
+use super::GROUPS;
 use crate::textrace::{QuadRecord, quad_morton};
 use crate::varint::low_u32;
 
@@ -51,7 +51,7 @@ struct Follow {
 #[derive(Clone, Copy)]
 pub(super) struct Last {
     /// The run's last record; before the first one 0, 0 and the last run's group.
-    place: Place,
+    pub place: Place,
     /// Its mask was the likeliest one.
     likeliest: bool,
     /// It came right after the one before it on the curve.
@@ -211,21 +211,23 @@ impl Places {
         last.first_of_run = false;
     }
 
-    /// The group follows itself in other quads: the usual case, in which [`Self::read_alone`] may read
-    /// what comes next.
+    /// The group that is expected in the same quad after the one that is expected after this group's, if
+    /// this group is that one: then [`Self::read_next_quad`] can read what comes next. The group itself, if
+    /// it follows itself in other quads.
     #[inline(always)]
-    pub fn is_alone(&self, group: u8) -> bool {
-        let alone = Follow {
-            group,
-            same_quad: false,
-        };
-        self.follow(group) == alone
+    pub fn pair_of(&self, last: &Last) -> Option<u8> {
+        let group = last.place.group;
+        let next = self.follow(group);
+        let after = self.follow(next.group);
+        let alone = !next.same_quad & (next.group == group);
+        let in_pairs = !next.same_quad & last.regular & after.same_quad & (after.group == group);
+        (alone | in_pairs).then_some(next.group)
     }
 
-    /// The next record after one whose group follows itself: nothing but code, step and mask. `None` where
-    /// it is told otherwise and [`Self::read`] must read it.
+    /// The next quad where what is expected after a group is in another one: nothing but code, step and
+    /// mask. `None` where it is told otherwise and [`Self::read`] must read it.
     #[inline(always)]
-    pub fn read_alone(
+    pub fn read_next_quad(
         &mut self,
         last: &mut Last,
         codes: &Codes,
