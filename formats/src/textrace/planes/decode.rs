@@ -337,12 +337,7 @@ fn later(
     let (mut residual, used) = small_pairs(classes, bits >> length);
     back.skip(length + used);
     if classes.wide {
-        let [uv, dx, dy, cross] = &mut residual;
-        for (pair, class) in [dx, dy, cross, uv].into_iter().zip(classes.each()) {
-            if class == WIDE {
-                *pair = pair_of(back, &codes.later)?;
-            }
-        }
+        residual = wide_pairs(back, codes, classes, residual)?;
     }
     let QuadRecord { x, y, .. } = *record;
     let [uv, dx, dy, cross] = told.plane.predict(x, y);
@@ -352,6 +347,51 @@ fn later(
     record.dy = sum(dy, by_dy);
     record.cross = sum(cross, by_cross);
     Ok(())
+}
+
+/// Wide pairs, all of a width, in place of zeros.
+#[inline(always)]
+fn wide_pairs(
+    back: &mut BitReader<'_, true>,
+    codes: &Codes,
+    classes: Classes,
+    [uv, dx, dy, cross]: Quad,
+) -> Outcome<Quad> {
+    let word = back.peek_unpadded().ok_or(SHORT)?;
+    let (width, used) = codes.later.decode(word);
+    let [of_dx, of_dy, of_cross, of_uv] = classes.each();
+    let all = |class: u32| 2 * width * u32::from(class == WIDE);
+    let dx_end = used + all(of_dx);
+    let dy_end = dx_end + all(of_dy);
+    let cross_end = dy_end + all(of_cross);
+    let end = cross_end + all(of_uv);
+    if end <= PEEK_BITS {
+        // Which ones are wide is hard to foretell: no branches.
+        back.skip(end);
+        let low = (1u64 << width) - 1;
+        let pair = |class: u32, at: u32, small: Pair| {
+            let low = low * u64::from(class == WIDE);
+            let bits = word >> at;
+            let [u, v] = small;
+            [unfold(bits & low) | u, unfold(bits >> width & low) | v]
+        };
+        return Ok([
+            pair(of_uv, cross_end, uv),
+            pair(of_dx, used, dx),
+            pair(of_dy, dx_end, dy),
+            pair(of_cross, dy_end, cross),
+        ]);
+    }
+    back.skip(used);
+    let mut quad = [dx, dy, cross, uv];
+    for (pair, class) in quad.iter_mut().zip(classes.each()) {
+        if class == WIDE {
+            let word = back.peek_unpadded().ok_or(SHORT)?;
+            *pair = numbers(back, word, 0, width)?;
+        }
+    }
+    let [dx, dy, cross, uv] = quad;
+    Ok([uv, dx, dy, cross])
 }
 
 /// A pair whose width a code tells.

@@ -152,9 +152,10 @@ impl<'a, S: Sink> Encoder<'a, S> {
         for (_, (class, index)) in pairs {
             self.back.bits(index, class_bits(class));
         }
-        for (pair, (class, _)) in pairs {
-            if class == WIDE {
-                put_pair(self.back, &self.codes.later, pair);
+        if let Some(width) = wide_width(&pairs) {
+            self.back.symbol(&self.codes.later, width, 0);
+            for (pair, _) in pairs.iter().filter(is_wide) {
+                put_numbers(self.back, *pair, width);
             }
         }
         group.noise = usize::from(classes.noise);
@@ -279,13 +280,10 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 classes.symbol(),
                 code.length(ESCAPE_SIZES, 0) + 4 * CLASS_NUMBER_BITS,
             );
-            for (pair, (class, _)) in pairs {
-                bits += if class == WIDE {
-                    let width = width(pair);
-                    self.codes.later.length(width, 0) + 2 * width
-                } else {
-                    class_bits(class)
-                };
+            bits += pairs.map(|(_, (class, _))| class_bits(class)).iter().sum::<u32>();
+            if let Some(width) = wide_width(&pairs) {
+                let wide = pairs.iter().filter(is_wide).count() as u32;
+                bits += self.codes.later.length(width, 0) + 2 * width * wide;
             }
             at = usize::from(classes.noise);
         }
@@ -363,6 +361,15 @@ fn first_pairs(quad: &Quad, expected: &Expected) -> [[i32; 2]; 4] {
 
 /// A pair, its class and the bits that name it in the class.
 type Classified = ([i32; 2], (u32, u32));
+
+fn is_wide((_, (class, _)): &&Classified) -> bool {
+    *class == WIDE
+}
+
+/// Bits that the largest number of the wide pairs needs; `None` where no pair is wide.
+fn wide_width(pairs: &[Classified; 4]) -> Option<u32> {
+    pairs.iter().filter(is_wide).map(|(pair, _)| width(*pair)).max()
+}
 
 /// Residuals in the order in which they are written, dx, dy, cross, uv, with their classes; the
 /// classes as one number, too.
