@@ -153,7 +153,7 @@ impl<'a> Decoder<'a> {
                 later(&mut self.back, self.codes, &mut record, told)?;
             } else {
                 *known_as = self.told.len();
-                let told = self.first(&mut record, of_run, left)?;
+                let told = self.first(&mut record, of_run, places.share(left))?;
                 of_run = Some(told.plane);
                 self.told.push(told);
             }
@@ -248,7 +248,7 @@ impl<'a> Decoder<'a> {
         &mut self,
         record: &mut QuadRecord,
         of_run: Option<Plane>,
-        left_in_run: u32,
+        likely_others: u32,
     ) -> Outcome<Told> {
         let QuadRecord { x, y, group, .. } = *record;
         let back = usize::try_from(self.number(&self.codes.parent)? - 1).unwrap_or(usize::MAX);
@@ -259,7 +259,7 @@ impl<'a> Decoder<'a> {
         for (left, code) in left.iter_mut().zip(&self.codes.first) {
             (width, *left) = self.pair_after(code, width)?;
         }
-        let (mode, level) = self.level(left_in_run)?;
+        let (mode, level) = self.level(likely_others)?;
         let mut by = Quad::default();
         if level > 0 {
             for (pair, code) in by.iter_mut().zip(&self.codes.correction) {
@@ -291,8 +291,8 @@ impl<'a> Decoder<'a> {
 
     /// How residuals are told, and how fine the correction of the plane is; a lone record has
     /// neither.
-    fn level(&mut self, left_in_run: u32) -> Outcome<(Mode, u32)> {
-        let Some(context) = level_context(left_in_run) else {
+    fn level(&mut self, likely_others: u32) -> Outcome<(Mode, u32)> {
+        let Some(context) = level_context(likely_others) else {
             return Ok((Mode::Plain, 0));
         };
         let symbol = self.symbol(self.codes.level.get(context).ok_or(SHORT)?)?;

@@ -126,7 +126,8 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 continue;
             }
             let after = &records[at + 1..];
-            let choice = self.first(record, lineage, of_run, after);
+            let likely_others = places.share(after.len() as u32);
+            let choice = self.first(record, lineage, of_run, likely_others, after);
             lineage.note(record.group, choice.plane);
             of_run = Some(choice.plane);
             *group = Some(Group {
@@ -167,6 +168,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
         record: &QuadRecord,
         lineage: &Lineage,
         of_run: Option<Plane>,
+        likely_others: u32,
         after: &[QuadRecord],
     ) -> Choice {
         let QuadRecord { x, y, group, .. } = *record;
@@ -192,7 +194,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
         }
         let tilt = tilt_of_run(of_run.is_some(), &quad, &expected);
         let plain = Plane::through(x, y, &quad, tilt);
-        let Some(context) = level_context(after.len() as u32) else {
+        let Some(context) = level_context(likely_others) else {
             return Choice::plain(plain);
         };
         let of_group = |other: &&QuadRecord| other.group == group;

@@ -8,8 +8,8 @@ use crate::varint::low_u32;
 
 /// Which code tells the level of a plane's corrections, by the records after the first one of its
 /// group in its run; `None` where there are none.
-pub(super) fn level_context(left_in_run: u32) -> Option<usize> {
-    match left_in_run {
+pub(super) fn level_context(likely_others: u32) -> Option<usize> {
+    match likely_others {
         0 => None,
         1 | 2 => Some(0),
         3..=6 => Some(1),

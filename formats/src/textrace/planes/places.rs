@@ -136,6 +136,12 @@ impl Places {
         self.last.regular = regular;
     }
 
+    /// How many of the records left in the run are likely to be of a group: half of them where groups
+    /// take turns.
+    pub fn share(&self, left_in_run: u32) -> u32 {
+        left_in_run >> u32::from(self.last.regular)
+    }
+
     /// A run of these records, which starts now, is regular.
     pub fn is_regular(&self, mut run: impl Iterator<Item = Place>) -> bool {
         let mut places = self.clone();
