@@ -159,12 +159,12 @@ impl<'a> Decoder<'a> {
             }
             records.push(record);
             let index = *known_as;
-            if let Some(before) = places.pair_of(&last) {
-                left = if before == place.group {
+            if let Some(starts) = places.starts_next_quad(&last) {
+                left = if starts == place.group {
                     self.quads_of_one(places, &mut last, index, left, records)?
                 } else {
-                    let before = known.get(usize::from(before) % GROUPS).copied();
-                    let both = [before.unwrap_or(usize::MAX), index];
+                    let first = known.get(usize::from(starts) % GROUPS).copied();
+                    let both = [first.unwrap_or(usize::MAX), index];
                     self.quads_of_two(places, &mut last, both, left, records)?
                 };
             }

@@ -282,7 +282,10 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 classes.symbol(),
                 code.length(ESCAPE_SIZES, 0) + 4 * CLASS_NUMBER_BITS,
             );
-            bits += pairs.map(|(_, (class, _))| class_bits(class)).iter().sum::<u32>();
+            bits += pairs
+                .map(|(_, (class, _))| class_bits(class))
+                .iter()
+                .sum::<u32>();
             if let Some(width) = wide_width(&pairs) {
                 let wide = pairs.iter().filter(is_wide).count() as u32;
                 bits += self.codes.later.length(width, 0) + 2 * width * wide;
@@ -370,7 +373,11 @@ fn is_wide((_, (class, _)): &&Classified) -> bool {
 
 /// Bits that the largest number of the wide pairs needs; `None` where no pair is wide.
 fn wide_width(pairs: &[Classified; 4]) -> Option<u32> {
-    pairs.iter().filter(is_wide).map(|(pair, _)| width(*pair)).max()
+    pairs
+        .iter()
+        .filter(is_wide)
+        .map(|(pair, _)| width(*pair))
+        .max()
 }
 
 /// Residuals in the order in which they are written, dx, dy, cross, uv, with their classes; the

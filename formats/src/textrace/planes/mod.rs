@@ -7,9 +7,9 @@
 //! Sizes of residuals, and steps and masks ([`places`]), are told by prefix codes with fixed lengths
 //! ([`lengths`]).
 //!
-//! A tile is written kind by kind: all places, all planes, all classes of residuals, all small
-//! residuals, all wide ones. The encoder fits the planes to the exact records ([`fit`]); a decoder does
-//! not need to know how.
+//! A tile is written run by run, from both ends: runs, places and planes from the front, residuals from
+//! the back. So a decoder has two chains of codes that do not wait for each other. The encoder fits the
+//! planes to the exact records ([`fit`]); a decoder does not need to know how.
 
 mod codes;
 mod decode;

@@ -6,8 +6,8 @@ use super::GROUPS;
 use super::plane::{Plane, Quad, cross, tilt_of};
 use crate::varint::low_u32;
 
-/// Which code tells the level of a plane's corrections, by the records after the first one of its
-/// group in its run; `None` where there are none.
+/// Which code tells the level of a plane's corrections, by how many records of its group are likely to
+/// follow in the run; `None` where none are.
 pub(super) fn level_context(likely_others: u32) -> Option<usize> {
     match likely_others {
         0 => None,

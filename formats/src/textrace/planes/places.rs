@@ -2,9 +2,9 @@
 //! to record, in both directions alike.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
+use super::GROUPS;
 use super::codes::Codes;
 use super::encode::Sink;
-use super::GROUPS;
 use crate::textrace::{QuadRecord, quad_morton};
 use crate::varint::low_u32;
 
@@ -28,7 +28,10 @@ impl Place {
     /// A record there, its numbers unknown.
     #[inline(always)]
     pub fn record(self) -> QuadRecord {
-        let (x, y) = POSITIONS.get(self.morton as usize & 63).copied().unwrap_or_default();
+        let (x, y) = POSITIONS
+            .get(self.morton as usize & 63)
+            .copied()
+            .unwrap_or_default();
         QuadRecord {
             x,
             y,
@@ -217,11 +220,11 @@ impl Places {
         last.first_of_run = false;
     }
 
-    /// The group that is expected in the same quad after the one that is expected after this group's, if
-    /// this group is that one: then [`Self::read_next_quad`] can read what comes next. The group itself, if
-    /// it follows itself in other quads.
+    /// Where groups take turns in the same quads, two by two, and the last record ended a quad: the group
+    /// of each quad's first record. Where the last record's group follows itself in other quads: that
+    /// group. Then [`Self::read_next_quad`] can read what comes next.
     #[inline(always)]
-    pub fn pair_of(&self, last: &Last) -> Option<u8> {
+    pub fn starts_next_quad(&self, last: &Last) -> Option<u8> {
         let group = last.place.group;
         let next = self.follow(group);
         let after = self.follow(next.group);
@@ -230,8 +233,8 @@ impl Places {
         (alone | in_pairs).then_some(next.group)
     }
 
-    /// The next quad where what is expected after a group is in another one: nothing but code, step and
-    /// mask. `None` where it is told otherwise and [`Self::read`] must read it.
+    /// The next quad, if another one is expected: nothing but step and mask; nothing is to be remembered of
+    /// groups. `None` where it is told otherwise and [`Self::read`] must read it.
     #[inline(always)]
     pub fn read_next_quad(
         &mut self,

@@ -123,7 +123,10 @@ impl Units {
     /// The finer, the higher the level; slopes of w the finer, too, the larger dx and dy are.
     pub fn new(level: u32, quad: &Quad) -> Self {
         let [_, [a, b], [c, d], _] = *quad;
-        let (ab, cd) = (a.unsigned_abs().max(b.unsigned_abs()), c.unsigned_abs().max(d.unsigned_abs()));
+        let (ab, cd) = (
+            a.unsigned_abs().max(b.unsigned_abs()),
+            c.unsigned_abs().max(d.unsigned_abs()),
+        );
         let largest = ab.max(cd);
         Self {
             start: 0.25,
