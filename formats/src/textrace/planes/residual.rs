@@ -143,14 +143,14 @@ const OF_SYMBOL: [Classes; ESCAPE_SIZES as usize] = {
 /// classes fill it up to a power of two.
 const BY_BITS: [[i32; 2]; 128] = {
     let mut pairs = [[0; 2]; 128];
-    let mut at = 0;
-    while at < pairs.len() {
-        let class = at as u32 >> 4;
-        let index = at as u32 & ((1 << class_bits(class)) - 1);
+    let mut at = 0u32;
+    while at < 128 {
+        let class = at >> 4;
+        let index = at & ((1 << class_bits(class)) - 1);
         #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
         {
             let [u, v] = SMALL[(nibble(STARTS, class) + index) as usize];
-            pairs[at] = [u as i32, v as i32];
+            pairs[at as usize] = [u as i32, v as i32];
         }
         at += 1;
     }
