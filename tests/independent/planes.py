@@ -194,21 +194,21 @@ def along(n, start, end):
 
 
 class Told:
-    """A group's plane in a run, and its records' numbers."""
+    """A group's plane in a run, and what its records depend on."""
 
-    def __init__(self, x, y, group, starts_run):
-        self.x, self.y, self.group, self.starts_run = x, y, group, starts_run
-        self.others = 0
+    def __init__(self, x, y):
+        self.x, self.y = x, y
 
 
 class Tile:
     def __init__(self, data, codes):
-        self.bits = Bits(data)
+        self.bits, self.back = Bits(data), Bits(data[::-1])
+        self.bytes = len(data)
         self.codes = codes
         self.place = self.mask = self.group = self.start = self.draw = 0
         self.one = self.likely = False
-        # x, y, mask, group and the plane of each record; of each plane the first record.
-        self.records, self.planes = [], []
+        # x, y, mask, group, uv, dx, dy and cross of each record; the planes told so far by group.
+        self.rows, self.earlier = [], [[] for _ in range(16)]
         self.start_anew()
 
     def start_anew(self):
@@ -222,20 +222,22 @@ class Tile:
             self.draw = draw
         self.regular = any(same for _, same in self.follows) and self.bits.take(1)
         self.first = True
-        of_run = {}
-        for _ in range(count):
+        of_run, last = {}, None
+        for left in reversed(range(count)):
             place, mask, group = self.next_place()
             require(0 <= place < 64, "a quad outside its tile")
             x = place & 1 | place >> 1 & 2 | place >> 2 & 4
             y = place >> 1 & 1 | place >> 2 & 2 | place >> 3 & 4
-            is_first = group not in of_run
-            if is_first:
-                of_run[group] = Told(x, y, group, self.first)
-                self.planes.append(of_run[group])
+            if group in of_run:
+                quad = self.departed(of_run[group], x, y)
             else:
-                of_run[group].others += 1
-            self.records.append((x, y, mask, group, of_run[group], is_first))
+                told = of_run[group] = Told(x, y)
+                self.tell(told, self.earlier[group], last, left // 2 if self.regular else left)
+                last, quad = told.plane, told.quad
+            self.rows.append((x, y, mask, group, *quad))
             self.note(place, mask, group)
+        for group, told in of_run.items():
+            self.earlier[group].append(told.plane)
 
     def note(self, place, mask, group):
         same = not self.first and (place, mask) == (self.place, self.mask)
@@ -272,25 +274,19 @@ class Tile:
             mask ^= 15 ^ rest
         return place, mask, group
 
-    def tell_planes(self):
-        earlier = [[] for _ in range(16)]
-        last = None
-        for told in self.planes:
-            self.tell(told, earlier[told.group], None if told.starts_run else last)
-            last = told.plane
-
-    def tell(self, told, earlier, of_run):
+    def tell(self, told, earlier, of_run, likely_others):
         bits, codes, x, y = self.bits, self.codes, told.x, told.y
         back = bits.power(codes["parent"][0]) - 1
-        require(back <= len(earlier), "a plane that is not there")
-        parent = Plane() if back == len(earlier) else earlier[-1 - back]
+        counted = min(len(earlier), 64)
+        require(back <= counted, "a plane that is not there")
+        parent = Plane() if back == counted else earlier[-1 - back]
         width, left = 0, []
         for i in range(4):
             width += unzigzag(bits.symbol(codes["first"][i]))
             left.append(bits.pair(width))
         mode = level = 0
-        if told.others:
-            context = min((told.others + 1).bit_length() - 2, 3)
+        if likely_others:
+            context = min((likely_others + 1).bit_length() - 2, 3)
             mode, level = divmod(bits.symbol(codes["level"][context]), 8)
         by = [[0, 0]] * 4
         if level:
@@ -314,39 +310,32 @@ class Tile:
         plane.start = [uv[k] + by[0][k] * 0.25 for k in range(2)]
         plane.right = [dx[k] * (1.0 + p) + by[1][k] * unit for k in range(2)]
         plane.down = [dy[k] * (1.0 + q) + by[2][k] * unit for k in range(2)]
-        earlier.append(plane)
         told.plane, told.quad = plane, (uv, dx, dy, cross)
         told.mode, told.noise, told.context = mode, 2 if level else 3, Context(x, y)
 
-    def rows(self):
-        later = [[record, []] for record in self.records if not record[5]]
-        for record, pairs in later:
-            told = record[4]
-            z = self.bits.symbol(self.codes["sizes"][6 * told.mode + told.noise])
-            if z == ESCAPE_SIZES:
-                classes = [self.bits.take(3) for _ in range(4)]
-                require(max(classes) <= 4, "a class")
-            else:
-                classes = [z // 5**i % 5 for i in range(4)]
-            told.noise = NOISE[sum(SIZES[each] for each in classes)]
-            pairs.extend(classes)
-        for _, pairs in later:
-            for i, each in enumerate(pairs):
-                if each < 4:
-                    pairs[i] = SMALL[each][self.bits.take(NUMBER_BITS[each])] if each else [0, 0]
-        for _, pairs in later:
-            for i, each in enumerate(pairs):
+    def residuals(self, told):
+        """Pairs of dx, dy, cross and uv."""
+        bits = self.back
+        z = bits.symbol(self.codes["sizes"][6 * told.mode + told.noise])
+        if z == ESCAPE_SIZES:
+            classes = [bits.take(3) for _ in range(4)]
+            require(max(classes) <= 4, "a class")
+        else:
+            classes = [z // 5**i % 5 for i in range(4)]
+        told.noise = NOISE[sum(SIZES[each] for each in classes)]
+        pairs = [[0, 0] for _ in range(4)]
+        for i, each in enumerate(classes):
+            if each in (1, 2, 3):
+                pairs[i] = SMALL[each][bits.take(NUMBER_BITS[each])]
+        if 4 in classes:
+            width = bits.symbol(self.codes["later"][0])
+            for i, each in enumerate(classes):
                 if each == 4:
-                    pairs[i] = self.bits.pair(self.bits.symbol(self.codes["later"][0]))
-        later = iter(later)
-        rows = []
-        for x, y, mask, group, told, is_first in self.records:
-            quad = told.quad if is_first else self.departed(told, x, y, next(later)[1])
-            rows.append((x, y, mask, group, *quad))
-        return rows
+                    pairs[i] = bits.pair(width)
+        return pairs
 
-    def departed(self, told, x, y, pairs):
-        dx, dy, cross, uv = pairs
+    def departed(self, told, x, y):
+        dx, dy, cross, uv = self.residuals(told)
         departure = [uv, dx, dy, cross]
         if told.mode == 1:
             cross = [cross[i] + uv[i] - dx[i] - dy[i] for i in range(2)]
@@ -370,12 +359,14 @@ def decode_planes(data, runs, records, codes):
         if head & 1:
             draw = bits.gamma() - 1
         count = bits.power(codes["count"][0])
-        require(len(tile.records) + count <= records, "records of a run")
+        require(len(tile.rows) + count <= records, "records of a run")
         heads.append((primitive, draw, count))
         following = primitive + 1
         tile.run(draw, count)
-    require(len(tile.records) == records, "records of the runs")
-    tile.tell_planes()
-    rows = tile.rows()
-    require(bits.left < 8 and not bits.number, "bits after the last record")
-    return heads, rows
+    require(len(tile.rows) == records, "records of the runs")
+    read = 0
+    for each in (bits, tile.back):
+        read += tile.bytes - each.left // 8
+        require(not each.number & (1 << each.left % 8) - 1, "bits after the last record")
+    require(read == tile.bytes, "bytes between front and back")
+    return heads, tile.rows

@@ -51,38 +51,63 @@ impl BitWriter {
     }
 }
 
-/// Reads bits from bytes that end with padding.
+/// Reads bits from bytes; `BACK`: from the last byte to the first.
 #[derive(Clone, Copy)]
-pub(in crate::textrace) struct BitReader<'a> {
+pub(in crate::textrace) struct BitReader<'a, const BACK: bool = false> {
     bytes: &'a [u8],
     bit: usize,
 }
 
 impl<'a> BitReader<'a> {
-    pub(in crate::textrace) fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, bit: 0 }
-    }
-
-    /// The next bits, at least [`PEEK_BITS`] of them; `None` at the end.
+    /// The next bits, at least [`PEEK_BITS`] of them, of bytes that end with padding; `None` at the end.
     #[inline(always)]
     pub(in crate::textrace) fn peek(&self) -> Option<u64> {
         let word = self.bytes.get(self.bit >> 3..)?.first_chunk::<8>()?;
         Some(u64::from_le_bytes(*word) >> (self.bit & 7))
     }
 
-    /// The next bits, zeros after the last one, for bytes without padding; `None` where bits were
+    /// The bytes that no read bit lies in.
+    pub(in crate::textrace) fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.bytes_read()..).unwrap_or_default()
+    }
+}
+
+impl<'a, const BACK: bool> BitReader<'a, BACK> {
+    pub(in crate::textrace) fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, bit: 0 }
+    }
+
+    /// The next bits, at least [`PEEK_BITS`] of them, zeros after the last one; `None` where bits were
     /// read that are not there.
     #[inline(always)]
     pub(in crate::textrace) fn peek_unpadded(&self) -> Option<u64> {
-        self.peek().or_else(|| self.peek_tail())
+        self.whole_word().or_else(|| self.peek_tail())
+    }
+
+    #[inline(always)]
+    fn whole_word(&self) -> Option<u64> {
+        let at = self.bit >> 3;
+        let word = if BACK {
+            let end = self.bytes.len().checked_sub(at)?;
+            u64::from_be_bytes(*self.bytes.get(..end)?.last_chunk::<8>()?)
+        } else {
+            u64::from_le_bytes(*self.bytes.get(at..)?.first_chunk::<8>()?)
+        };
+        Some(word >> (self.bit & 7))
     }
 
     #[cold]
     #[inline(never)]
     fn peek_tail(&self) -> Option<u64> {
         let mut word = [0; 8];
-        let left = self.bytes.get(self.bit >> 3..)?;
-        word.iter_mut().zip(left).for_each(|(to, from)| *to = *from);
+        let at = self.bit >> 3;
+        if BACK {
+            let left = self.bytes.iter().rev().skip(at);
+            word.iter_mut().zip(left).for_each(|(to, from)| *to = *from);
+        } else {
+            let left = self.bytes.iter().skip(at);
+            word.iter_mut().zip(left).for_each(|(to, from)| *to = *from);
+        }
         (self.bit <= self.bytes.len() * 8).then(|| u64::from_le_bytes(word) >> (self.bit & 7))
     }
 
@@ -93,21 +118,20 @@ impl<'a> BitReader<'a> {
 
     /// The bits between the last one read and the end of its byte.
     pub(in crate::textrace) fn left_in_byte(&self) -> u8 {
-        let byte = self.bytes.get(self.bit >> 3).copied().unwrap_or_default();
-        if self.bit & 7 == 0 {
-            0
+        let at = self.bit >> 3;
+        let byte = if BACK {
+            self.bytes.iter().rev().nth(at)
         } else {
-            byte >> (self.bit & 7)
+            self.bytes.get(at)
+        };
+        match self.bit & 7 {
+            0 => 0,
+            read => byte.copied().unwrap_or_default() >> read,
         }
     }
 
-    /// Bits were read that are not there.
-    pub(in crate::textrace) fn overrun(&self) -> bool {
-        self.bit > self.bytes.len() * 8
-    }
-
-    /// The bytes that no read bit lies in.
-    pub(in crate::textrace) fn rest(&self) -> &'a [u8] {
-        self.bytes.get(self.bit.div_ceil(8)..).unwrap_or_default()
+    /// Bytes of which at least a bit was read, some of them perhaps beyond the end.
+    pub(in crate::textrace) fn bytes_read(&self) -> usize {
+        self.bit.div_ceil(8)
     }
 }

@@ -75,12 +75,36 @@ impl Code {
     }
 }
 
+/// Codes of which a context chooses one.
+pub(super) struct Family {
+    pub codes: Vec<Code>,
+    /// [`Code::by_bits`] of each, one after the other.
+    by_bits: Vec<u16>,
+}
+
+impl Family {
+    fn new(codes: Vec<Code>) -> Self {
+        let by_bits = codes.iter().flat_map(|code| code.by_bits).collect();
+        Self { codes, by_bits }
+    }
+
+    /// Symbol and length of the code that the bits start with; (0, 0) where the context has no code.
+    #[inline(always)]
+    pub fn decode(&self, context: usize, bits: u64) -> (u32, u32) {
+        #[allow(clippy::cast_possible_truncation, reason = "less than ENTRIES")]
+        let low = (bits & (ENTRIES as u64 - 1)) as usize;
+        let entry = self.by_bits.get(context << MOST_BITS | low);
+        let entry = entry.copied().unwrap_or_default();
+        (u32::from(entry >> 4), u32::from(entry & 15))
+    }
+}
+
 /// All codes.
 pub(super) struct Codes {
-    /// Step and mask, by [`super::places::Places::context`].
-    pub place: [Code; 17],
-    /// Classes of a quad's residuals, by mode and by those of the group's last quad in the run.
-    pub sizes: [Code; NOISES * Mode::ALL.len()],
+    /// Step and mask, by [`super::places::Last::context`].
+    pub place: Family,
+    /// Classes of a quad's residuals, by [`sizes_context`].
+    pub sizes: Family,
     /// Widths of a first quad's dx, dy, cross and uv.
     pub first: [Code; 4],
     /// Widths of what no class holds.
@@ -99,18 +123,22 @@ pub(super) struct Codes {
     pub start: Code,
 }
 
+/// Codes of step and mask.
+const PLACES: usize = 17;
+/// Codes of classes.
+const SIZES: usize = NOISES * Mode::ALL.len();
 /// Number of codes.
-pub(super) const CODES: usize = 17 + NOISES * Mode::ALL.len() + 4 + 1 + 4 + 4 + 4;
+pub(super) const CODES: usize = PLACES + SIZES + 4 + 1 + 4 + 4 + 4;
+
+/// Which code tells the classes of a quad's residuals.
+#[inline(always)]
+pub(super) fn sizes_context(mode: Mode, noise: usize) -> usize {
+    mode as usize * NOISES + noise
+}
 
 static ALL: LazyLock<Codes> = LazyLock::new(|| Codes::new(&LENGTHS));
 
 impl Codes {
-    /// The code of the classes of a quad's residuals.
-    #[inline(always)]
-    pub fn sizes(&self, mode: Mode, noise: usize) -> Option<&Code> {
-        self.sizes.get(mode as usize * NOISES + noise)
-    }
-
     pub fn get() -> &'static Self {
         &ALL
     }
@@ -122,8 +150,8 @@ impl Codes {
             Code::new(number, lengths.as_ref())
         };
         Self {
-            place: from_fn(|_| next()),
-            sizes: from_fn(|_| next()),
+            place: Family::new((0..PLACES).map(|_| next()).collect()),
+            sizes: Family::new((0..SIZES).map(|_| next()).collect()),
             first: from_fn(|_| next()),
             later: next(),
             correction: from_fn(|_| next()),

@@ -1,7 +1,7 @@
 //! From records to bits, pass by pass as they are read.
 
 use super::GROUPS;
-use super::codes::{Code, Codes};
+use super::codes::{Code, Codes, sizes_context};
 use super::fit::fit;
 use super::mode::{Departure, Mode};
 use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
@@ -13,10 +13,6 @@ use super::residual::{
 use crate::textrace::bits::BitWriter;
 use crate::textrace::{QuadRecord, Tile, quad_morton};
 use crate::varint::{low_u32, zigzag};
-
-/// Most earlier runs that a first quad is compared with. More would be smaller by little and
-/// take longer.
-const MOST_PARENTS: usize = 64;
 
 /// What takes the encoder's output: bits, or counts of symbols.
 pub(super) trait Sink {
@@ -41,15 +37,6 @@ impl Sink for BitWriter {
     }
 }
 
-/// A group of a run.
-struct Told {
-    /// Index of its first record.
-    first: usize,
-    starts_run: bool,
-    /// Indices of its other records.
-    others: Vec<usize>,
-}
-
 /// A plane, and how its quads are told.
 #[derive(Clone, Copy)]
 struct Choice {
@@ -59,73 +46,55 @@ struct Choice {
     plane: Plane,
 }
 
-/// A record after the first one of its group in its run.
-struct Later {
-    record: usize,
-    /// Index of its plane.
-    told: usize,
-    classes: Classes,
-    pairs: [Classified; 4],
-    mode: Mode,
+/// A group of a run.
+struct Group {
+    departure: Departure,
+    plane: Plane,
+    /// Which code tells the classes of its next record.
+    noise: usize,
 }
 
-/// Writes a tile.
-pub(super) fn tile(tile: &Tile, codes: &Codes, sink: &mut impl Sink) {
-    let mut encoder = Encoder { sink, codes };
-    let told = encoder.places(tile);
-    let (mut later, noises) = encoder.planes(tile, &told);
-    later.sort_by_key(|later| later.record);
-    encoder.classes(noises, &later);
-    encoder.residuals(&later);
+/// Writes a tile: runs, places and planes to `front`, departures to `back`.
+pub(super) fn tile<S: Sink>(tile: &Tile, codes: &Codes, front: &mut S, back: &mut S) {
+    let mut encoder = Encoder { front, back, codes };
+    encoder.tile(tile);
 }
 
 struct Encoder<'a, S> {
-    sink: &'a mut S,
+    front: &'a mut S,
+    back: &'a mut S,
     codes: &'a Codes,
 }
 
 impl<'a, S: Sink> Encoder<'a, S> {
     /// A number from 1 on in Elias's gamma code.
     fn gamma(&mut self, number: u64) {
-        self.sink.bits(0, number.ilog2());
-        self.sink.bits(1, 1);
+        self.front.bits(0, number.ilog2());
+        self.front.bits(1, 1);
         self.below_power(number);
     }
 
     /// A number from 1 on: a code tells its highest bit.
     fn number(&mut self, code: &Code, number: u64) {
-        self.sink.symbol(code, number.ilog2(), 0);
+        self.front.symbol(code, number.ilog2(), 0);
         self.below_power(number);
     }
 
     /// The bits of a number below its highest one.
     fn below_power(&mut self, number: u64) {
         let power = number.ilog2();
-        self.sink.bits((number - (1 << power)) as u32, power);
+        self.front.bits((number - (1 << power)) as u32, power);
     }
 
-    fn pair(&mut self, code: &Code, pair: [i32; 2]) {
-        let width = width(pair);
-        self.sink.symbol(code, width, 0);
-        self.numbers(pair, width);
-    }
-
-    fn numbers(&mut self, pair: [i32; 2], width: u32) {
-        for number in pair {
-            self.sink.bits(fold(number), width);
-        }
-    }
-
-    /// Runs and places. Tells which groups each run has.
-    fn places(&mut self, tile: &Tile) -> Vec<Told> {
-        let mut all: Vec<Told> = vec![];
+    fn tile(&mut self, tile: &Tile) {
         let mut places = Places::new();
+        let mut lineage = Lineage::new();
         let mut next_primitive = 0;
         let mut draw = 0;
         for run in &tile.runs {
             let step = u64::from(run.primitive) + 1 - next_primitive;
             let changed = u32::from(run.draw != draw);
-            self.sink
+            self.front
                 .symbol(&self.codes.header, step.ilog2() << 1 | changed, 0);
             self.below_power(step);
             if run.draw != draw {
@@ -134,65 +103,63 @@ impl<'a, S: Sink> Encoder<'a, S> {
             }
             self.number(&self.codes.count, run.count.into());
             next_primitive = u64::from(run.primitive) + 1;
+            let records = &tile.records[run.first as usize..][..run.count as usize];
             places.start_run(run.draw);
             if places.tells_regular() {
-                let of_run = &tile.records[run.first as usize..][..run.count as usize];
-                let regular = places.is_regular(of_run.iter().map(place_of));
-                self.sink.bits(regular.into(), 1);
+                let regular = places.is_regular(records.iter().map(place_of));
+                self.front.bits(regular.into(), 1);
                 places.set_regular(regular);
             }
-            let mut told: [Option<usize>; GROUPS] = [None; GROUPS];
-            let first = run.first as usize;
-            for index in first..first + run.count as usize {
-                let record = &tile.records[index];
-                places.write(self.codes, place_of(record), self.sink);
-                match told[usize::from(record.group)] {
-                    Some(told) => all[told].others.push(index),
-                    None => {
-                        told[usize::from(record.group)] = Some(all.len());
-                        all.push(Told {
-                            first: index,
-                            starts_run: index == first,
-                            others: vec![],
-                        });
-                    }
-                }
-            }
+            self.run(records, &mut places, &mut lineage);
         }
-        all
     }
 
-    /// First quads and planes. Tells what the planes leave of the other quads, and which code tells the
-    /// classes of the first of them.
-    fn planes(&mut self, tile: &Tile, told: &[Told]) -> (Vec<Later>, Vec<usize>) {
-        let mut lineage = Lineage::new(told.iter().map(|told| tile.records[told.first].group));
-        let mut planes: Vec<Plane> = vec![];
-        let mut later = vec![];
-        let mut noises = vec![];
-        for (number, told) in told.iter().enumerate() {
-            let record = &tile.records[told.first];
-            let of_run = planes.last().copied().filter(|_| !told.starts_run);
-            let others: Vec<QuadRecord> = told.others.iter().map(|i| tile.records[*i]).collect();
-            let choice = self.first(record, &lineage, &planes, of_run, &others);
-            let mut departure = Departure::start(choice.mode, record.x, record.y);
-            for (index, record) in told.others.iter().zip(&others) {
-                let expected = choice.plane.predict(record.x, record.y);
-                let left = difference(&quad_of(record), &expected);
-                let residual = departure.write(record.x, record.y, &left);
-                let (classes, pairs) = classes(&residual);
-                later.push(Later {
-                    record: *index,
-                    told: number,
-                    classes,
-                    pairs,
-                    mode: choice.mode,
-                });
+    /// The records of a run.
+    fn run(&mut self, records: &[QuadRecord], places: &mut Places, lineage: &mut Lineage) {
+        let mut groups: [Option<Group>; GROUPS] = [const { None }; GROUPS];
+        let mut of_run = None;
+        for (at, record) in records.iter().enumerate() {
+            places.write(self.codes, place_of(record), self.front);
+            let group = &mut groups[usize::from(record.group)];
+            if let Some(group) = group {
+                self.later(record, group);
+                continue;
             }
-            planes.push(choice.plane);
-            lineage.note(record.group, number);
-            noises.push(first_noise(choice.level));
+            let after = &records[at + 1..];
+            let likely_others = places.share(after.len() as u32);
+            let choice = self.first(record, lineage, of_run, likely_others, after);
+            lineage.note(record.group, choice.plane);
+            of_run = Some(choice.plane);
+            *group = Some(Group {
+                departure: Departure::start(choice.mode, record.x, record.y),
+                plane: choice.plane,
+                noise: first_noise(choice.level),
+            });
         }
-        (later, noises)
+    }
+
+    /// A departure.
+    fn later(&mut self, record: &QuadRecord, group: &mut Group) {
+        let QuadRecord { x, y, .. } = *record;
+        let left = difference(&quad_of(record), &group.plane.predict(x, y));
+        let residual = group.departure.write(x, y, &left);
+        let (classes, pairs) = classes(&residual);
+        let code = self.sizes(group.departure.mode, group.noise);
+        if !self.back.symbol(code, classes.symbol(), ESCAPE_SIZES) {
+            for class in classes.each() {
+                self.back.bits(class, CLASS_NUMBER_BITS);
+            }
+        }
+        for (_, (class, index)) in pairs {
+            self.back.bits(index, class_bits(class));
+        }
+        if let Some(width) = wide_width(&pairs) {
+            self.back.symbol(&self.codes.later, width, 0);
+            for (pair, _) in pairs.iter().filter(is_wide) {
+                put_numbers(self.back, *pair, width);
+            }
+        }
+        group.noise = usize::from(classes.noise);
     }
 
     /// The first quad of a run in a group, and the plane for the others.
@@ -200,19 +167,15 @@ impl<'a, S: Sink> Encoder<'a, S> {
         &mut self,
         record: &QuadRecord,
         lineage: &Lineage,
-        planes: &[Plane],
         of_run: Option<Plane>,
-        others: &[QuadRecord],
+        likely_others: u32,
+        after: &[QuadRecord],
     ) -> Choice {
         let QuadRecord { x, y, group, .. } = *record;
         let quad = quad_of(record);
         let known = lineage.count(group);
-        let candidates = (0..known.min(MOST_PARENTS)).chain([known]);
-        let parents = candidates.filter_map(|back| {
-            let parent = match lineage.parent(group, back)? {
-                Some(index) => planes[index],
-                None => Plane::default(),
-            };
+        let parents = (0..=known).filter_map(|back| {
+            let parent = lineage.parent(group, back)?;
             let expected = Expected::new(&parent, of_run.as_ref(), x, y);
             let pairs = first_pairs(&quad, &expected);
             let power = (back as u64 + 1).ilog2();
@@ -225,21 +188,23 @@ impl<'a, S: Sink> Encoder<'a, S> {
         let mut before = 0;
         for (code, pair) in self.codes.first.iter().zip(pairs) {
             let width = width(pair);
-            self.sink.symbol(code, width_symbol(before, width), 0);
-            self.numbers(pair, width);
+            self.front.symbol(code, width_symbol(before, width), 0);
+            put_numbers(self.front, pair, width);
             before = width;
         }
         let tilt = tilt_of_run(of_run.is_some(), &quad, &expected);
         let plain = Plane::through(x, y, &quad, tilt);
-        let Some(context) = level_context(others.len() as u32) else {
+        let Some(context) = level_context(likely_others) else {
             return Choice::plain(plain);
         };
-        let choice = self.best_plane(&quad, plain, record, others, context);
+        let of_group = |other: &&QuadRecord| other.group == group;
+        let others: Vec<QuadRecord> = after.iter().filter(of_group).copied().collect();
+        let choice = self.best_plane(&quad, plain, record, &others, context);
         let symbol = (choice.mode as u32) << 3 | choice.level;
-        self.sink.symbol(&self.codes.level[context], symbol, 0);
+        self.front.symbol(&self.codes.level[context], symbol, 0);
         if choice.level > 0 {
             for (code, pair) in self.codes.correction.iter().zip(choice.correction) {
-                self.pair(code, pair);
+                put_pair(self.front, code, pair);
             }
         }
         choice
@@ -295,35 +260,8 @@ impl<'a, S: Sink> Encoder<'a, S> {
         best
     }
 
-    /// Classes of residuals.
-    fn classes(&mut self, mut noises: Vec<usize>, later: &[Later]) {
-        for later in later {
-            let at = &mut noises[later.told];
-            let (code, symbol) = (self.sizes(later.mode, *at), later.classes.symbol());
-            if !self.sink.symbol(code, symbol, ESCAPE_SIZES) {
-                for class in later.classes.each() {
-                    self.sink.bits(class, CLASS_NUMBER_BITS);
-                }
-            }
-            *at = usize::from(later.classes.noise);
-        }
-    }
-
-    /// Residuals: first those of few bits, then the wide ones.
-    fn residuals(&mut self, later: &[Later]) {
-        for (_, (class, index)) in later.iter().flat_map(|later| later.pairs) {
-            self.sink.bits(index, class_bits(class));
-        }
-        for (pair, (class, _)) in later.iter().flat_map(|later| later.pairs) {
-            if class == WIDE {
-                self.pair(&self.codes.later, pair);
-            }
-        }
-    }
-
     fn sizes(&self, mode: Mode, noise: usize) -> &'a Code {
-        let code = self.codes.sizes(mode, noise);
-        code.expect("a code for each mode and noise")
+        &self.codes.sizes.codes[sizes_context(mode, noise)]
     }
 
     /// Bits of some records' residuals.
@@ -344,13 +282,13 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 classes.symbol(),
                 code.length(ESCAPE_SIZES, 0) + 4 * CLASS_NUMBER_BITS,
             );
-            for (pair, (class, _)) in pairs {
-                bits += if class == WIDE {
-                    let width = width(pair);
-                    self.codes.later.length(width, 0) + 2 * width
-                } else {
-                    class_bits(class)
-                };
+            bits += pairs
+                .map(|(_, (class, _))| class_bits(class))
+                .iter()
+                .sum::<u32>();
+            if let Some(width) = wide_width(&pairs) {
+                let wide = pairs.iter().filter(is_wide).count() as u32;
+                bits += self.codes.later.length(width, 0) + 2 * width * wide;
             }
             at = usize::from(classes.noise);
         }
@@ -396,6 +334,18 @@ fn place_of(record: &QuadRecord) -> Place {
     }
 }
 
+fn put_pair(sink: &mut impl Sink, code: &Code, pair: [i32; 2]) {
+    let width = width(pair);
+    sink.symbol(code, width, 0);
+    put_numbers(sink, pair, width);
+}
+
+fn put_numbers(sink: &mut impl Sink, pair: [i32; 2], width: u32) {
+    for number in pair {
+        sink.bits(fold(number), width);
+    }
+}
+
 /// The symbol of a width after another.
 fn width_symbol(before: u32, width: u32) -> u32 {
     low_u32(zigzag(i64::from(width) - i64::from(before)))
@@ -416,6 +366,19 @@ fn first_pairs(quad: &Quad, expected: &Expected) -> [[i32; 2]; 4] {
 
 /// A pair, its class and the bits that name it in the class.
 type Classified = ([i32; 2], (u32, u32));
+
+fn is_wide((_, (class, _)): &&Classified) -> bool {
+    *class == WIDE
+}
+
+/// Bits that the largest number of the wide pairs needs; `None` where no pair is wide.
+fn wide_width(pairs: &[Classified; 4]) -> Option<u32> {
+    pairs
+        .iter()
+        .filter(is_wide)
+        .map(|(pair, _)| width(*pair))
+        .max()
+}
 
 /// Residuals in the order in which they are written, dx, dy, cross, uv, with their classes; the
 /// classes as one number, too.

@@ -7,9 +7,9 @@
 //! Sizes of residuals, and steps and masks ([`places`]), are told by prefix codes with fixed lengths
 //! ([`lengths`]).
 //!
-//! A tile is written kind by kind: all places, all planes, all classes of residuals, all small
-//! residuals, all wide ones. The encoder fits the planes to the exact records ([`fit`]); a decoder does
-//! not need to know how.
+//! A tile is written run by run, from both ends: runs, places and planes from the front, residuals from
+//! the back. So a decoder has two chains of codes that do not wait for each other. The encoder fits the
+//! planes to the exact records ([`fit`]); a decoder does not need to know how.
 
 mod codes;
 mod decode;
@@ -39,9 +39,11 @@ const SHORT: &str = "more bits";
 
 pub(super) fn encode(tile: &Tile) -> Vec<u8> {
     let bytes = Vec::with_capacity(tile.records.len() * 4 + tile.runs.len() * 16 + 16);
-    let mut bits = BitWriter::new(bytes);
-    encode::tile(tile, Codes::get(), &mut bits);
-    bits.finish_unpadded()
+    let (mut front, mut back) = (BitWriter::new(bytes), BitWriter::new(vec![]));
+    encode::tile(tile, Codes::get(), &mut front, &mut back);
+    let mut bytes = front.finish_unpadded();
+    bytes.extend(back.finish_unpadded().iter().rev());
+    bytes
 }
 
 pub(super) fn decode<'a>(
@@ -52,24 +54,27 @@ pub(super) fn decode<'a>(
 ) -> Parsed<'a, ()> {
     let mut decoder = Decoder::new(input);
     let outcome = decoder.tile(runs, records, tile);
-    let bits = decoder.bits();
-    let rest = bits.rest();
+    let (front, back) = decoder.readers();
+    let rest = front.rest();
     outcome.map_err(|expected| {
         let found = format_args!("{} bytes left", rest.len());
         nom::Err::Failure(Fault::new(rest, expected, found))
     })?;
+    let read = front.bytes_read() + back.bytes_read();
     ensure(
         rest,
-        bits.left_in_byte() == 0,
-        || "zero bits after the last record".to_owned(),
-        format_args!("{:#b}", bits.left_in_byte()),
+        read == input.len(),
+        || format!("{read} bytes, from the front and from the back"),
+        format_args!("{}", input.len()),
     )?;
-    ensure(
-        rest,
-        rest.is_empty(),
-        || "no bytes after the last record".to_owned(),
-        format_args!("{}", rest.len()),
-    )?;
+    for left in [front.left_in_byte(), back.left_in_byte()] {
+        ensure(
+            rest,
+            left == 0,
+            || "zero bits after the last record".to_owned(),
+            format_args!("{left:#b}"),
+        )?;
+    }
     Ok((&[], ()))
 }
 

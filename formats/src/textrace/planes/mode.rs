@@ -76,7 +76,7 @@ impl Departure {
                 };
                 let uv = plus(self.last.uv(x, y, &now), uv);
                 self.last.learn(x, y, uv, now, true);
-                [uv, now.dx, now.dy, now.cross].map(|pair| pair.map(|number| number.0))
+                [plain(uv), plain(now.dx), plain(now.dy), plain(now.cross)]
             }
         }
     }
@@ -93,11 +93,10 @@ impl Departure {
             Mode::Bending | Mode::Following => {
                 let (x, y) = (x.into(), y.into());
                 let guess = self.guess(x, y);
-                let [as_uv, dx, dy, cross] = quad.map(|pair| pair.map(Wrapping));
+                let [as_uv, dx, dy, cross] = quad.map(|[u, v]| [Wrapping(u), Wrapping(v)]);
                 let now = Derivatives { dx, dy, cross };
                 let guess_uv = self.last.uv(x, y, &now);
                 self.last.learn(x, y, as_uv, now, true);
-                let plain = |pair: [Wrapping<i32>; 2]| pair.map(|number| number.0);
                 [
                     minus(uv, plain(guess_uv)),
                     minus(plain(dx), plain(guess.dx)),
@@ -112,6 +111,11 @@ impl Departure {
 #[inline(always)]
 fn plus([a, b]: [Wrapping<i32>; 2], [c, d]: Pair) -> [Wrapping<i32>; 2] {
     [a + Wrapping(c), b + Wrapping(d)]
+}
+
+#[inline(always)]
+fn plain([u, v]: [Wrapping<i32>; 2]) -> Pair {
+    [u.0, v.0]
 }
 
 #[inline(always)]

@@ -4,11 +4,12 @@
 
 use super::GROUPS;
 use super::plane::{Plane, Quad, cross, tilt_of};
+use crate::varint::low_u32;
 
-/// Which code tells the level of a plane's corrections, by the records after the first one of its
-/// group in its run; `None` where there are none.
-pub(super) fn level_context(others: u32) -> Option<usize> {
-    match others {
+/// Which code tells the level of a plane's corrections, by how many records of its group are likely to
+/// follow in the run; `None` where none are.
+pub(super) fn level_context(likely_others: u32) -> Option<usize> {
+    match likely_others {
         0 => None,
         1 | 2 => Some(0),
         3..=6 => Some(1),
@@ -22,60 +23,60 @@ pub(super) fn first_noise(level: u32) -> usize {
     if level == 0 { 3 } else { 2 }
 }
 
-/// The planes so far, by group.
+/// Most planes of a group that can be a parent. More would be smaller by little and take longer.
+const MOST_PARENTS: usize = 64;
+
+/// The planes so far, and the last ones of each group.
 pub(super) struct Lineage {
-    /// Places in `planes`: where each group's start, and how many it has.
-    groups: [(usize, usize); GROUPS],
-    /// Indices of planes, those of a group side by side.
-    planes: Vec<usize>,
+    planes: Vec<Plane>,
+    /// Indices in `planes` by group: of its n-th plane at n modulo [`MOST_PARENTS`].
+    last: [[u32; MOST_PARENTS]; GROUPS],
+    /// Planes of each group.
+    counts: [usize; GROUPS],
 }
 
 impl Lineage {
-    /// For planes of these groups.
-    pub fn new(groups: impl Iterator<Item = u8> + Clone) -> Self {
-        let mut counts = [0usize; GROUPS];
-        let mut all = 0;
-        for group in groups {
-            all += 1;
-            if let Some(count) = counts.get_mut(usize::from(group) % GROUPS) {
-                *count += 1;
-            }
-        }
-        let mut next = 0;
+    pub fn new() -> Self {
         Self {
-            groups: counts.map(|count| {
-                next += count;
-                (next - count, 0)
-            }),
-            planes: vec![0; all],
+            planes: vec![],
+            last: [[0; MOST_PARENTS]; GROUPS],
+            counts: [0; GROUPS],
         }
     }
 
-    /// Planes of a group so far.
+    /// Planes of a group that can be a parent.
+    #[inline(always)]
     pub fn count(&self, group: u8) -> usize {
-        let of = self.groups.get(usize::from(group) % GROUPS);
-        of.map_or(0, |(_, count)| *count)
+        let count = self.counts.get(usize::from(group) % GROUPS);
+        count.copied().unwrap_or_default().min(MOST_PARENTS)
     }
 
-    /// Index of the plane that is `back` planes of the group before the last one; past all there is
-    /// a plane of zeros (`Some(None)`).
-    pub fn parent(&self, group: u8, back: usize) -> Option<Option<usize>> {
-        let (first, count) = *self.groups.get(usize::from(group) % GROUPS)?;
-        if back == count {
-            return Some(None);
+    /// The plane that is `back` planes of the group before the last one; past all that can be a parent
+    /// a plane of zeros, then none.
+    #[inline(always)]
+    pub fn parent(&self, group: u8, back: usize) -> Option<Plane> {
+        let group = usize::from(group) % GROUPS;
+        let count = *self.counts.get(group)?;
+        let can_be = count.min(MOST_PARENTS);
+        if back >= can_be {
+            return (back == can_be).then(Plane::default);
         }
-        let at = first + count.checked_sub(back + 1)?;
-        Some(Some(self.planes.get(at).copied()?))
+        let slot = (count - 1 - back) % MOST_PARENTS;
+        let index = *self.last.get(group)?.get(slot)?;
+        self.planes.get(index as usize).copied()
     }
 
     /// Takes in a plane.
-    pub fn note(&mut self, group: u8, index: usize) {
-        if let Some((first, count)) = self.groups.get_mut(usize::from(group) % GROUPS) {
-            if let Some(place) = self.planes.get_mut(*first + *count) {
-                *place = index;
+    #[inline(always)]
+    pub fn note(&mut self, group: u8, plane: Plane) {
+        let group = usize::from(group) % GROUPS;
+        if let Some((last, count)) = self.last.get_mut(group).zip(self.counts.get_mut(group)) {
+            if let Some(slot) = last.get_mut(*count % MOST_PARENTS) {
+                *slot = low_u32(self.planes.len() as u64);
             }
             *count += 1;
         }
+        self.planes.push(plane);
     }
 }
 

@@ -2,9 +2,10 @@
 //! to record, in both directions alike.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
+use super::GROUPS;
 use super::codes::Codes;
 use super::encode::Sink;
-use super::{GROUPS, SHORT};
+use crate::textrace::{QuadRecord, quad_morton};
 use crate::varint::low_u32;
 
 /// Steps along the curve that have symbols, 1 to this; the last one stands for all from here on,
@@ -23,6 +24,24 @@ pub(super) struct Place {
     pub group: u8,
 }
 
+impl Place {
+    /// A record there, its numbers unknown.
+    #[inline(always)]
+    pub fn record(self) -> QuadRecord {
+        let (x, y) = POSITIONS
+            .get(self.morton as usize & 63)
+            .copied()
+            .unwrap_or_default();
+        QuadRecord {
+            x,
+            y,
+            mask: self.mask,
+            group: self.group,
+            ..QuadRecord::default()
+        }
+    }
+}
+
 /// What came after a group's record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Follow {
@@ -35,7 +54,7 @@ struct Follow {
 #[derive(Clone, Copy)]
 pub(super) struct Last {
     /// The run's last record; before the first one 0, 0 and the last run's group.
-    place: Place,
+    pub place: Place,
     /// Its mask was the likeliest one.
     likeliest: bool,
     /// It came right after the one before it on the curve.
@@ -54,9 +73,15 @@ impl Last {
         if self.first_of_run {
             16
         } else {
-            let corner = usize::from(self.place.morton.to_le_bytes()[0] & 3);
-            corner << 2 | usize::from(self.likeliest) << 1 | usize::from(self.stepped_one)
+            self.later_context()
         }
+    }
+
+    /// The same after a run's first record.
+    #[inline(always)]
+    fn later_context(&self) -> usize {
+        let corner = usize::from(self.place.morton.to_le_bytes()[0] & 3);
+        corner << 2 | usize::from(self.likeliest) << 1 | usize::from(self.stepped_one)
     }
 }
 
@@ -112,6 +137,12 @@ impl Places {
     /// Sets whether the run is regular.
     pub fn set_regular(&mut self, regular: bool) {
         self.last.regular = regular;
+    }
+
+    /// How many of the records left in the run are likely to be of a group: half of them where groups
+    /// take turns.
+    pub fn share(&self, left_in_run: u32) -> u32 {
+        left_in_run >> u32::from(self.last.regular)
     }
 
     /// A run of these records, which starts now, is regular.
@@ -189,6 +220,53 @@ impl Places {
         last.first_of_run = false;
     }
 
+    /// Where groups take turns in the same quads, two by two, and the last record ended a quad: the group
+    /// of each quad's first record. Where the last record's group follows itself in other quads: that
+    /// group. Then [`Self::read_next_quad`] can read what comes next.
+    #[inline(always)]
+    pub fn starts_next_quad(&self, last: &Last) -> Option<u8> {
+        let group = last.place.group;
+        let next = self.follow(group);
+        let after = self.follow(next.group);
+        let alone = !next.same_quad & (next.group == group);
+        let in_pairs = !next.same_quad & last.regular & after.same_quad & (after.group == group);
+        (alone | in_pairs).then_some(next.group)
+    }
+
+    /// The next quad, if another one is expected: nothing but step and mask; nothing is to be remembered of
+    /// groups. `None` where it is told otherwise and [`Self::read`] must read it.
+    #[inline(always)]
+    pub fn read_next_quad(
+        &mut self,
+        last: &mut Last,
+        codes: &Codes,
+        bits: u64,
+    ) -> Result<Option<(Place, u32)>, &'static str> {
+        let (symbol, length) = codes.place.decode(last.later_context(), bits);
+        let far = symbol >= (STEPS - 1) << 4;
+        let step = if far {
+            low_u32(bits >> length & 63)
+        } else {
+            1 + (symbol >> 4)
+        };
+        if (symbol == ESCAPE_PLACE) | (step == 0) {
+            return Ok(None);
+        }
+        let morton = last.place.morton + step;
+        if morton > 63 {
+            return Err(OUTSIDE);
+        }
+        let mask = (symbol & 15).to_le_bytes()[0];
+        last.likeliest = mask == 15;
+        last.stepped_one = step == 1;
+        last.place.morton = morton;
+        last.place.mask = self.swap_mask(morton, mask);
+        if let Some(covered) = self.covered.get_mut(morton as usize & 63) {
+            *covered |= last.place.mask;
+        }
+        Ok(Some((last.place, length + if far { 6 } else { 0 })))
+    }
+
     /// The next record after `last`, from at least 57 bits; and how many of them tell it.
     #[inline(always)]
     pub fn read(
@@ -216,8 +294,7 @@ impl Places {
             }
         }
         bits >>= used;
-        let code = codes.place.get(last.context()).ok_or(SHORT)?;
-        let (symbol, length) = code.decode(bits);
+        let (symbol, length) = codes.place.decode(last.context(), bits);
         used += length;
         bits >>= length;
         if symbol == ESCAPE_PLACE {
@@ -285,7 +362,7 @@ impl Places {
             }
         }
         #[allow(clippy::indexing_slicing, reason = "the context is one of 17")]
-        let code = &codes.place[last.context()];
+        let code = &codes.place.codes[last.context()];
         let swapped = self.swap_mask(place.morton, place.mask);
         let symbol = if place.group == follow.group && step > 0 {
             (step.min(STEPS) - 1) << 4 | u32::from(swapped)
@@ -302,6 +379,24 @@ impl Places {
         }
     }
 }
+
+/// Column and row of each place on the Morton curve.
+const POSITIONS: [(u8, u8); 64] = {
+    let mut positions = [(0, 0); 64];
+    let mut y = 0;
+    while y < 8 {
+        let mut x = 0;
+        while x < 8 {
+            #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+            {
+                positions[quad_morton(x, y) as usize] = (x, y);
+            }
+            x += 1;
+        }
+        y += 1;
+    }
+    positions
+};
 
 fn follow_themselves() -> [Follow; GROUPS] {
     let mut group = 0;

@@ -76,34 +76,37 @@ impl Plane {
     }
 
     /// The plane through a quad's own numbers, with a slope of w.
+    #[inline]
     pub fn through(x: u8, y: u8, quad: &Quad, tilt: [f64; 2]) -> Self {
-        let [uv, dx, dy, _] = quad.map(|pair| pair.map(f64::from));
+        let [uv, dx, dy, _] = *quad;
+        let (uv, dx, dy) = (floats(uv), floats(dx), floats(dy));
         let [p, q] = tilt;
         Self {
             origin: [f64::from(2 * x), f64::from(2 * y)],
             start: uv,
-            slopes: [dx.map(|d| d * (1.0 + p)), dy.map(|d| d * (1.0 + q))],
+            slopes: [times(dx, 1.0 + p), times(dy, 1.0 + q)],
             tilt,
         }
     }
 
     /// The plane with slopes of w, slopes and start changed by a correction in the units of `level`.
+    #[inline]
     pub fn corrected(x: u8, y: u8, quad: &Quad, tilt: [f64; 2], level: u32, by: &Quad) -> Self {
-        let [start, right, down, change] = by.map(|pair| pair.map(f64::from));
+        let [start, right, down, change] = *by;
+        let (start, right, down) = (floats(start), floats(right), floats(down));
         let units = Units::new(level, quad);
-        let ([p, q], [dp, dq]) = (tilt, change);
+        let ([p, q], [dp, dq]) = (tilt, floats(change));
         let tilt = [
             within_one(p + dp * units.tilt),
             within_one(q + dq * units.tilt),
         ];
         let mut plane = Self::through(x, y, quad, tilt);
-        let add = |to: &mut [f64; 2], by: [f64; 2], unit: f64| {
-            to.iter_mut().zip(by).for_each(|(to, by)| *to += by * unit);
-        };
-        let [of_right, of_down] = &mut plane.slopes;
-        add(of_right, right, units.slope);
-        add(of_down, down, units.slope);
-        add(&mut plane.start, start, units.start);
+        let [of_right, of_down] = plane.slopes;
+        plane.slopes = [
+            plus(of_right, times(right, units.slope)),
+            plus(of_down, times(down, units.slope)),
+        ];
+        plane.start = plus(plane.start, times(start, units.start));
         plane
     }
 }
@@ -119,11 +122,12 @@ pub(super) struct Units {
 impl Units {
     /// The finer, the higher the level; slopes of w the finer, too, the larger dx and dy are.
     pub fn new(level: u32, quad: &Quad) -> Self {
-        let [_, dx, dy, _] = quad;
-        let largest = dx
-            .iter()
-            .chain(dy)
-            .fold(0, |most, d| d.unsigned_abs().max(most));
+        let [_, [a, b], [c, d], _] = *quad;
+        let (ab, cd) = (
+            a.unsigned_abs().max(b.unsigned_abs()),
+            c.unsigned_abs().max(d.unsigned_abs()),
+        );
+        let largest = ab.max(cd);
         Self {
             start: 0.25,
             slope: power(level),
@@ -151,7 +155,8 @@ pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f64; 2]) -> [i32; 2] {
 /// `-(dx * q + dy * p) / (1 + p + q)` for u and for v, so least squares with a prior.
 #[inline]
 pub(super) fn tilt_of(quad: &Quad, expected: [f64; 2]) -> [f64; 2] {
-    let [_, dx, dy, cross] = quad.map(|pair| pair.map(f64::from));
+    let [_, dx, dy, cross] = *quad;
+    let (dx, dy, cross) = (floats(dx), floats(dy), floats(cross));
     let [p, q] = expected;
     let ([dx_u, dx_v], [dy_u, dy_v], [c_u, c_v]) = (dx, dy, cross);
     let (a_u, b_u, a_v, b_v) = (c_u + dy_u, c_u + dx_u, c_v + dy_v, c_v + dx_v);
@@ -167,6 +172,12 @@ pub(super) fn tilt_of(quad: &Quad, expected: [f64; 2]) -> [f64; 2] {
         within_one(p + ((bb + PRIOR) * ae - ab * be) / determinant),
         within_one(q + ((aa + PRIOR) * be - ab * ae) / determinant),
     ]
+}
+
+/// Not `map`, which is not always inlined.
+#[inline(always)]
+fn floats([a, b]: [i32; 2]) -> [f64; 2] {
+    [a.into(), b.into()]
 }
 
 #[inline]

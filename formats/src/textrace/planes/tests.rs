@@ -171,11 +171,14 @@ fn the_documented_lengths_are_the_codes() {
 #[test]
 fn symbols_come_back_from_their_bits() {
     let codes = Codes::get();
-    for code in codes.place.iter().chain(&codes.sizes).chain(&codes.level) {
-        for symbol in 0..=ESCAPE_SIZES {
-            if let Some((bits, length)) = code.encode(symbol) {
-                let noise = u64::from(bits) | 0xffff << length;
-                assert_eq!(code.decode(noise), (symbol, length));
+    for family in [&codes.place, &codes.sizes] {
+        for (context, code) in family.codes.iter().enumerate() {
+            for symbol in 0..=ESCAPE_SIZES {
+                if let Some((bits, length)) = code.encode(symbol) {
+                    let noise = u64::from(bits) | 0xffff << length;
+                    assert_eq!(family.decode(context, noise), (symbol, length));
+                    assert_eq!(code.decode(noise), (symbol, length));
+                }
             }
         }
     }

@@ -16,12 +16,31 @@ use crate::textrace::{Textrace, Tile};
 use std::path::Path;
 
 /// Counts what an encoder would write.
-#[derive(Default)]
 struct Counts {
     by_code: Vec<Vec<u64>>,
     /// Bits by code: of its symbols and of the numbers after them.
     bits: Vec<[u64; 2]>,
     last: usize,
+}
+
+impl Counts {
+    /// For codes of these lengths.
+    fn new(texts: &[String]) -> Self {
+        Self {
+            by_code: texts.iter().map(|l| vec![0; l.len()]).collect(),
+            bits: vec![[0; 2]; CODES],
+            last: 0,
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        let sums = self.by_code.iter_mut().flatten();
+        sums.zip(other.by_code.iter().flatten())
+            .for_each(|(sum, count)| *sum += count);
+        let sums = self.bits.iter_mut().flatten();
+        sums.zip(other.bits.iter().flatten())
+            .for_each(|(sum, count)| *sum += count);
+    }
 }
 
 impl Sink for Counts {
@@ -80,11 +99,7 @@ fn train() {
         let codes = Codes::new(texts.as_slice().try_into().unwrap());
         let mut sums = vec![];
         for trace in &traces {
-            let mut counts = Counts {
-                by_code: texts.iter().map(|l| vec![0; l.len()]).collect(),
-                bits: vec![[0; 2]; CODES],
-                last: 0,
-            };
+            let mut counts = Counts::new(&texts);
             let mut tile = Tile::default();
             let mut records = 0;
             for (pass, info) in trace.tables().passes.iter().enumerate() {
@@ -92,7 +107,9 @@ fn train() {
                     trace.decode_tile(pass, index, &mut tile).unwrap();
                     records += tile.records.len();
                     counts.last = CODES - 1;
-                    encode::tile(&tile, &codes, &mut counts);
+                    let mut back = Counts::new(&texts);
+                    encode::tile(&tile, &codes, &mut counts, &mut back);
+                    counts.add(&back);
                 }
             }
             let by_code: Vec<String> = counts
