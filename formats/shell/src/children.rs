@@ -25,24 +25,36 @@ fn children() -> MutexGuard<'static, Children> {
     CHILDREN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs a program to its end.
+/// Runs a program to its end. Does not return when a signal ends this program: what became of the child then
+/// is nobody's error.
 ///
 /// # Errors
 /// It cannot be started or waited for.
 pub fn run_child(command: &mut Command) -> io::Result<ExitStatus> {
-    let mut child = {
-        let mut children = children();
-        if children.ending {
-            return Err(io::ErrorKind::Interrupted.into());
-        }
-        let child = command.spawn()?;
-        children.running.insert(child.id());
-        child
-    };
+    let mut now = children();
+    if now.ending {
+        drop(now);
+        wait_for_the_end();
+    }
+    let mut child = command.spawn()?;
+    now.running.insert(child.id());
+    drop(now);
     let status = child.wait();
-    children().running.remove(&child.id());
+    let mut now = children();
+    now.running.remove(&child.id());
     ONE_ENDED.notify_all();
+    if now.ending {
+        drop(now);
+        wait_for_the_end();
+    }
     status
+}
+
+/// The thread that received the signal ends the program.
+fn wait_for_the_end() -> ! {
+    loop {
+        std::thread::park();
+    }
 }
 
 /// Sends a signal to all children and waits until they have ended. Nothing is started after it.
