@@ -16,6 +16,7 @@ use crate::cache::Levels;
 use crate::config::{CacheConfig, Mode, RunConfig, TmuConfig};
 use crate::result::{RunResult, TmuResult};
 use crate::stream::{Expander, LineMemory, TileSource};
+use crate::tmu::PipelineStats;
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -71,6 +72,28 @@ pub struct Outcome {
     pub tmu: Option<TmuResult>,
     /// Cycles until the last core was done; none in functional mode.
     pub cycles: Option<u64>,
+}
+
+impl Outcome {
+    /// What texture units and caches counted.
+    pub(super) fn timed(
+        counts: CacheCounts,
+        units: impl Iterator<Item = PipelineStats>,
+        cycles: u64,
+    ) -> Self {
+        let mut sum = PipelineStats::default();
+        units.for_each(|unit| sum.add(&unit));
+        Self {
+            counts,
+            tmu: Some(TmuResult {
+                utilization: sum.utilization(),
+                wasted_issues: sum.wasted,
+                threads: sum.threads,
+                loops: sum.loops,
+            }),
+            cycles: Some(cycles),
+        }
+    }
 }
 
 impl From<CacheCounts> for Outcome {

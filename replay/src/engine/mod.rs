@@ -5,6 +5,7 @@ mod counts;
 mod first_miss;
 mod functional;
 mod in_turn;
+mod items;
 mod one_pass;
 mod summary;
 #[cfg(test)]

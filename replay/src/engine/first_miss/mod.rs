@@ -12,10 +12,11 @@ mod thread;
 use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
+use super::items::Items;
 use crate::cache::{Delay, DelayedFill, Levels};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
-use crate::result::{FirstLookups, TmuResult};
+use crate::result::FirstLookups;
 use crate::stream::{Cores, StreamError, furthest_behind};
 use crate::tmu::PipelineStats;
 use memory::{Memory, Seen};
@@ -100,35 +101,23 @@ impl<D: DelayedFill> FirstMiss<D> {
         phase: &[WorkItem],
         assign: Assign,
     ) -> Result<(), StreamError> {
-        let cores = self.units.len();
-        // First idle: the next item of all. Static: the next of the core's.
-        let mut next_item: Vec<usize> = match assign {
-            Assign::FirstIdle => vec![0],
-            Assign::Static => (0..cores).collect(),
-        };
-        let step = next_item.len();
+        let mut items = Items::new(phase, assign, self.units.len());
         // A core that is done is at the end of time.
         let mut clocks: Vec<u64> = self.units.iter().map(|unit| unit.clock).collect();
         while let Some((core, until)) = furthest_behind(&clocks) {
-            let slot = &mut next_item[core % step];
-            let mut item = || {
-                let item = phase.get(*slot);
-                *slot += step;
-                item
-            };
-            clocks[core] = self.run_core(core, until, work, &mut item)?;
+            clocks[core] = self.run_core(core, until, work, &mut items)?;
         }
         Ok(())
     }
 
     /// Runs a core until it wants something shared after `until`: its cycle; the end of time if it
     /// is done.
-    fn run_core<'p>(
+    fn run_core(
         &mut self,
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
-        item: &mut dyn FnMut() -> Option<&'p WorkItem>,
+        items: &mut Items<'_>,
     ) -> Result<u64, StreamError> {
         loop {
             let unit = &mut self.units[core];
@@ -149,7 +138,7 @@ impl<D: DelayedFill> FirstMiss<D> {
                         }
                     } else if unit.clock > until {
                         return Ok(unit.clock);
-                    } else if let Some(item) = item() {
+                    } else if let Some(item) = items.next(core) {
                         work.load(core, item)?;
                     } else {
                         unit.drained = true;
@@ -215,18 +204,8 @@ impl<D: DelayedFill> Machine for FirstMiss<D> {
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
-        let mut sum = PipelineStats::default();
-        self.units.iter().for_each(|unit| sum.add(&unit.stats));
-        Outcome {
-            counts: self.memory.counts().clone(),
-            tmu: Some(TmuResult {
-                utilization: sum.utilization(),
-                wasted_issues: sum.wasted,
-                threads: sum.threads,
-                loops: sum.loops,
-            }),
-            cycles: Some(self.cycles),
-        }
+        let stats = self.units.iter().map(|unit| unit.stats);
+        Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
     }
 
     fn first_lookups(&self) -> Option<FirstLookups> {

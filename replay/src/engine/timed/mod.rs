@@ -6,12 +6,12 @@ mod memory;
 use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
+use super::items::Items;
 use crate::cache::{Delay, DelayedFill, Levels};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
-use crate::result::TmuResult;
 use crate::stream::{Cores, StreamError, furthest_behind};
-use crate::tmu::{Pipeline, PipelineStats, Turn};
+use crate::tmu::{Pipeline, Turn};
 use memory::{Found, Memory};
 
 /// Texture units, and the caches that they share.
@@ -95,40 +95,6 @@ impl<D: DelayedFill> Timed<D> {
     }
 }
 
-/// The items of a phase by assignment.
-struct Items<'a> {
-    items: &'a [WorkItem],
-    assign: Assign,
-    /// First idle: the next item of all. Static: the next item by core.
-    next: Vec<usize>,
-    cores: usize,
-}
-
-impl<'a> Items<'a> {
-    fn new(items: &'a [WorkItem], assign: Assign, cores: usize) -> Self {
-        let next = match assign {
-            Assign::FirstIdle => vec![0],
-            Assign::Static => (0..cores).collect(),
-        };
-        Self {
-            items,
-            assign,
-            next,
-            cores,
-        }
-    }
-
-    fn next(&mut self, core: usize) -> Option<&'a WorkItem> {
-        let (next, step) = match self.assign {
-            Assign::FirstIdle => (&mut self.next[0], 1),
-            Assign::Static => (&mut self.next[core], self.cores),
-        };
-        let item = self.items.get(*next);
-        *next += step;
-        item
-    }
-}
-
 impl<D: DelayedFill> Machine for Timed<D> {
     /// A phase starts when the last core is done with the one before.
     fn run(
@@ -151,17 +117,7 @@ impl<D: DelayedFill> Machine for Timed<D> {
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
-        let mut sum = PipelineStats::default();
-        self.units.iter().for_each(|unit| sum.add(&unit.stats()));
-        Outcome {
-            counts: self.memory.counts().clone(),
-            tmu: Some(TmuResult {
-                utilization: sum.utilization(),
-                wasted_issues: sum.wasted,
-                threads: sum.threads,
-                loops: sum.loops,
-            }),
-            cycles: Some(self.cycles),
-        }
+        let stats = self.units.iter().map(Pipeline::stats);
+        Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
     }
 }
