@@ -16,6 +16,24 @@ pub const fn quad_morton(x: u8, y: u8) -> u8 {
     spread(x) | spread(y) << 1
 }
 
+/// Column and row of the quad at each position of the curve.
+pub(super) const QUAD_POSITIONS: [(u8, u8); 64] = {
+    let mut positions = [(0, 0); 64];
+    let mut y = 0;
+    while y < 8 {
+        let mut x = 0;
+        while x < 8 {
+            #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+            {
+                positions[quad_morton(x, y) as usize] = (x, y);
+            }
+            x += 1;
+        }
+        y += 1;
+    }
+    positions
+};
+
 /// Checks a whole tile against the draw table.
 pub(super) fn check(draws: &[Draw], tile: &Tile) -> Result<(), Broken> {
     let mut records = tile.records.as_slice();

@@ -14,6 +14,7 @@
 
 use super::predict::{Context, Derivatives, Pair, split};
 use crate::textrace::bits::{BitReader, BitWriter, PEEK_BITS};
+use crate::textrace::invariant::QUAD_POSITIONS;
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile, quad_morton};
 use crate::varint::{low_u32, unzigzag, zigzag};
 use std::num::Wrapping;
@@ -184,7 +185,7 @@ fn decode_record(state: &mut State, bits: &mut BitReader<'_>) -> Option<QuadReco
     }
     bits.skip(used);
     let morton = state.morton + step;
-    let &(x, y) = POSITIONS.get(morton as usize)?;
+    let &(x, y) = QUAD_POSITIONS.get(morton as usize)?;
     let context = state.contexts.get_mut(usize::from(group) % GROUPS)?;
     let (column, row) = (i32::from(x), i32::from(y));
     let [dx_width, dy_width, cross_width, uv_width] = widths;
@@ -270,21 +271,3 @@ const CODES: [u8; 33] = {
 fn width(code: u32) -> u32 {
     WIDTHS.get(code as usize & 15).copied().map_or(0, u32::from)
 }
-
-/// Column and row of each position of the Morton curve.
-const POSITIONS: [(u8, u8); 64] = {
-    let mut positions = [(0, 0); 64];
-    let mut y = 0;
-    while y < 8 {
-        let mut x = 0;
-        while x < 8 {
-            #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
-            {
-                positions[quad_morton(x, y) as usize] = (x, y);
-            }
-            x += 1;
-        }
-        y += 1;
-    }
-    positions
-};

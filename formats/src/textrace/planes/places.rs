@@ -5,7 +5,8 @@
 use super::GROUPS;
 use super::codes::Codes;
 use super::encode::Sink;
-use crate::textrace::{QuadRecord, quad_morton};
+use crate::textrace::QuadRecord;
+use crate::textrace::invariant::QUAD_POSITIONS;
 use crate::varint::low_u32;
 
 /// Steps along the curve that have symbols, 1 to this; the last one stands for all from here on,
@@ -28,7 +29,7 @@ impl Place {
     /// A record there, its numbers unknown.
     #[inline(always)]
     pub fn record(self) -> QuadRecord {
-        let (x, y) = POSITIONS
+        let (x, y) = QUAD_POSITIONS
             .get(self.morton as usize & 63)
             .copied()
             .unwrap_or_default();
@@ -379,24 +380,6 @@ impl Places {
         }
     }
 }
-
-/// Column and row of each place on the Morton curve.
-const POSITIONS: [(u8, u8); 64] = {
-    let mut positions = [(0, 0); 64];
-    let mut y = 0;
-    while y < 8 {
-        let mut x = 0;
-        while x < 8 {
-            #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
-            {
-                positions[quad_morton(x, y) as usize] = (x, y);
-            }
-            x += 1;
-        }
-        y += 1;
-    }
-    positions
-};
 
 fn follow_themselves() -> [Follow; GROUPS] {
     let mut group = 0;
