@@ -76,22 +76,42 @@ pub struct Pending {
     pub segment: u32,
 }
 
-/// How many footprints wait after `now`, and when the first of what they wait for is there.
+/// Drops what has arrived by `now`.
 #[inline(always)]
-fn waiting(pending: &[Pending], now: u64) -> (u32, u64) {
-    let (mut waiting, mut earliest) = (0, u64::MAX);
-    let (mut segment, mut footprints) = (0, 0_u32);
-    for one in pending {
-        if one.segment != segment {
-            waiting += footprints.count_ones();
-            (segment, footprints) = (one.segment, 0);
-        }
-        // No branches: which lines are there is a coin toss to the processor.
-        let late = one.ready > now;
-        footprints |= if late { one.footprints } else { 0 };
-        earliest = earliest.min(if late { one.ready } else { u64::MAX });
+fn drop_arrived(pending: &mut Vec<Pending>, now: u64) {
+    let mut kept = 0;
+    for at in 0..pending.len() {
+        let Pending {
+            ready,
+            footprints,
+            segment,
+        } = pending[at];
+        pending[kept] = Pending {
+            ready,
+            footprints,
+            segment,
+        };
+        kept += usize::from(ready > now);
     }
-    (waiting + footprints.count_ones(), earliest)
+    pending.truncate(kept);
+}
+
+/// How many footprints wait, and when the first of what they wait for is there.
+#[inline(always)]
+fn waiting(pending: &[Pending]) -> (u32, u64) {
+    let earliest = pending.iter().fold(u64::MAX, |earliest, one| earliest.min(one.ready));
+    let of_segment = |list: &[Pending]| {
+        let any = list.iter().fold(0, |any, one| any | one.footprints);
+        any.count_ones()
+    };
+    let waiting = match pending {
+        [first, .., last] if first.segment != last.segment => {
+            let segments = pending.chunk_by(|a, b| a.segment == b.segment);
+            segments.map(of_segment).sum()
+        }
+        _ => of_segment(pending),
+    };
+    (waiting, earliest)
 }
 
 /// The pipeline of one core.
@@ -185,17 +205,18 @@ impl Pipeline {
             self.trip(0, thread);
             return;
         }
-        let list = &self.pending[thread.list as usize];
+        let list = &mut self.pending[thread.list as usize];
         let waited = thread.waiting;
-        (thread.waiting, thread.earliest) = waiting(list, self.clock);
+        drop_arrived(list, self.clock);
+        (thread.waiting, thread.earliest) = waiting(list);
         if thread.waiting == 0 {
             self.spare.push(thread.list);
         }
         self.trip((waited - thread.waiting).into(), thread);
     }
 
-    /// A new thread enters now. `pending` is what those of its `footprints` that miss wait for; the list
-    /// is taken, and another one is left for it.
+    /// A new thread enters now. `pending` is what those of its `footprints` that miss wait for, all of it
+    /// after now; the list is taken, and another one is left for it.
     #[inline(always)]
     pub fn start(&mut self, footprints: u32, pending: &mut Vec<Pending>) {
         self.stats.threads += 1;
@@ -212,7 +233,7 @@ impl Pipeline {
             self.pending.push(Vec::new());
             self.pending.len() as u32 - 1
         });
-        let (waiting, earliest) = waiting(pending, self.clock);
+        let (waiting, earliest) = waiting(pending);
         let thread = Looping {
             back: 0,
             earliest,
@@ -326,8 +347,11 @@ mod tests {
             footprints,
             segment,
         };
-        let list = [one(9, 0b11, 0), one(5, 0b110, 0), one(7, 0b1, 3)];
-        let found = [4, 6, 7, 9].map(|now| waiting(&list, now));
+        let mut list = vec![one(9, 0b11, 0), one(5, 0b110, 0), one(7, 0b1, 3)];
+        let found = [4, 6, 7, 9].map(|now| {
+            drop_arrived(&mut list, now);
+            waiting(&list)
+        });
         assert_eq!(found, [(4, 5), (3, 7), (2, 9), (0, u64::MAX)]);
     }
 
