@@ -10,6 +10,7 @@ mod forest;
 mod in_flight;
 mod levels;
 mod lru;
+mod on_the_way;
 mod random;
 mod set_order;
 mod tree_plru;

@@ -1,12 +1,12 @@
 //! An LRU cache of four ways whose sets are filled one by one.
 //!
 //! What a fill does to a set depends on this set alone, so it need not be done when the line arrives,
-//! but when somebody comes to the set next. Each set keeps what is on its way into it: no calendar, and
-//! whoever misses looks for the line among the few of its set.
+//! but when somebody comes to the set next. Each set keeps what is on its way into it: no calendar.
 
 use super::EMPTY;
 use super::delayed::{DelayedFill, Missing, NOT_ASKED};
 use super::lru::look_up;
+use super::on_the_way::OnTheWay;
 
 /// A line on its way.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +40,63 @@ const EMPTY_SET: Set = Set {
 pub struct SetOrder {
     /// A power of two.
     sets: Vec<Set>,
-    /// By set, the latest first; of one cycle the last request first.
-    later: Vec<Vec<Arrival>>,
+    /// By set.
+    later: Vec<Later>,
+    /// All of them.
+    on_the_way: OnTheWay,
+}
+
+/// What arrives in a set after its first line.
+#[derive(Clone, Debug, Default)]
+struct Later {
+    /// The first `gone` have arrived; the others by cycle, of one cycle in the order of their requests.
+    arrivals: Vec<Arrival>,
+    gone: usize,
+}
+
+impl Later {
+    /// Most arrive after all that are on their way.
+    #[inline(always)]
+    fn enter(&mut self, new: Arrival) {
+        let all = self.arrivals.len();
+        if all == self.arrivals.capacity() && self.gone > all / 2 {
+            self.arrivals.drain(..std::mem::take(&mut self.gone));
+        }
+        let mut at = self.arrivals.len();
+        self.arrivals.push(new);
+        while at > self.gone && self.arrivals[at - 1].cycle > new.cycle {
+            self.arrivals[at] = self.arrivals[at - 1];
+            at -= 1;
+        }
+        self.arrivals[at] = new;
+    }
+
+    /// Puts a line before all others.
+    fn enter_first(&mut self, first: Arrival) {
+        match self.gone.checked_sub(1) {
+            Some(at) => {
+                self.gone = at;
+                self.arrivals[at] = first;
+            }
+            None => self.arrivals.insert(0, first),
+        }
+    }
+
+    /// The first one, which arrives.
+    #[inline(always)]
+    fn take(&mut self) -> Option<Arrival> {
+        let first = *self.arrivals.get(self.gone)?;
+        self.gone += 1;
+        if self.gone == self.arrivals.len() {
+            self.clear();
+        }
+        Some(first)
+    }
+
+    fn clear(&mut self) {
+        self.arrivals.clear();
+        self.gone = 0;
+    }
 }
 
 impl SetOrder {
@@ -51,13 +106,14 @@ impl SetOrder {
         debug_assert!(sets.is_power_of_two());
         Self {
             sets: vec![EMPTY_SET; sets as usize],
-            later: vec![Vec::new(); sets as usize],
+            later: vec![Later::default(); sets as usize],
+            on_the_way: OnTheWay::new(),
         }
     }
 
-    /// The set that holds a line, with all that has arrived, and what else is on its way into it.
+    /// The set that holds a line, with all that has arrived.
     #[inline(always)]
-    fn settled(&mut self, line: u32, now: u64) -> (&mut Set, &mut Vec<Arrival>) {
+    fn settled(&mut self, line: u32, now: u64) -> (&mut Set, &mut Later) {
         let index = line as usize & (self.sets.len() - 1);
         let (set, later) = (&mut self.sets[index], &mut self.later[index]);
         if set.due <= now {
@@ -70,12 +126,12 @@ impl SetOrder {
 impl Set {
     /// Fills what has arrived.
     #[inline(never)]
-    fn settle(&mut self, later: &mut Vec<Arrival>, now: u64) {
+    fn settle(&mut self, later: &mut Later, now: u64) {
         while self.due <= now {
             self.fill(self.first);
             let next = match self.later {
                 0 => None,
-                _ => later.pop(),
+                _ => later.take(),
             };
             (self.due, self.first) = (u64::MAX, EMPTY);
             if let Some(Arrival { cycle, line }) = next {
@@ -93,19 +149,14 @@ impl Set {
 
     /// When a line arrives that the set does not hold.
     #[inline(always)]
-    fn arrival(&self, later: &[Arrival], line: u32) -> u64 {
+    fn arrival(&self, on_the_way: &OnTheWay, line: u32, now: u64) -> u64 {
         if self.first == line {
             return self.due;
         }
         if self.later == 0 {
             return NOT_ASKED;
         }
-        // No early end: where in the list it is, the processor cannot guess.
-        let or_that = |found, other: &Arrival| match other.line == line {
-            true => other.cycle,
-            false => found,
-        };
-        later.iter().fold(NOT_ASKED, or_that)
+        on_the_way.arrival(line, now)
     }
 }
 
@@ -122,7 +173,7 @@ impl DelayedFill for SetOrder {
                 set.settle(&mut laters[index], now);
             }
             if !look_up(&mut set.tags, line) {
-                let arrival = set.arrival(&laters[index], line);
+                let arrival = set.arrival(&self.on_the_way, line, now);
                 latest = latest.max(arrival);
                 missing.push(Missing { index: at, arrival });
             }
@@ -132,17 +183,19 @@ impl DelayedFill for SetOrder {
 
     #[inline(always)]
     fn look_up(&mut self, line: u32, now: u64) -> u64 {
-        let (set, later) = self.settled(line, now);
+        let (set, _) = self.settled(line, now);
         if look_up(&mut set.tags, line) {
             return 0;
         }
-        set.arrival(later, line)
+        let set = *set;
+        set.arrival(&self.on_the_way, line, now)
     }
 
     #[inline(always)]
     fn arrival(&mut self, line: u32, now: u64) -> u64 {
-        let (set, later) = self.settled(line, now);
-        set.arrival(later, line)
+        let (set, _) = self.settled(line, now);
+        let set = *set;
+        set.arrival(&self.on_the_way, line, now)
     }
 
     #[inline(always)]
@@ -154,33 +207,27 @@ impl DelayedFill for SetOrder {
         }
         if set.due == u64::MAX {
             (set.due, set.first) = (arrival, line);
-            return;
-        }
-        set.later += 1;
-        let new = Arrival {
-            cycle: arrival,
-            line,
-        };
-        if arrival < set.due {
-            later.push(Arrival {
+        } else if arrival < set.due {
+            later.enter_first(Arrival {
                 cycle: set.due,
                 line: set.first,
             });
+            set.later += 1;
             (set.due, set.first) = (arrival, line);
-            return;
+        } else {
+            later.enter(Arrival {
+                cycle: arrival,
+                line,
+            });
+            set.later += 1;
         }
-        let mut at = later.len();
-        later.push(new);
-        while at > 0 && later[at - 1].cycle <= arrival {
-            later[at] = later[at - 1];
-            at -= 1;
-        }
-        later[at] = new;
+        self.on_the_way.enter(line, now, arrival);
     }
 
     fn clear(&mut self) {
         self.sets.fill(EMPTY_SET);
-        self.later.iter_mut().for_each(Vec::clear);
+        self.later.iter_mut().for_each(Later::clear);
+        self.on_the_way.clear();
     }
 }
 
