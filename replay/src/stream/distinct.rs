@@ -30,9 +30,9 @@ impl Use {
     /// Bits of `cell` that name none.
     const LISTED: u32 = Tag::CELLS as u32;
 
-    fn new(footprints: u32, first_line: usize, cell: u32) -> Self {
+    fn new(footprints: u32, first_line: u32, cell: u32) -> Self {
         Self {
-            bits: footprints | (first_line as u32) << FOOTPRINTS,
+            bits: footprints | first_line << FOOTPRINTS,
             cell,
         }
     }
@@ -90,11 +90,13 @@ impl<'a> QuadLines<'a> {
 }
 
 /// A distinct line of the segment at hand.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Seen {
     line: u32,
     footprints: u32,
-    first_line: usize,
+    /// And [`Use::LISTED`].
+    cell: u32,
+    first_line: u32,
 }
 
 /// Finds the distinct lines of one quad after another.
@@ -106,12 +108,15 @@ pub(super) struct Distinct {
     segment: u32,
     /// [`Use::LISTED`] for all but a quad's first segment.
     listed: u32,
-    seen: Vec<Seen>,
-    /// Cell of each.
-    cells: Vec<u32>,
+    /// So many are in use.
+    distinct: usize,
+    seen: [Seen; Use::FIRST_LINES],
     /// Index in `seen` of each line.
-    indexes: Vec<u8>,
+    indexes: [u8; Use::FIRST_LINES],
 }
+
+/// A footprint has four lines at most.
+const _: () = assert!(4 * FOOTPRINTS as usize <= Use::FIRST_LINES);
 
 impl Default for Distinct {
     fn default() -> Self {
@@ -119,9 +124,9 @@ impl Default for Distinct {
             buckets: vec![(0, 0); BUCKETS],
             segment: 0,
             listed: 0,
-            seen: Vec::new(),
-            cells: Vec::new(),
-            indexes: Vec::new(),
+            distinct: 0,
+            seen: [Seen::default(); Use::FIRST_LINES],
+            indexes: [0; Use::FIRST_LINES],
         }
     }
 }
@@ -155,7 +160,7 @@ impl Distinct {
                 }
                 footprints += times;
             }
-            self.finish(distinct, uses);
+            self.finish(line - start, distinct, uses);
         }
     }
 
@@ -167,9 +172,7 @@ impl Distinct {
             self.buckets.fill((0, 0));
             self.segment = 1;
         }
-        self.seen.clear();
-        self.cells.clear();
-        self.indexes.clear();
+        self.distinct = 0;
     }
 
     /// Adds a line of some footprints.
@@ -180,49 +183,51 @@ impl Distinct {
         let index = loop {
             let (segment, index) = self.buckets[bucket];
             if segment != self.segment {
-                let index = self.seen.len() as u32;
-                self.buckets[bucket] = (self.segment, index);
-                self.cells.push(cell | listed);
-                self.seen.push(Seen {
+                let index = self.distinct;
+                self.buckets[bucket] = (self.segment, index as u32);
+                self.seen[index] = Seen {
                     line,
                     footprints: 0,
-                    first_line: at,
-                });
+                    cell: cell | listed,
+                    first_line: at as u32,
+                };
+                self.distinct += 1;
                 break index;
             }
-            if self.seen[index as usize].line == line {
-                if self.cells[index as usize] & !Use::LISTED == cell {
-                    break index;
+            let seen = &self.seen[index as usize];
+            if seen.line == line {
+                if seen.cell & !Use::LISTED == cell {
+                    break index as usize;
                 }
                 listed = Use::LISTED;
             }
             bucket = (bucket + 1) % BUCKETS;
         };
-        self.seen[index as usize].footprints |= footprints;
-        self.indexes.push(index as u8);
+        self.seen[index].footprints |= footprints;
+        self.indexes[at] = index as u8;
     }
 
-    /// Appends what was added, in the order of last use.
-    fn finish(&mut self, distinct: &mut Vec<u32>, uses: &mut Vec<Use>) {
+    /// Appends what was added, so many lines, in the order of last use.
+    fn finish(&mut self, lines: usize, distinct: &mut Vec<u32>, uses: &mut Vec<Use>) {
         let first = distinct.len();
-        let mut slot = first + self.seen.len();
-        distinct.resize(slot, 0);
-        uses.resize(slot, Use::default());
-        if let Some(last) = uses.last_mut() {
-            last.bits = Use::LAST;
-        }
-        for &index in self.indexes.iter().rev() {
+        distinct.resize(first + self.distinct, 0);
+        uses.resize(first + self.distinct, Use::default());
+        let (distinct, uses) = (&mut distinct[first..], &mut uses[first..]);
+        let mut left = self.distinct;
+        for &index in self.indexes[..lines].iter().rev() {
+            // No branches on whether a line comes up for the first time: then it keeps its slot, else the
+            // next one takes it.
+            let Some(slot) = left.checked_sub(1) else {
+                break;
+            };
             let seen = &mut self.seen[usize::from(index)];
             let footprints = std::mem::take(&mut seen.footprints);
-            if footprints != 0 {
-                slot -= 1;
-                let of = Use::new(footprints, seen.first_line, self.cells[usize::from(index)]);
-                distinct[slot] = seen.line;
-                uses[slot] = Use {
-                    bits: of.bits | uses[slot].bits,
-                    ..of
-                };
-            }
+            distinct[slot] = seen.line;
+            uses[slot] = Use::new(footprints, seen.first_line, seen.cell);
+            left -= usize::from(footprints != 0);
+        }
+        if let Some(last) = uses.last_mut() {
+            last.bits |= Use::LAST;
         }
     }
 }
