@@ -82,13 +82,16 @@ impl Pending {
             let depths = of_tree(&self.depths, self.trees, under.tree);
             self.missed.clone_from(&self.accesses);
             retain(&mut self.missed, depths, under.ways);
+            let last = under.level.tallies.len() - 1;
             for (tree, tally) in under.level.tallies.iter_mut().enumerate() {
                 let lines = self.missed.iter().map(|access| access.line);
                 under.forest.access_tree(tree, lines, &mut self.l2_depths);
                 let depths = self.l2_depths.iter().copied();
                 tally.count(&self.missed, depths.clone());
-                // A line on top with fewer sets is so with more.
-                retain(&mut self.missed, depths, 1);
+                if tree < last {
+                    // A line on top with fewer sets is so with more.
+                    retain(&mut self.missed, depths, 1);
+                }
             }
         }
         self.accesses.clear();

@@ -46,16 +46,15 @@ struct Classes<T> {
 
 impl<T: Copy + Default> Classes<T> {
     fn new(bins: usize, classes: usize) -> Self {
-        let places = if bins == 0 { 0 } else { bins * classes + 1 };
         Self {
-            counts: vec![T::default(); places],
+            counts: vec![T::default(); bins * classes + 1],
             classes,
         }
     }
 
     /// Counts of one associativity, the `rank`-th, by bin.
     fn of(&self, rank: usize, sum: impl Fn(&[T]) -> T) -> impl Iterator<Item = T> {
-        let bins = self.counts.get(1..).unwrap_or(&[]).chunks(self.classes);
+        let bins = self.counts[1..].chunks(self.classes);
         bins.map(move |counts| sum(&counts[rank..]))
     }
 }
@@ -80,30 +79,45 @@ impl Tally {
 
     /// Counts accesses, footprint after footprint; `depths` says how deep each line lay in its stack.
     pub(super) fn count(&mut self, accesses: &[Access], depths: impl Iterator<Item = u8>) {
-        match (self.ways.len(), self.by_tile) {
-            (1, None) => self.count_classes::<1, false>(accesses, depths),
-            _ => self.count_classes::<0, true>(accesses, depths),
+        match *self.ways {
+            [ways] => self.count_one(ways as u8, accesses, depths),
+            _ => self.count_several(accesses, depths),
         }
     }
 
-    /// For `CLASSES` associativities, or any number of them if that is 0; without `TILES` not by tile.
-    #[inline(always)]
-    fn count_classes<const CLASSES: usize, const TILES: bool>(
-        &mut self,
-        accesses: &[Access],
-        depths: impl Iterator<Item = u8>,
-    ) {
-        let classes = if CLASSES == 0 {
-            self.ways.len()
-        } else {
-            CLASSES
-        };
-        let place = |bin: u32, missing: u8| bin as usize * classes + usize::from(missing);
+    /// A footprint counts at its first miss.
+    fn count_one(&mut self, ways: u8, accesses: &[Access], depths: impl Iterator<Item = u8>) {
         // Borrowed one by one, so that they stay in registers.
+        let (lines, footprints) = (
+            &mut self.lines.counts[1..],
+            &mut self.footprints.counts[1..],
+        );
+        let (tiles, by_tile) = (&mut self.tiles.counts[1..], self.by_tile);
+        let (mut footprint, mut missed_before) = (u32::MAX, false);
+        for (access, depth) in accesses.iter().zip(depths) {
+            let misses = depth >= ways;
+            missed_before &= access.footprint == footprint;
+            footprint = access.footprint;
+            let first = misses & !missed_before;
+            missed_before |= misses;
+            lines[access.cell as usize] += u64::from(misses);
+            footprints[access.cell as usize] += u64::from(first);
+            if let Some(by_tile) = by_tile {
+                let counts = select_unpredictable(by_tile == ByTile::Lines, misses, first);
+                let total = &mut tiles[access.tile as usize];
+                *total = total.wrapping_add(u32::from(counts));
+            }
+        }
+    }
+
+    /// A footprint counts when it ends, by the most associativities that miss a line of it.
+    fn count_several(&mut self, accesses: &[Access], depths: impl Iterator<Item = u8>) {
+        let classes = self.ways.len();
+        let place = |bin: u32, missing: u8| bin as usize * classes + usize::from(missing);
         let (lines, footprints) = (&mut *self.lines.counts, &mut *self.footprints.counts);
         let (tiles, by_tile, missing) = (&mut *self.tiles.counts, self.by_tile, &*self.missing);
         let mut tile = |what, bin, missing: u8, count: bool| {
-            if TILES && by_tile == Some(what) {
+            if by_tile == Some(what) {
                 let total = &mut tiles[place(bin, missing)];
                 *total = total.wrapping_add(u32::from(count));
             }
