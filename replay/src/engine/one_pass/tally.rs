@@ -103,7 +103,10 @@ impl Tally {
             lines[access.cell as usize] += u64::from(misses);
             footprints[access.cell as usize] += u64::from(first);
             if let Some(by_tile) = by_tile {
-                let counts = select_unpredictable(by_tile == ByTile::Lines, misses, first);
+                let counts = match by_tile {
+                    ByTile::Footprints => first,
+                    ByTile::Lines => misses,
+                };
                 let total = &mut tiles[access.tile as usize];
                 *total = total.wrapping_add(u32::from(counts));
             }
