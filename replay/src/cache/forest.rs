@@ -8,6 +8,7 @@
 
 use super::EMPTY;
 use super::lru::to_front;
+use std::hint::select_unpredictable;
 
 /// The stacks of one number of sets.
 #[derive(Clone, Debug)]
@@ -26,6 +27,34 @@ impl Stacks {
         let first = (line & self.set_mask) as usize * self.depth;
         to_front(&mut self.lines[first..first + self.depth], line) as u8
     }
+}
+
+impl Stacks {
+    /// Accesses lines; their stacks' depth is `N`, known to the compiler.
+    fn access_each<const N: usize>(
+        &mut self,
+        lines: impl Iterator<Item = u32>,
+        depths: &mut Vec<u8>,
+    ) {
+        let (stacks, _) = self.lines.as_chunks_mut::<N>();
+        let mask = self.set_mask;
+        depths.extend(lines.map(|line| to_front_of(&mut stacks[(line & mask) as usize], line)));
+    }
+}
+
+/// Moves a line to the front of its stack, without a branch: how deep it was; `N` if it was not there.
+#[inline(always)]
+fn to_front_of<const N: usize>(stack: &mut [u32; N], line: u32) -> u8 {
+    let old = *stack;
+    let mut depth = N;
+    for (at, tag) in old.iter().enumerate().rev() {
+        depth = select_unpredictable(*tag == line, at, depth);
+    }
+    stack[0] = line;
+    for at in 1..N {
+        stack[at] = select_unpredictable(at <= depth, old[at - 1], old[at]);
+    }
+    depth as u8
 }
 
 /// LRU caches of several numbers of sets and ways that see the same lines.
@@ -76,6 +105,24 @@ impl Forest {
             }
         }
         lines.len()
+    }
+
+    /// Accesses lines for one number of sets only: `depths` gets what [`Self::access`] says of each.
+    /// Lines that lay on top need not be asked for with more sets.
+    pub fn access_tree(
+        &mut self,
+        tree: usize,
+        lines: impl Iterator<Item = u32>,
+        depths: &mut Vec<u8>,
+    ) {
+        depths.clear();
+        let tree = &mut self.trees[tree];
+        match tree.depth {
+            1 => tree.access_each::<1>(lines, depths),
+            2 => tree.access_each::<2>(lines, depths),
+            4 => tree.access_each::<4>(lines, depths),
+            _ => depths.extend(lines.map(|line| tree.access(line))),
+        }
     }
 
     /// Accesses a line. `depths` gets, for each number of sets, how deep the line lay in its
