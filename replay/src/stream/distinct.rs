@@ -109,7 +109,7 @@ pub(super) struct Distinct {
     /// [`Use::LISTED`] for all but a quad's first segment.
     listed: u32,
     /// So many are in use.
-    distinct: usize,
+    distinct: u32,
     seen: [Seen; Use::FIRST_LINES],
     /// Index in `seen` of each line.
     indexes: [u8; Use::FIRST_LINES],
@@ -132,35 +132,33 @@ impl Default for Distinct {
 }
 
 impl Distinct {
-    /// Appends a quad's distinct lines and their uses.
+    /// Appends the distinct lines and their uses of a quad of so many footprints, repeats counted.
     pub(super) fn list(
         &mut self,
-        lines: &[u32],
-        tags: &[Tag],
+        footprints: u32,
+        mut lines: &[u32],
+        mut tags: &[Tag],
         distinct: &mut Vec<u32>,
         uses: &mut Vec<Use>,
     ) {
-        let mut line = 0;
-        while line < lines.len() {
-            self.begin(line > 0);
-            let start = line;
-            let mut footprints = 0;
-            while line < lines.len() {
-                let times = 1 + tags[line].repeats();
-                if footprints + times > FOOTPRINTS {
-                    break;
-                }
-                let bits = ((1 << times) - 1) << footprints;
-                loop {
-                    self.add(lines[line], tags[line].cell(), bits, line - start);
-                    line += 1;
-                    if line == lines.len() || tags[line].is_first() {
-                        break;
-                    }
-                }
-                footprints += times;
+        let mut again = false;
+        while !lines.is_empty() {
+            let end = match footprints <= FOOTPRINTS {
+                true => lines.len(),
+                false => segment_end(tags),
+            };
+            self.begin(again);
+            let mut bits = 0_u32;
+            for (at, (&line, tag)) in lines[..end].iter().zip(tags).enumerate() {
+                // No branches: how many lines a footprint has is a coin toss to the processor.
+                let next = u32::BITS - bits.leading_zeros();
+                let of_next = ((2 << tag.repeats()) - 1) << next;
+                bits = select(tag.is_first(), of_next, bits);
+                self.add(line, tag.cell(), bits, at);
             }
-            self.finish(line - start, distinct, uses);
+            self.finish(end, distinct, uses);
+            (lines, tags) = (&lines[end..], &tags[end..]);
+            again = true;
         }
     }
 
@@ -178,14 +176,39 @@ impl Distinct {
     /// Adds a line of some footprints.
     #[inline(always)]
     fn add(&mut self, line: u32, cell: u32, footprints: u32, at: usize) {
-        let mut bucket = line.wrapping_mul(0x9e37_79b1) as usize >> (32 - BUCKETS.ilog2());
+        let bucket = bucket(line);
+        let (segment, index) = self.buckets[bucket];
+        // No branches: whether a line is new is a coin toss to the processor.
+        let new = segment != self.segment;
+        let index = select(new, self.distinct, index);
+        let seen = &mut self.seen[index as usize % Use::FIRST_LINES];
+        let same = (seen.line == line) & (seen.cell & !Use::LISTED == cell);
+        if !(new | same) {
+            self.add_beside(bucket, line, cell, footprints, at);
+            return;
+        }
+        *seen = Seen {
+            line,
+            footprints: footprints | select(new, 0, seen.footprints),
+            cell: select(new, cell | self.listed, seen.cell),
+            first_line: select(new, at as u32, seen.first_line),
+        };
+        self.buckets[bucket] = (self.segment, index);
+        self.distinct += u32::from(new);
+        self.indexes[at % Use::FIRST_LINES] = index as u8;
+    }
+
+    /// Adds a line whose bucket another one has, or the same line of another cell.
+    #[inline(never)]
+    fn add_beside(&mut self, first: usize, line: u32, cell: u32, footprints: u32, at: usize) {
+        let mut bucket = first;
         let mut listed = self.listed;
         let index = loop {
             let (segment, index) = self.buckets[bucket];
             if segment != self.segment {
                 let index = self.distinct;
-                self.buckets[bucket] = (self.segment, index as u32);
-                self.seen[index] = Seen {
+                self.buckets[bucket] = (self.segment, index);
+                self.seen[index as usize] = Seen {
                     line,
                     footprints: 0,
                     cell: cell | listed,
@@ -197,23 +220,23 @@ impl Distinct {
             let seen = &self.seen[index as usize];
             if seen.line == line {
                 if seen.cell & !Use::LISTED == cell {
-                    break index as usize;
+                    break index;
                 }
                 listed = Use::LISTED;
             }
             bucket = (bucket + 1) % BUCKETS;
         };
-        self.seen[index].footprints |= footprints;
+        self.seen[index as usize].footprints |= footprints;
         self.indexes[at] = index as u8;
     }
 
     /// Appends what was added, so many lines, in the order of last use.
     fn finish(&mut self, lines: usize, distinct: &mut Vec<u32>, uses: &mut Vec<Use>) {
+        let mut left = self.distinct as usize;
         let first = distinct.len();
-        distinct.resize(first + self.distinct, 0);
-        uses.resize(first + self.distinct, Use::default());
+        distinct.resize(first + left, 0);
+        uses.resize(first + left, Use::default());
         let (distinct, uses) = (&mut distinct[first..], &mut uses[first..]);
-        let mut left = self.distinct;
         for &index in self.indexes[..lines].iter().rev() {
             // No branches on whether a line comes up for the first time: then it keeps its slot, else the
             // next one takes it.
@@ -230,6 +253,26 @@ impl Distinct {
             last.bits |= Use::LAST;
         }
     }
+}
+
+/// Where the first segment of a quad ends.
+fn segment_end(tags: &[Tag]) -> usize {
+    let mut footprints = 0;
+    let ends = |tag: &Tag| {
+        footprints += if tag.is_first() { 1 + tag.repeats() } else { 0 };
+        footprints > FOOTPRINTS
+    };
+    tags.iter().position(ends).unwrap_or(tags.len())
+}
+
+#[inline(always)]
+fn bucket(line: u32) -> usize {
+    line.wrapping_mul(0x9e37_79b1) as usize >> (u32::BITS - BUCKETS.ilog2())
+}
+
+#[inline(always)]
+fn select(yes: bool, this: u32, that: u32) -> u32 {
+    std::hint::select_unpredictable(yes, this, that)
 }
 
 #[cfg(test)]
@@ -262,7 +305,8 @@ mod tests {
                     }
                 }
                 let (lines, tags) = (&tile.lines[start..], &tile.tags[start..]);
-                distinct.list(lines, tags, &mut tile.distinct, &mut tile.uses);
+                let all = footprints.iter().map(|(_, repeats, _)| 1 + repeats).sum();
+                distinct.list(all, lines, tags, &mut tile.distinct, &mut tile.uses);
                 tile.quads.push(QuadEnd {
                     end: tile.lines.len() as u32,
                     distinct_end: tile.distinct.len() as u32,

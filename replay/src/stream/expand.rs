@@ -237,7 +237,8 @@ impl<'a> Expander<'a> {
                 if let Some(distinct) = distinct {
                     let start = lines.quads.last().map_or(0, |quad| quad.end as usize);
                     let (lines_of, tags) = (&lines.lines[start..], &lines.tags[start..]);
-                    distinct.list(lines_of, tags, &mut lines.distinct, &mut lines.uses);
+                    let (found, uses) = (&mut lines.distinct, &mut lines.uses);
+                    distinct.list(footprints, lines_of, tags, found, uses);
                 }
                 if !self.all {
                     lines.lines.clear();
