@@ -5,6 +5,7 @@
 //! needs a place takes any whose time has passed.
 
 use super::delayed::NOT_ASKED;
+use std::hint::select_unpredictable;
 
 /// Buckets of four places. Texture units have some dozens of lines on their way.
 const BUCKETS: usize = 128;
@@ -44,21 +45,22 @@ impl OnTheWay {
     #[inline(always)]
     pub(super) fn arrival(&self, line: u32, now: u64) -> u64 {
         let bucket = &self.buckets[bucket(line)];
-        let mut found = 0;
+        let mut found = NOT_ASKED;
         for (&other, &arrival) in bucket.lines.iter().zip(&bucket.arrivals) {
             // No branches: which of them it is, the processor cannot guess.
-            found = found.max(if other == line { arrival } else { 0 });
+            found = select_unpredictable((other == line) & (arrival > now), arrival, found);
         }
         if self.others_until > now {
-            found = found.max(self.among_others(line));
+            found = found.min(self.among_others(line, now));
         }
-        if found > now { found } else { NOT_ASKED }
+        found
     }
 
     #[cold]
-    fn among_others(&self, line: u32) -> u64 {
-        let of_line = self.others.iter().filter(|(other, _)| *other == line);
-        of_line.map(|(_, arrival)| *arrival).max().unwrap_or(0)
+    fn among_others(&self, line: u32, now: u64) -> u64 {
+        let on_the_way = |&(other, arrival): &(u32, u64)| other == line && arrival > now;
+        let found = self.others.iter().copied().find(on_the_way);
+        found.map_or(NOT_ASKED, |(_, arrival)| arrival)
     }
 
     /// A line that is not on its way `now` arrives later.

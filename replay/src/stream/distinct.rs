@@ -72,13 +72,20 @@ impl Use {
 }
 
 impl<'a> QuadLines<'a> {
+    /// True if all its footprints fit into one segment.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_one_segment(&self) -> bool {
+        self.footprints <= FOOTPRINTS
+    }
+
     /// Where the distinct lines of each segment end.
     #[inline(always)]
     pub fn segments(self) -> impl Iterator<Item = usize> + use<'a> {
         let mut start = 0;
         std::iter::from_fn(move || {
             let uses = &self.uses[start..];
-            start += if self.footprints <= FOOTPRINTS && !uses.is_empty() {
+            start += if self.is_one_segment() && !uses.is_empty() {
                 // All of them fit into one.
                 uses.len()
             } else {

@@ -2,6 +2,7 @@
 
 use crate::config::TmuConfig;
 use std::collections::VecDeque;
+use std::hint::select_unpredictable;
 
 /// What happens at the first stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,42 +77,46 @@ pub struct Pending {
     pub segment: u32,
 }
 
-/// Drops what has arrived by `now`.
+/// Drops what has arrived by `now`: how many footprints wait still, and when the first of what they wait
+/// for is there.
 #[inline(always)]
-fn drop_arrived(pending: &mut Vec<Pending>, now: u64) {
+fn drop_arrived(pending: &mut Vec<Pending>, now: u64) -> (u32, u64) {
+    let segment = |one: Option<&Pending>| one.map(|one| one.segment);
+    let one_segment = segment(pending.first()) == segment(pending.last());
+    let (mut footprints, mut earliest) = (0, u64::MAX);
     let mut kept = 0;
     for at in 0..pending.len() {
+        // Read whole, then written: else each would wait for the one before.
         let Pending {
             ready,
-            footprints,
+            footprints: of,
             segment,
         } = pending[at];
         pending[kept] = Pending {
             ready,
-            footprints,
+            footprints: of,
             segment,
         };
-        kept += usize::from(ready > now);
+        // No branches: which lines are there is a coin toss to the processor.
+        let late = ready > now;
+        kept += usize::from(late);
+        footprints |= select_unpredictable(late, of, 0);
+        earliest = select_unpredictable(late & (ready < earliest), ready, earliest);
     }
     pending.truncate(kept);
-}
-
-/// How many footprints wait, and when the first of what they wait for is there.
-#[inline(always)]
-fn waiting(pending: &[Pending]) -> (u32, u64) {
-    let earliest = pending.iter().fold(u64::MAX, |earliest, one| earliest.min(one.ready));
-    let of_segment = |list: &[Pending]| {
-        let any = list.iter().fold(0, |any, one| any | one.footprints);
-        any.count_ones()
-    };
-    let waiting = match pending {
-        [first, .., last] if first.segment != last.segment => {
-            let segments = pending.chunk_by(|a, b| a.segment == b.segment);
-            segments.map(of_segment).sum()
-        }
-        _ => of_segment(pending),
+    let waiting = match one_segment {
+        true => footprints.count_ones(),
+        false => of_segments(pending),
     };
     (waiting, earliest)
+}
+
+/// How many footprints wait.
+#[inline(never)]
+fn of_segments(pending: &[Pending]) -> u32 {
+    let segments = pending.chunk_by(|a, b| a.segment == b.segment);
+    let of_segment = |list: &[Pending]| list.iter().fold(0, |any, one| any | one.footprints);
+    segments.map(|list| of_segment(list).count_ones()).sum()
 }
 
 /// The pipeline of one core.
@@ -207,8 +212,7 @@ impl Pipeline {
         }
         let list = &mut self.pending[thread.list as usize];
         let waited = thread.waiting;
-        drop_arrived(list, self.clock);
-        (thread.waiting, thread.earliest) = waiting(list);
+        (thread.waiting, thread.earliest) = drop_arrived(list, self.clock);
         if thread.waiting == 0 {
             self.spare.push(thread.list);
         }
@@ -233,7 +237,7 @@ impl Pipeline {
             self.pending.push(Vec::new());
             self.pending.len() as u32 - 1
         });
-        let (waiting, earliest) = waiting(pending);
+        let (waiting, earliest) = drop_arrived(pending, self.clock);
         let thread = Looping {
             back: 0,
             earliest,
@@ -348,10 +352,7 @@ mod tests {
             segment,
         };
         let mut list = vec![one(9, 0b11, 0), one(5, 0b110, 0), one(7, 0b1, 3)];
-        let found = [4, 6, 7, 9].map(|now| {
-            drop_arrived(&mut list, now);
-            waiting(&list)
-        });
+        let found = [4, 6, 7, 9].map(|now| drop_arrived(&mut list, now));
         assert_eq!(found, [(4, 5), (3, 7), (2, 9), (0, u64::MAX)]);
     }
 

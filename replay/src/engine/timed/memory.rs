@@ -11,6 +11,7 @@ use crate::cache::{Delay, DelayedFill, Levels, Missing, NOT_ASKED};
 use crate::config::TmuConfig;
 use crate::stream::{QuadLines, Use};
 use crate::tmu::Pending;
+use std::hint::select_unpredictable;
 
 /// A core's L1, and the thread that was looked up last.
 struct First<D> {
@@ -110,6 +111,11 @@ impl<D: DelayedFill> Memory<D> {
         let missing = std::mem::take(&mut self.l1[core].missing);
         if missing.is_empty() {
             self.one_by_one(core, now, quad, &mut trips);
+        }
+        if quad.is_one_segment() {
+            self.segment(core, now, quad, &missing, 0, &mut trips);
+            self.l1[core].missing = missing;
+            return &mut self.pending;
         }
         let mut rest = &*missing;
         for (segment, end) in (0..).zip(quad.segments()) {
@@ -288,10 +294,9 @@ impl Trips {
     fn next(&mut self, fetches_per_trip: u32) -> u32 {
         let trip = self.full_trips;
         self.fetches += 1;
-        if self.fetches == fetches_per_trip {
-            self.fetches = 0;
-            self.full_trips += 1;
-        }
+        let full = self.fetches == fetches_per_trip;
+        self.fetches = select_unpredictable(full, 0, self.fetches);
+        self.full_trips += u32::from(full);
         trip
     }
 }
