@@ -271,14 +271,7 @@ impl<'a> Expander<'a> {
         out: &mut TileLines,
     ) -> (u64, u32) {
         let (mut hash, mut lookups) = (0_u64, 0);
-        let count = usize::from(bundle.count);
-        let mut index = 0;
-        while index < count {
-            let mut next = index + 1;
-            while next < count && bundle.repeats(next) {
-                next += 1;
-            }
-            let times = (next - index) as u32;
+        for (index, times) in bundle.runs() {
             let [first, other] = Tag::of_footprint(cell, times - 1);
             let mut tag = first;
             let mut once = 0_u64;
@@ -296,7 +289,6 @@ impl<'a> Expander<'a> {
             }
             hash = hash.wrapping_add(once.wrapping_mul(times.into()));
             lookups += relative.len() as u32 * times;
-            index = next;
         }
         (hash, lookups)
     }

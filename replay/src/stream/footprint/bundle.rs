@@ -34,11 +34,18 @@ impl Bundle {
         &self.lines[index & 3][..len]
     }
 
-    /// True if the footprint has the same lines as the one before.
+    /// The footprints that do not have the same lines as the one before: of each its index, and how many
+    /// lanes in a row have it.
     #[inline(always)]
-    #[must_use]
-    pub fn repeats(&self, index: usize) -> bool {
-        self.repeats >> index & 1 != 0
+    pub fn runs(&self) -> impl Iterator<Item = (usize, u32)> + use<> {
+        // A bit for the first of each run, and one after the last lane.
+        let all = 1_u32 << self.count;
+        let mut firsts = (all - 1) & !u32::from(self.repeats) | all;
+        std::iter::from_fn(move || {
+            let first = firsts.trailing_zeros();
+            firsts &= firsts - 1;
+            (firsts != 0).then(|| (first as usize, firsts.trailing_zeros() - first))
+        })
     }
 
     /// Adds the footprint of the lines of its four texels (top left, top right, bottom left,
@@ -94,10 +101,14 @@ mod tests {
 
     #[test]
     fn only_equal_neighbours_are_repeats() {
-        let bundle = bundle(&[[1, 2, 1, 2], [1, 2, 1, 2], [2, 1, 2, 1], [1, 2, 1, 2]]);
-        assert_eq!(
-            [0, 1, 2, 3].map(|i| bundle.repeats(i)),
-            [false, true, false, false]
-        );
+        let footprints = [[1, 2, 1, 2], [1, 2, 1, 2], [2, 1, 2, 1], [1, 2, 1, 2]];
+        for (count, runs) in [
+            (0, &[][..]),
+            (1, &[(0, 1)]),
+            (2, &[(0, 2)]),
+            (4, &[(0, 2), (2, 1), (3, 1)]),
+        ] {
+            assert!(bundle(&footprints[..count]).runs().eq(runs.iter().copied()));
+        }
     }
 }
