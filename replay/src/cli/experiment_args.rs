@@ -10,6 +10,7 @@ use crate::report::picture::EmbeddedPicture;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::page;
 use anyhow::{Context, Result, bail, ensure};
+use rayon::prelude::*;
 use shell::{Output, Progress, is_stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -133,8 +134,9 @@ impl ExperimentArgs {
     /// A label that no trace has, a file that is no picture.
     fn pictures(&self, report: &PaperReport) -> Result<Vec<EmbeddedPicture>> {
         let known: Vec<&str> = report.traces.iter().map(|t| t.label.as_str()).collect();
-        self.images
-            .iter()
+        let pictures: Vec<Result<EmbeddedPicture>> = self
+            .images
+            .par_iter()
             .map(|image| {
                 let (label, path) = match image.split_once('=') {
                     Some((label, path)) => (label, path),
@@ -151,7 +153,9 @@ impl ExperimentArgs {
                 );
                 EmbeddedPicture::open(label, Path::new(path))
             })
-            .collect()
+            .collect();
+        // The first error in the order of the arguments is what is told.
+        pictures.into_iter().collect()
     }
 
     /// Writes the report's page, and the same numbers beside it as JSON and CSV.

@@ -19,6 +19,7 @@ fn fast(tables: &Tables, config: &RunConfig, record: &QuadRecord) -> Vec<Read> {
         &[*record],
         &mut footprints.scratch(),
         |sample, bundle| {
+            let mut firsts = bundle.runs().map(|(first, _)| first).peekable();
             for index in 0..usize::from(bundle.count) {
                 let lines: Vec<u32> = bundle
                     .lines_of(index)
@@ -26,7 +27,7 @@ fn fast(tables: &Tables, config: &RunConfig, record: &QuadRecord) -> Vec<Read> {
                     .map(|l| sample.base_line + l)
                     .collect();
                 let same = index > 0 && reads.last().is_some_and(|(_, _, last)| *last == lines);
-                assert_eq!(bundle.repeats(index), same);
+                assert_eq!(firsts.next_if_eq(&index).is_none(), same);
                 reads.push((sample.texture, bundle.level, lines));
             }
         },
