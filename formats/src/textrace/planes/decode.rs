@@ -4,7 +4,9 @@
 
 use super::codes::{Codes, sizes_context};
 use super::mode::{Departure, Mode};
-use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
+use super::parents::{
+    Expected, Lineage, MOST_PARENT_BITS, first_noise, level_context, tilt_of_run,
+};
 use super::places::{Last, Place, Places};
 use super::plane::{Plane, Quad, Surface};
 use super::residual::{CLASS_NUMBER_BITS, Classes, Pair, WIDE, sum, symbol, unfold};
@@ -210,10 +212,10 @@ impl<'a> Decoder<'a> {
             return Err("widths of at most 32 bits");
         }
         back.skip(used);
-        if power > 6 {
+        if power > MOST_PARENT_BITS {
             return Err("an earlier run of the group");
         }
-        // Six bits and five codes.
+        // The bits of the parent's number and five codes.
         let bits = back.peek().ok_or(SHORT)?;
         let parent = usize::try_from(from_one(power, bits) - 1).unwrap_or(usize::MAX);
         let mut used = power;
@@ -366,7 +368,11 @@ fn later<const PLAIN: bool>(
                 *to = sum(*to, rest);
             }
         }
-        add(&mut record, &expected, &told.departure.read(x, y, &residual));
+        add(
+            &mut record,
+            &expected,
+            &told.departure.read(x, y, &residual),
+        );
     }
     told.noise = classes.noise();
     Ok(record)

@@ -236,7 +236,12 @@ impl<'a, S: Sink> Encoder<'a, S> {
                     bits += self.pairs_bits(&self.codes.correction, &correction);
                 }
                 let departure = Departure::start(mode, first.x, first.y);
-                bits += self.run_bits(&Surface::from(&plane), departure, others, first_noise(level));
+                bits += self.run_bits(
+                    &Surface::from(&plane),
+                    departure,
+                    others,
+                    first_noise(level),
+                );
                 if bits < least {
                     least = bits;
                     best = Choice {

@@ -3,7 +3,7 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::GROUPS;
-use super::plane::{Surface, Quad, cross, tilt_of};
+use super::plane::{Quad, Surface, cross, tilt_of};
 use crate::varint::low_u32;
 
 /// Which code tells the level of a plane's corrections, by how many records of its group are likely to
@@ -25,6 +25,8 @@ pub(super) fn first_noise(level: u32) -> usize {
 
 /// Most planes of a group that can be a parent. More would be smaller by little and take longer.
 const MOST_PARENTS: usize = 64;
+/// Bits below the highest one of the largest number that names a parent.
+pub(super) const MOST_PARENT_BITS: u32 = MOST_PARENTS.ilog2();
 
 /// The planes so far, and the last ones of each group.
 pub(super) struct Lineage {

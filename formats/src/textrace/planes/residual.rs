@@ -95,7 +95,7 @@ impl Classes {
         let last = class_bits(dy) + class_bits(cross);
         let mut wide = (uv >= WIDE) as u32 | ((dx >= WIDE) as u32) << 1;
         wide |= ((dy >= WIDE) as u32) << 2 | ((cross >= WIDE) as u32) << 3;
-        let low = first + last | first << 5 | noise << 9 | ((wide != 0) as u32) << 12;
+        let low = (first + last) | first << 5 | noise << 9 | ((wide != 0) as u32) << 12;
         let high = (last | wide << 4) as u64;
         let starts = (two_start(uv, dx) | two_start(dy, cross) << 16) as u64;
         Self(low as u64 | starts << 16 | high << 48)
@@ -209,7 +209,10 @@ const fn two_start(one: u32, other: u32) -> u32 {
 }
 
 /// The pair of a class that some bits name.
-#[allow(clippy::indexing_slicing, reason = "evaluated when compiled, or a test")]
+#[allow(
+    clippy::indexing_slicing,
+    reason = "evaluated when compiled, or a test"
+)]
 pub(super) const fn small(class: u32, bits: u32) -> [i8; 2] {
     let index = bits & ((1 << class_bits(class)) - 1);
     SMALL[(nibble(STARTS, class) + index) as usize]

@@ -137,7 +137,10 @@ fn other_counts_than_the_index_tells_are_refused() {
         let mut out = Tile::default();
         let refused = decode(runs, records, &bytes, &mut out).is_err();
         assert!(refused, "{runs} runs of {records}");
-        assert!(out.records.len() <= bytes.len() * 8 + 8, "bounded by the bytes");
+        assert!(
+            out.records.len() <= bytes.len() * 8 + 8,
+            "bounded by the bytes"
+        );
     }
 }
 
