@@ -3,6 +3,7 @@
 Written from FORMAT.md alone; even the code lengths are read from there.
 """
 
+import struct
 from pathlib import Path
 
 from container import require, unzigzag
@@ -68,10 +69,6 @@ class Bits:
                 return code.symbols[length, bits]
         require(False, "bits that are no code")
 
-    def power(self, code):
-        power = self.symbol(code)
-        return (1 << power) + self.take(power)
-
     def gamma(self):
         zeros = 0
         while not self.take(1):
@@ -97,35 +94,50 @@ def wide(value):
     return i32(round(value))
 
 
+def f32(value):
+    """A single operation of f64 on f32 numbers, rounded again, is that of f32."""
+    return struct.unpack("<f", struct.pack("<f", value))[0]
+
+
+def near(value):
+    (bits,) = struct.unpack("<I", struct.pack("<f", value + 12582912.0))
+    return i32(bits - 0x4B400000)
+
+
 class Plane:
     def __init__(self):
-        self.ox = self.oy = 0
-        self.start, self.right, self.down = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
-        self.p = self.q = 0.0
+        self.keep(0, 0, [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], 0.0, 0.0)
 
-    def w(self, x, y):
-        return (1.0 + self.p * (2 * x - self.ox)) + self.q * (2 * y - self.oy)
+    def keep(self, ox, oy, start, right, down, p, q):
+        self.ox, self.oy = ox, oy
+        self.base = [wide(each) for each in start]
+        self.rest = [f32(each - base) for each, base in zip(start, self.base)]
+        self.right, self.down = [f32(each) for each in right], [f32(each) for each in down]
+        self.p, self.q = f32(p), f32(q)
+
+    def w(self, right, down):
+        return f32(f32(1.0 + f32(self.p * right)) + f32(self.q * down))
 
     def tilt(self, x, y):
-        w = least(self.w(x, y))
-        return one(self.p / w), one(self.q / w)
+        w = least(self.w(2 * x - self.ox, 2 * y - self.oy))
+        return one(f32(self.p / w)), one(f32(self.q / w))
 
     def says(self, x, y):
         """uv, dx, dy and cross."""
-        w0 = self.w(x, y)
-        w1 = w0 + self.p
-        weights = [w0, w1, w0 + self.q, w1 + self.q]
-        scales = [1.0 / least(w) for w in weights]
+        X, Y = 2 * x - self.ox, 2 * y - self.oy
+        upper = [self.w(X, Y), self.w(X + 1, Y)]
+        weights = [least(w) for w in upper + [f32(w + self.q) for w in upper]]
         says = [[0, 0] for _ in range(4)]
         for i in range(2):
             right, down = self.right[i], self.down[i]
-            n0 = right * (2 * x - self.ox) + down * (2 * y - self.oy)
-            n1 = n0 + right
-            numbers = [n0, n1, n0 + down, n1 + down]
-            a, b, c, d = (n * scale for n, scale in zip(numbers, scales))
-            row = [self.start[i] + a, b - a, c - a, (d - c) - (b - a)]
+            upper = [f32(f32(right * at) + f32(down * Y)) for at in (X, X + 1)]
+            numbers = upper + [f32(n + down) for n in upper]
+            a, b, c, d = (f32(n / w) for n, w in zip(numbers, weights))
+            cross = f32(f32(d - b) - f32(c - a))
+            row = [f32(a + self.rest[i]), f32(b - a), f32(c - a), cross]
             for k, value in enumerate(row):
-                says[k][i] = wide(value)
+                says[k][i] = near(value)
+            says[0][i] = i32(says[0][i] + self.base[i])
         return says
 
 
@@ -275,22 +287,25 @@ class Tile:
         return place, mask, group
 
     def tell(self, told, earlier, of_run, likely_others):
-        bits, codes, x, y = self.bits, self.codes, told.x, told.y
-        back = bits.power(codes["parent"][0]) - 1
+        bits, codes, x, y = self.back, self.codes, told.x, told.y
+        power = bits.symbol(codes["parent"][0])
+        require(power <= 6, "a plane that is not there")
+        width, widths = 0, []
+        for i in range(4):
+            width += unzigzag(bits.symbol(codes["first"][i]))
+            widths.append(width)
+        back = (1 << power) + bits.take(power) - 1
         counted = min(len(earlier), 64)
         require(back <= counted, "a plane that is not there")
         parent = Plane() if back == counted else earlier[-1 - back]
-        width, left = 0, []
-        for i in range(4):
-            width += unzigzag(bits.symbol(codes["first"][i]))
-            left.append(bits.pair(width))
         mode = level = 0
         if likely_others:
             context = min((likely_others + 1).bit_length() - 2, 3)
             mode, level = divmod(bits.symbol(codes["level"][context]), 8)
-        by = [[0, 0]] * 4
         if level:
-            by = [bits.pair(bits.symbol(codes["correction"][i])) for i in range(4)]
+            widths += [bits.symbol(codes["correction"][i]) for i in range(4)]
+        left = [bits.pair(width) for width in widths]
+        by = left[4:] or [[0, 0]] * 4
         p, q = (of_run or parent).tilt(x, y)
         uv, dx, dy, _ = parent.says(x, y)
         add = lambda a, b: wrapped(a[0] + b[0], a[1] + b[1])
@@ -305,16 +320,16 @@ class Tile:
             p = one(p + by[3][0] * 2.0 ** -(2 * level + size))
             q = one(q + by[3][1] * 2.0 ** -(2 * level + size))
         plane = Plane()
-        plane.ox, plane.oy, plane.p, plane.q = 2 * x, 2 * y, p, q
         unit = 2.0**-level
-        plane.start = [uv[k] + by[0][k] * 0.25 for k in range(2)]
-        plane.right = [dx[k] * (1.0 + p) + by[1][k] * unit for k in range(2)]
-        plane.down = [dy[k] * (1.0 + q) + by[2][k] * unit for k in range(2)]
+        start = [uv[k] + by[0][k] * 0.25 for k in range(2)]
+        right = [dx[k] * (1.0 + p) + by[1][k] * unit for k in range(2)]
+        down = [dy[k] * (1.0 + q) + by[2][k] * unit for k in range(2)]
+        plane.keep(2 * x, 2 * y, start, right, down, p, q)
         told.plane, told.quad = plane, (uv, dx, dy, cross)
         told.mode, told.noise, told.context = mode, 2 if level else 3, Context(x, y)
 
     def residuals(self, told):
-        """Pairs of dx, dy, cross and uv."""
+        """Pairs of uv, dx, dy and cross."""
         bits = self.back
         z = bits.symbol(self.codes["sizes"][6 * told.mode + told.noise])
         if z == ESCAPE_SIZES:
@@ -335,8 +350,7 @@ class Tile:
         return pairs
 
     def departed(self, told, x, y):
-        dx, dy, cross, uv = self.residuals(told)
-        departure = [uv, dx, dy, cross]
+        uv, dx, dy, cross = departure = self.residuals(told)
         if told.mode == 1:
             cross = [cross[i] + uv[i] - dx[i] - dy[i] for i in range(2)]
             dx = [dx[i] - uv[i] for i in range(2)]
@@ -354,11 +368,12 @@ def decode_planes(data, runs, records, codes):
     heads, following, draw = [], 0, 0
     for _ in range(runs):
         head = bits.symbol(codes["header"][0])
+        power = bits.symbol(codes["count"][0])
         primitive = following - 1 + (1 << (head >> 1)) + bits.take(head >> 1)
         require(primitive < 1 << 32, "a primitive out of range")
         if head & 1:
             draw = bits.gamma() - 1
-        count = bits.power(codes["count"][0])
+        count = (1 << power) + bits.take(power)
         require(len(tile.rows) + count <= records, "records of a run")
         heads.append((primitive, draw, count))
         following = primitive + 1

@@ -51,64 +51,24 @@ impl BitWriter {
     }
 }
 
-/// Reads bits from bytes; `BACK`: from the last byte to the first.
+/// Reads bits from bytes that end with [`PADDING_BYTES`].
 #[derive(Clone, Copy)]
-pub(in crate::textrace) struct BitReader<'a, const BACK: bool = false> {
+pub(in crate::textrace) struct BitReader<'a> {
     bytes: &'a [u8],
     bit: usize,
 }
 
 impl<'a> BitReader<'a> {
-    /// The next bits, at least [`PEEK_BITS`] of them, of bytes that end with padding; `None` at the end.
-    #[inline(always)]
-    pub(in crate::textrace) fn peek(&self) -> Option<u64> {
-        let word = self.bytes.get(self.bit >> 3..)?.first_chunk::<8>()?;
-        Some(u64::from_le_bytes(*word) >> (self.bit & 7))
-    }
-
-    /// The bytes that no read bit lies in.
-    pub(in crate::textrace) fn rest(&self) -> &'a [u8] {
-        self.bytes.get(self.bytes_read()..).unwrap_or_default()
-    }
-}
-
-impl<'a, const BACK: bool> BitReader<'a, BACK> {
     pub(in crate::textrace) fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, bit: 0 }
     }
 
-    /// The next bits, at least [`PEEK_BITS`] of them, zeros after the last one; `None` where bits were
-    /// read that are not there.
+    /// The next bits, at least [`PEEK_BITS`] of them; `None` at the end.
     #[inline(always)]
-    pub(in crate::textrace) fn peek_unpadded(&self) -> Option<u64> {
-        self.whole_word().or_else(|| self.peek_tail())
-    }
-
-    #[inline(always)]
-    fn whole_word(&self) -> Option<u64> {
+    pub(in crate::textrace) fn peek(&self) -> Option<u64> {
         let at = self.bit >> 3;
-        let word = if BACK {
-            let end = self.bytes.len().checked_sub(at)?;
-            u64::from_be_bytes(*self.bytes.get(..end)?.last_chunk::<8>()?)
-        } else {
-            u64::from_le_bytes(*self.bytes.get(at..)?.first_chunk::<8>()?)
-        };
-        Some(word >> (self.bit & 7))
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn peek_tail(&self) -> Option<u64> {
-        let mut word = [0; 8];
-        let at = self.bit >> 3;
-        if BACK {
-            let left = self.bytes.iter().rev().skip(at);
-            word.iter_mut().zip(left).for_each(|(to, from)| *to = *from);
-        } else {
-            let left = self.bytes.iter().skip(at);
-            word.iter_mut().zip(left).for_each(|(to, from)| *to = *from);
-        }
-        (self.bit <= self.bytes.len() * 8).then(|| u64::from_le_bytes(word) >> (self.bit & 7))
+        let word = self.bytes.get(at..at + 8)?.first_chunk::<8>()?;
+        Some(u64::from_le_bytes(*word) >> (self.bit & 7))
     }
 
     #[inline(always)]
@@ -116,14 +76,14 @@ impl<'a, const BACK: bool> BitReader<'a, BACK> {
         self.bit += count as usize;
     }
 
+    /// The bytes that no read bit lies in.
+    pub(in crate::textrace) fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.bytes_read()..).unwrap_or_default()
+    }
+
     /// The bits between the last one read and the end of its byte.
     pub(in crate::textrace) fn left_in_byte(&self) -> u8 {
-        let at = self.bit >> 3;
-        let byte = if BACK {
-            self.bytes.iter().rev().nth(at)
-        } else {
-            self.bytes.get(at)
-        };
+        let byte = self.bytes.get(self.bit >> 3);
         match self.bit & 7 {
             0 => 0,
             read => byte.copied().unwrap_or_default() >> read,

@@ -1,15 +1,15 @@
-//! From bits to records, run by run: places and planes from the front, departures from the back. The
-//! two readers do not wait for each other, nor does either wait for what the planes say.
+//! From bits to records, run by run: runs and places from the front, planes and departures from the back.
+//! The two readers do not wait for each other, nor does either wait for what the planes say.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::codes::{Code, Codes, sizes_context};
+use super::codes::{Codes, sizes_context};
 use super::mode::{Departure, Mode};
-use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
-use super::places::{Last, Places};
-use super::plane::{Plane, Quad};
-use super::residual::{
-    CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, Pair, WIDE, small_pairs, sum, unfold,
+use super::parents::{
+    Expected, Lineage, MOST_PARENT_BITS, first_noise, level_context, tilt_of_run,
 };
+use super::places::{Last, Place, Places};
+use super::plane::{Plane, Quad, Surface};
+use super::residual::{CLASS_NUMBER_BITS, Classes, Pair, WIDE, sum, symbol, unfold};
 use super::{GROUPS, SHORT};
 use crate::textrace::bits::{BitReader, PEEK_BITS};
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile};
@@ -19,54 +19,55 @@ use crate::varint::{low_u32, unzigzag};
 pub(super) type Outcome<T> = Result<T, &'static str>;
 
 /// A group of a run.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Told {
-    group: u8,
-    plane: Plane,
+    plane: Surface,
     departure: Departure,
     noise: usize,
 }
 
 pub(super) struct Decoder<'a> {
-    front: BitReader<'a>,
-    back: BitReader<'a, true>,
+    pub front: BitReader<'a>,
+    pub back: BitReader<'a>,
     codes: &'static Codes,
     lineage: Lineage,
-    /// The groups of a run.
-    told: Vec<Told>,
+    /// By group, of those of the run.
+    told: [Told; GROUPS],
 }
 
 impl<'a> Decoder<'a> {
-    pub fn new(input: &'a [u8]) -> Self {
+    /// Bytes from the front and bytes from the back, both with padding.
+    pub fn new(front: &'a [u8], back: &'a [u8]) -> Self {
         Self {
-            front: BitReader::new(input),
-            back: BitReader::new(input),
+            front: BitReader::new(front),
+            back: BitReader::new(back),
             codes: Codes::get(),
             lineage: Lineage::new(),
-            told: vec![],
+            told: [Told::default(); GROUPS],
         }
-    }
-
-    /// What follows from the front and from the back.
-    pub fn readers(&self) -> (&BitReader<'a>, &BitReader<'a, true>) {
-        (&self.front, &self.back)
     }
 
     /// Reads the runs and their records.
     pub fn tile(&mut self, runs: u32, records: u32, tile: &mut Tile) -> Outcome<()> {
         let mut places = Places::new();
+        let mut last = Last::new();
         let mut next_primitive = 0u64;
         let mut draw = 0;
         let mut first = 0u32;
         for _ in 0..runs {
-            let header = self.symbol(&self.codes.header)?;
-            let power = header >> 1;
-            let primitive = next_primitive + (1 << power | self.take(power)?) - 1;
+            // Two codes and 32 bits at most.
+            let bits = self.front.peek().ok_or(SHORT)?;
+            let (header, header_bits) = self.codes.header.decode(bits);
+            let (power, count_bits) = self.codes.count.decode(bits >> header_bits);
+            let used = header_bits + count_bits;
+            let primitive = next_primitive + from_one(header >> 1, bits >> used) - 1;
             let primitive = u32::try_from(primitive).map_err(|_| "a primitive below 2^32")?;
+            self.front.skip(used + (header >> 1));
             if header & 1 == 1 {
-                draw = u32::try_from(self.gamma()? - 1).map_err(|_| "a draw below 2^32")?;
+                draw = self.draw()?;
             }
-            let count = u32::try_from(self.number(&self.codes.count)?).unwrap_or(u32::MAX);
+            let bits = self.front.peek().ok_or(SHORT)?;
+            let count = u32::try_from(from_one(power, bits)).unwrap_or(u32::MAX);
             if count > records - first {
                 return Err("a run of no more records than the index tells");
             }
@@ -76,11 +77,11 @@ impl<'a> Decoder<'a> {
                 first,
                 count,
             });
-            places.start_run(draw);
-            if places.tells_regular() {
-                places.set_regular(self.take(1)? == 1);
-            }
-            self.run(&mut places, count, &mut tile.records)?;
+            places.start_run(&mut last, draw);
+            let tells_regular = places.tells_regular();
+            last.regular = tells_regular & (bits >> power & 1 == 1);
+            self.front.skip(power + u32::from(tells_regular));
+            last = self.run(&mut places, last, count, &mut tile.records)?;
             first += count;
             next_primitive = u64::from(primitive) + 1;
         }
@@ -90,42 +91,16 @@ impl<'a> Decoder<'a> {
         Ok(())
     }
 
-    #[inline(always)]
-    fn peek(&self) -> Outcome<u64> {
-        self.front.peek_unpadded().ok_or(SHORT)
-    }
-
-    /// A number of at most 32 bits.
-    #[inline(always)]
-    fn take(&mut self, count: u32) -> Outcome<u64> {
-        let bits = self.peek()?;
-        self.front.skip(count);
-        Ok(bits & ((1 << count) - 1))
-    }
-
-    /// A symbol of a code.
-    #[inline(always)]
-    fn symbol(&mut self, code: &Code) -> Outcome<u32> {
-        let (symbol, length) = code.decode(self.peek()?);
-        self.front.skip(length);
-        Ok(symbol)
-    }
-
-    /// A number from 1 to 2^33 - 1: a code tells its highest bit.
-    #[inline]
-    fn number(&mut self, code: &Code) -> Outcome<u64> {
-        let power = self.symbol(code)?;
-        Ok(1 << power | self.take(power)?)
-    }
-
-    /// A number from 1 to 2^33 - 1 in Elias's gamma code.
-    fn gamma(&mut self) -> Outcome<u64> {
-        let zeros = self.peek()?.trailing_zeros();
+    /// A draw, by Elias's gamma code.
+    fn draw(&mut self) -> Outcome<u32> {
+        let zeros = self.front.peek().ok_or(SHORT)?.trailing_zeros();
         if zeros > 32 {
             return Err("a number below 2^33");
         }
         self.front.skip(zeros + 1);
-        Ok(1 << zeros | self.take(zeros)?)
+        let number = from_one(zeros, self.front.peek().ok_or(SHORT)?);
+        self.front.skip(zeros);
+        u32::try_from(number - 1).map_err(|_| "a draw below 2^32")
     }
 
     /// The records of a run.
@@ -133,73 +108,61 @@ impl<'a> Decoder<'a> {
     fn run(
         &mut self,
         places: &mut Places,
+        mut last: Last,
         count: u32,
         records: &mut Vec<QuadRecord>,
-    ) -> Outcome<()> {
-        self.told.clear();
-        // Index in `told` of each group.
-        let mut known = [usize::MAX; GROUPS];
-        let mut of_run = None;
+    ) -> Outcome<Last> {
+        // Groups whose planes were told, a bit each.
+        let mut known = 0u32;
+        let mut tilt_from = None;
         let mut left = count;
         while left > 0 {
             left -= 1;
-            let mut last = places.last;
-            let (place, used) = places.read(&mut last, self.codes, self.peek()?)?;
+            let word = self.front.peek().ok_or(SHORT)?;
+            let (place, used) = places.read(&mut last, self.codes, word)?;
             self.front.skip(used);
-            let mut record = place.record();
-            let known_as = known.get_mut(usize::from(place.group) % GROUPS);
-            let known_as = known_as.ok_or(SHORT)?;
-            if let Some(told) = self.told.get_mut(*known_as) {
-                later(&mut self.back, self.codes, &mut record, told)?;
+            let group = usize::from(place.group);
+            if known >> group & 1 == 0 {
+                known |= 1 << group;
+                let share = last.share(left);
+                records.push(self.first(place, tilt_from, share)?);
+                tilt_from = Some(group);
             } else {
-                *known_as = self.told.len();
-                let told = self.first(&mut record, of_run, places.share(left))?;
-                of_run = Some(told.plane);
-                self.told.push(told);
+                let told = self.told.get_mut(group).ok_or(SHORT)?;
+                records.push(later::<false>(&mut self.back, self.codes, place, told)?);
             }
-            records.push(record);
-            let index = *known_as;
             if let Some(starts) = places.starts_next_quad(&last) {
-                left = if starts == place.group {
-                    self.quads_of_one(places, &mut last, index, left, records)?
-                } else {
-                    let first = known.get(usize::from(starts) % GROUPS).copied();
-                    let both = [first.unwrap_or(usize::MAX), index];
-                    self.quads_of_two(places, &mut last, both, left, records)?
-                };
+                let starts = usize::from(starts);
+                if starts == group {
+                    (left, last) = self.quads_of_one(places, last, left, records)?;
+                } else if known >> starts & 1 == 1 {
+                    let groups = [starts, group];
+                    (left, last) = self.quads_of_two(places, last, groups, left, records)?;
+                }
             }
-            places.last = last;
         }
-        Ok(())
+        Ok(last)
     }
 
     /// Quads of a group that follows itself, for as long as no other comes. Gives back how many records of the
-    /// run are left.
+    /// run are left, and what comes last now.
     #[inline(always)]
     fn quads_of_one(
         &mut self,
         places: &mut Places,
-        last: &mut Last,
-        index: usize,
-        mut left: u32,
+        last: Last,
+        left: u32,
         records: &mut Vec<QuadRecord>,
-    ) -> Outcome<u32> {
-        let told = self.told.get_mut(index).ok_or(SHORT)?;
-        // In registers, not in memory.
-        let (mut front, mut back, mut now) = (self.front, self.back, *told);
-        while left > 0 {
-            let word = front.peek_unpadded().ok_or(SHORT)?;
-            let Some((place, used)) = places.read_next_quad(last, self.codes, word)? else {
-                break;
-            };
-            front.skip(used);
-            let mut record = place.record();
-            later(&mut back, self.codes, &mut record, &mut now)?;
-            records.push(record);
-            left -= 1;
-        }
-        (self.front, self.back, *told) = (front, back, now);
-        Ok(left)
+    ) -> Outcome<(u32, Last)> {
+        let told = self.told.get_mut(usize::from(last.place.group));
+        let told = told.ok_or(SHORT)?;
+        let readers = (&mut self.front, &mut self.back);
+        let all = if told.departure.mode == Mode::Plain {
+            one::<true>
+        } else {
+            one::<false>
+        };
+        all(readers, self.codes, places, last, told, left, records)
     }
 
     /// The same of two groups in the same quads, in their order.
@@ -207,67 +170,85 @@ impl<'a> Decoder<'a> {
     fn quads_of_two(
         &mut self,
         places: &mut Places,
-        last: &mut Last,
-        [first, second]: [usize; 2],
-        mut left: u32,
+        last: Last,
+        groups: [usize; 2],
+        left: u32,
         records: &mut Vec<QuadRecord>,
-    ) -> Outcome<u32> {
-        let Some((one, two)) = self.told.get(first).zip(self.told.get(second)) else {
-            return Ok(left);
+    ) -> Outcome<(u32, Last)> {
+        let told = self.told.get_disjoint_mut(groups).map_err(|_| SHORT)?;
+        let readers = (&mut self.front, &mut self.back);
+        let all = if told.iter().all(|told| told.departure.mode == Mode::Plain) {
+            two::<true>
+        } else {
+            two::<false>
         };
-        let group = last.place.group;
-        let (mut one, mut two) = (*one, *two);
-        let (mut front, mut back) = (self.front, self.back);
-        while left > 1 {
-            let word = front.peek_unpadded().ok_or(SHORT)?;
-            let Some((place, used)) = places.read_next_quad(last, self.codes, word)? else {
-                break;
-            };
-            front.skip(used);
-            let mut record = place.record();
-            record.group = one.group;
-            later(&mut back, self.codes, &mut record, &mut one)?;
-            records.push(record);
-            record.group = group;
-            later(&mut back, self.codes, &mut record, &mut two)?;
-            records.push(record);
-            left -= 2;
-        }
-        (self.front, self.back) = (front, back);
-        for (index, now) in [(first, one), (second, two)] {
-            if let Some(told) = self.told.get_mut(index) {
-                *told = now;
-            }
-        }
-        Ok(left)
+        all(readers, self.codes, places, last, told, left, records)
     }
 
-    /// The first quad of a group in a run, and its plane.
+    /// The first quad of a group in a run, and its plane; `tilt_from` is the group of the run's plane before.
     #[inline(always)]
     fn first(
         &mut self,
-        record: &mut QuadRecord,
-        of_run: Option<Plane>,
+        place: Place,
+        tilt_from: Option<usize>,
         likely_others: u32,
-    ) -> Outcome<Told> {
-        let QuadRecord { x, y, group, .. } = *record;
-        let back = usize::try_from(self.number(&self.codes.parent)? - 1).unwrap_or(usize::MAX);
-        let parent = self.lineage.parent(group, back);
-        let parent = parent.ok_or("an earlier run of the group")?;
-        let mut left = [[0; 2]; 4];
+    ) -> Outcome<QuadRecord> {
+        let mut record = place.record();
+        let QuadRecord { x, y, group, .. } = record;
+        let codes = self.codes;
+        let mut back = self.back;
+        // Five codes of 10 bits at most.
+        let bits = back.peek().ok_or(SHORT)?;
+        let (power, mut used) = codes.parent.decode(bits);
+        let mut widths = [0; 4];
         let mut width = 0;
-        for (left, code) in left.iter_mut().zip(&self.codes.first) {
-            (width, *left) = self.pair_after(code, width)?;
+        for (to, code) in widths.iter_mut().zip(&codes.first) {
+            let (symbol, length) = code.decode(bits >> used);
+            width += unzigzag(symbol.into());
+            *to = u32::try_from(width).unwrap_or(u32::MAX);
+            used += length;
         }
-        let (mode, level) = self.level(likely_others)?;
-        let mut by = Quad::default();
-        if level > 0 {
-            for (pair, code) in by.iter_mut().zip(&self.codes.correction) {
-                *pair = pair_of(&mut self.front, code)?;
+        if widths.iter().any(|width| *width > 32) {
+            return Err("widths of at most 32 bits");
+        }
+        back.skip(used);
+        if power > MOST_PARENT_BITS {
+            return Err("an earlier run of the group");
+        }
+        // The bits of the parent's number and five codes.
+        let bits = back.peek().ok_or(SHORT)?;
+        let parent = usize::try_from(from_one(power, bits) - 1).unwrap_or(usize::MAX);
+        let mut used = power;
+        let (mut mode, mut level) = (Mode::Plain, 0);
+        let mut correction_widths = [0; 4];
+        if let Some(context) = level_context(likely_others) {
+            let code = codes.level.get(context).ok_or(SHORT)?;
+            let (symbol, length) = code.decode(bits >> used);
+            used += length;
+            mode = Mode::of(symbol >> 3).ok_or("one of the modes")?;
+            level = symbol & 7;
+            if level > 0 {
+                for (to, code) in correction_widths.iter_mut().zip(&codes.correction) {
+                    let (width, length) = code.decode(bits >> used);
+                    *to = width;
+                    used += length;
+                }
             }
         }
-        let [dx, dy, cross, uv] = left;
-        let expected = Expected::new(&parent, of_run.as_ref(), x, y);
+        back.skip(used);
+        let [dx_bits, dy_bits, cross_bits, uv_bits] = widths;
+        let [dx, dy] = pairs(&mut back, [dx_bits, dy_bits])?;
+        let [cross, uv] = pairs(&mut back, [cross_bits, uv_bits])?;
+        let mut by = Quad::default();
+        if level > 0 {
+            by = pairs(&mut back, correction_widths)?;
+        }
+        self.back = back;
+
+        let parent = self.lineage.parent(group, parent);
+        let parent = parent.ok_or("an earlier run of the group")?;
+        let of_run = tilt_from.and_then(|group| self.told.get(group));
+        let expected = Expected::new(&parent, of_run.map(|told| &told.plane), x, y);
         let [of_dx, of_dy] = expected.slopes();
         let (dx, dy) = (sum(of_dx, dx), sum(of_dy, dy));
         let cross = sum(expected.cross(dx, dy), cross);
@@ -280,147 +261,197 @@ impl<'a> Decoder<'a> {
         } else {
             Plane::corrected(x, y, &quad, tilt, level, &by)
         };
+        let plane = Surface::from(&plane);
         self.lineage.note(group, plane);
-        Ok(Told {
-            group,
+        let told = self.told.get_mut(usize::from(group));
+        *told.ok_or(SHORT)? = Told {
             plane,
             departure: Departure::start(mode, x, y),
             noise: first_noise(level),
-        })
-    }
-
-    /// How residuals are told, and how fine the correction of the plane is; a lone record has
-    /// neither.
-    fn level(&mut self, likely_others: u32) -> Outcome<(Mode, u32)> {
-        let Some(context) = level_context(likely_others) else {
-            return Ok((Mode::Plain, 0));
         };
-        let symbol = self.symbol(self.codes.level.get(context).ok_or(SHORT)?)?;
-        let mode = Mode::of(symbol >> 3).ok_or("one of the modes")?;
-        Ok((mode, symbol & 7))
-    }
-
-    /// A pair whose width a code tells as the difference from another, zigzag; and its width.
-    #[inline]
-    fn pair_after(&mut self, code: &Code, before: u32) -> Outcome<(u32, Pair)> {
-        let bits = self.peek()?;
-        let (symbol, length) = code.decode(bits);
-        let width = i64::from(before) + unzigzag(symbol.into());
-        let width = u32::try_from(width).ok().filter(|width| *width <= 32);
-        let width = width.ok_or("a width of at most 32 bits")?;
-        Ok((width, numbers(&mut self.front, bits, length, width)?))
+        Ok(record)
     }
 }
 
-/// A record after the first one of its group in its run.
-#[inline(always)]
-fn later(
-    back: &mut BitReader<'_, true>,
+type Readers<'r, 'a> = (&'r mut BitReader<'a>, &'r mut BitReader<'a>);
+
+/// See [`Decoder::quads_of_one`]; `PLAIN`: the group's mode is the plain one.
+fn one<const PLAIN: bool>(
+    readers: Readers<'_, '_>,
     codes: &Codes,
-    record: &mut QuadRecord,
+    places: &mut Places,
+    mut last: Last,
     told: &mut Told,
-) -> Outcome<()> {
-    let context = sizes_context(told.departure.mode, told.noise);
-    let bits = back.peek_unpadded().ok_or(SHORT)?;
-    let (symbol, mut length) = codes.sizes.decode(context, bits);
+    mut left: u32,
+    records: &mut Vec<QuadRecord>,
+) -> Outcome<(u32, Last)> {
+    // In registers, not in memory.
+    let (mut front, mut back) = (*readers.0, *readers.1);
+    while left > 0 {
+        let word = front.peek().ok_or(SHORT)?;
+        let Some((place, used)) = places.read_next_quad(&mut last, codes, word)? else {
+            break;
+        };
+        front.skip(used);
+        records.push(later::<PLAIN>(&mut back, codes, place, told)?);
+        left -= 1;
+    }
+    (*readers.0, *readers.1) = (front, back);
+    Ok((left, last))
+}
+
+/// See [`Decoder::quads_of_two`]; `PLAIN`: both modes are the plain one.
+fn two<const PLAIN: bool>(
+    readers: Readers<'_, '_>,
+    codes: &Codes,
+    places: &mut Places,
+    mut last: Last,
+    [first, second]: [&mut Told; 2],
+    mut left: u32,
+    records: &mut Vec<QuadRecord>,
+) -> Outcome<(u32, Last)> {
+    let (mut front, mut back) = (*readers.0, *readers.1);
+    let group = places.first_of_two(&last);
+    while left > 1 {
+        let word = front.peek().ok_or(SHORT)?;
+        let Some((place, used)) = places.read_next_quad(&mut last, codes, word)? else {
+            break;
+        };
+        front.skip(used);
+        let place_of_first = Place { group, ..place };
+        records.push(later::<PLAIN>(&mut back, codes, place_of_first, first)?);
+        records.push(later::<PLAIN>(&mut back, codes, place, second)?);
+        left -= 2;
+    }
+    (*readers.0, *readers.1) = (front, back);
+    Ok((left, last))
+}
+
+/// A record after the first one of its group in its run; `PLAIN`: its mode is the plain one.
+#[inline(always)]
+fn later<const PLAIN: bool>(
+    back: &mut BitReader<'_>,
+    codes: &Codes,
+    place: Place,
+    told: &mut Told,
+) -> Outcome<QuadRecord> {
+    let mode = if PLAIN {
+        Mode::Plain
+    } else {
+        told.departure.mode
+    };
+    let context = sizes_context(mode, told.noise);
+    let bits = back.peek().ok_or(SHORT)?;
+    let (symbol, code_bits) = codes.sizes.decode(context, bits);
     let mut classes = Classes::of_symbol(symbol);
-    if symbol == ESCAPE_SIZES {
-        let numbers = bits >> length;
-        length += 4 * CLASS_NUMBER_BITS;
-        let told = [0, 3, 6, 9].map(|from| low_u32(numbers >> from & 7));
-        if told.iter().any(|class| *class > WIDE) {
-            return Err("one of the classes");
+    let mut residual = classes.small_pairs(bits >> code_bits);
+    back.skip(code_bits + classes.bits());
+    let mut record = place.record();
+    let QuadRecord { x, y, .. } = record;
+    let expected = told.plane.predict(x, y);
+    if PLAIN {
+        add(&mut record, &expected, &residual);
+        if classes.is_special() {
+            let rest;
+            (classes, rest) = special(back, codes, classes)?;
+            let [uv, dx, dy, cross] = rest;
+            record.uv = sum(record.uv, uv);
+            record.dx = sum(record.dx, dx);
+            record.dy = sum(record.dy, dy);
+            record.cross = sum(record.cross, cross);
         }
-        classes = Classes::new(told);
+    } else {
+        if classes.is_special() {
+            let rest;
+            (classes, rest) = special(back, codes, classes)?;
+            for (to, rest) in residual.iter_mut().zip(rest) {
+                *to = sum(*to, rest);
+            }
+        }
+        add(
+            &mut record,
+            &expected,
+            &told.departure.read(x, y, &residual),
+        );
     }
-    told.noise = classes.noise.into();
-    let (mut residual, used) = small_pairs(classes, bits >> length);
-    back.skip(length + used);
-    if classes.wide {
-        residual = wide_pairs(back, codes, classes, residual)?;
-    }
-    let QuadRecord { x, y, .. } = *record;
-    let [uv, dx, dy, cross] = told.plane.predict(x, y);
-    let [by_uv, by_dx, by_dy, by_cross] = told.departure.read(x, y, &residual);
+    told.noise = classes.noise();
+    Ok(record)
+}
+
+#[inline(always)]
+fn add(record: &mut QuadRecord, expected: &Quad, departure: &Quad) {
+    let [uv, dx, dy, cross] = *expected;
+    let [by_uv, by_dx, by_dy, by_cross] = *departure;
     record.uv = sum(uv, by_uv);
     record.dx = sum(dx, by_dx);
     record.dy = sum(dy, by_dy);
     record.cross = sum(cross, by_cross);
-    Ok(())
 }
 
-/// Wide pairs, all of a width, in place of zeros.
-#[inline(always)]
-fn wide_pairs(
-    back: &mut BitReader<'_, true>,
+/// What is to be added where residuals are wide, or where their classes are told as numbers; and the classes.
+#[inline(never)]
+fn special(
+    back: &mut BitReader<'_>,
     codes: &Codes,
-    classes: Classes,
-    [uv, dx, dy, cross]: Quad,
-) -> Outcome<Quad> {
-    let word = back.peek_unpadded().ok_or(SHORT)?;
-    let (width, used) = codes.later.decode(word);
-    let [of_dx, of_dy, of_cross, of_uv] = classes.each();
-    let all = |class: u32| 2 * width * u32::from(class == WIDE);
-    let dx_end = used + all(of_dx);
-    let dy_end = dx_end + all(of_dy);
-    let cross_end = dy_end + all(of_cross);
-    let end = cross_end + all(of_uv);
-    if end <= PEEK_BITS {
-        // Which ones are wide is hard to foretell: no branches.
-        back.skip(end);
-        let low = (1u64 << width) - 1;
-        let pair = |class: u32, at: u32, small: Pair| {
-            let low = low * u64::from(class == WIDE);
-            let bits = word >> at;
-            let [u, v] = small;
-            [unfold(bits & low) | u, unfold(bits >> width & low) | v]
-        };
-        return Ok([
-            pair(of_uv, cross_end, uv),
-            pair(of_dx, used, dx),
-            pair(of_dy, dx_end, dy),
-            pair(of_cross, dy_end, cross),
-        ]);
+    mut classes: Classes,
+) -> Outcome<(Classes, Quad)> {
+    let mut residual = Quad::default();
+    if classes.is_escape() {
+        let bits = back.peek().ok_or(SHORT)?;
+        let told = [0, 3, 6, 9].map(|from| low_u32(bits >> from & 7));
+        if told.iter().any(|class| *class > WIDE) {
+            return Err("one of the classes");
+        }
+        classes = Classes::of_symbol(symbol(told));
+        residual = classes.small_pairs(bits >> (4 * CLASS_NUMBER_BITS));
+        back.skip(4 * CLASS_NUMBER_BITS + classes.bits());
     }
-    back.skip(used);
-    let mut quad = [dx, dy, cross, uv];
-    for (pair, class) in quad.iter_mut().zip(classes.each()) {
-        if class == WIDE {
-            let word = back.peek_unpadded().ok_or(SHORT)?;
-            *pair = numbers(back, word, 0, width)?;
+    let wide = classes.wide();
+    if wide != [0; 4] {
+        let (width, used) = codes.later.decode(back.peek().ok_or(SHORT)?);
+        back.skip(used);
+        let numbers = pairs(back, wide.map(|wide| wide * width))?;
+        for (to, wide) in residual.iter_mut().zip(numbers) {
+            *to = sum(*to, wide);
         }
     }
-    let [dx, dy, cross, uv] = quad;
-    Ok([uv, dx, dy, cross])
+    Ok((classes, residual))
 }
 
-/// A pair whose width a code tells.
-#[inline]
-fn pair_of<const BACK: bool>(bits: &mut BitReader<'_, BACK>, code: &Code) -> Outcome<Pair> {
-    let word = bits.peek_unpadded().ok_or(SHORT)?;
-    let (width, length) = code.decode(word);
-    numbers(bits, word, length, width)
-}
-
-/// Two numbers of a width, after `used` of the next bits.
+/// Pairs of numbers, each of a width of at most 32 bits.
 #[inline(always)]
-fn numbers<const BACK: bool>(
-    bits: &mut BitReader<'_, BACK>,
-    word: u64,
-    used: u32,
-    width: u32,
-) -> Outcome<Pair> {
-    let all = used + 2 * width;
-    let low = (1 << width) - 1;
-    if all <= PEEK_BITS {
-        bits.skip(all);
-        let word = word >> used;
-        return Ok([unfold(word & low), unfold(word >> width & low)]);
+fn pairs<const N: usize>(bits: &mut BitReader<'_>, widths: [u32; N]) -> Outcome<[Pair; N]> {
+    let mut pairs = [[0; 2]; N];
+    let all = 2 * widths.iter().sum::<u32>();
+    if all > PEEK_BITS {
+        for (pair, width) in pairs.iter_mut().zip(widths) {
+            *pair = long_pair(bits, width)?;
+        }
+        return Ok(pairs);
     }
-    bits.skip(used);
-    let u = bits.peek_unpadded().ok_or(SHORT)?;
-    bits.skip(width);
-    let v = bits.peek_unpadded().ok_or(SHORT)?;
-    bits.skip(width);
-    Ok([unfold(u & low), unfold(v & low)])
+    let mut word = bits.peek().ok_or(SHORT)?;
+    bits.skip(all);
+    for (pair, width) in pairs.iter_mut().zip(widths) {
+        let low = (1 << width) - 1;
+        *pair = [unfold(word & low), unfold(word >> width & low)];
+        word >>= 2 * width;
+    }
+    Ok(pairs)
+}
+
+#[cold]
+fn long_pair(bits: &mut BitReader<'_>, width: u32) -> Outcome<Pair> {
+    let mut pair = [0; 2];
+    for number in &mut pair {
+        *number = unfold(bits.peek().ok_or(SHORT)? & ((1 << width) - 1));
+        bits.skip(width);
+    }
+    Ok(pair)
+}
+
+/// A number from 1 on of which the highest bit is known, and `bits` hold the ones below.
+#[inline(always)]
+fn from_one(power: u32, bits: u64) -> u64 {
+    let highest = 1 << power;
+    highest | bits & (highest - 1)
 }

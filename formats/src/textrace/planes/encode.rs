@@ -5,10 +5,11 @@ use super::codes::{Code, Codes, sizes_context};
 use super::fit::fit;
 use super::mode::{Departure, Mode};
 use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
-use super::places::{Place, Places};
-use super::plane::{Plane, Quad, Units, quad_of};
+use super::places::{Last, Place, Places};
+use super::plane::{Plane, Quad, Surface, Units, quad_of};
 use super::residual::{
-    CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, WIDE, class_bits, classify, difference, fold, width,
+    CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, WIDE, class_bits, classify, difference, fold, symbol,
+    width,
 };
 use crate::textrace::bits::BitWriter;
 use crate::textrace::{QuadRecord, Tile, quad_morton};
@@ -49,12 +50,12 @@ struct Choice {
 /// A group of a run.
 struct Group {
     departure: Departure,
-    plane: Plane,
+    plane: Surface,
     /// Which code tells the classes of its next record.
     noise: usize,
 }
 
-/// Writes a tile: runs, places and planes to `front`, departures to `back`.
+/// Writes a tile: runs and places to `front`, planes and departures to `back`.
 pub(super) fn tile<S: Sink>(tile: &Tile, codes: &Codes, front: &mut S, back: &mut S) {
     let mut encoder = Encoder { front, back, codes };
     encoder.tile(tile);
@@ -71,71 +72,70 @@ impl<'a, S: Sink> Encoder<'a, S> {
     fn gamma(&mut self, number: u64) {
         self.front.bits(0, number.ilog2());
         self.front.bits(1, 1);
-        self.below_power(number);
-    }
-
-    /// A number from 1 on: a code tells its highest bit.
-    fn number(&mut self, code: &Code, number: u64) {
-        self.front.symbol(code, number.ilog2(), 0);
-        self.below_power(number);
-    }
-
-    /// The bits of a number below its highest one.
-    fn below_power(&mut self, number: u64) {
-        let power = number.ilog2();
-        self.front.bits((number - (1 << power)) as u32, power);
+        below_power(self.front, number);
     }
 
     fn tile(&mut self, tile: &Tile) {
         let mut places = Places::new();
+        let mut last = Last::new();
         let mut lineage = Lineage::new();
         let mut next_primitive = 0;
         let mut draw = 0;
         for run in &tile.runs {
             let step = u64::from(run.primitive) + 1 - next_primitive;
             let changed = u32::from(run.draw != draw);
-            self.front
-                .symbol(&self.codes.header, step.ilog2() << 1 | changed, 0);
-            self.below_power(step);
+            let header = step.ilog2() << 1 | changed;
+            self.front.symbol(&self.codes.header, header, 0);
+            let count = u64::from(run.count);
+            self.front.symbol(&self.codes.count, count.ilog2(), 0);
+            below_power(self.front, step);
             if run.draw != draw {
                 self.gamma(u64::from(run.draw) + 1);
                 draw = run.draw;
             }
-            self.number(&self.codes.count, run.count.into());
+            below_power(self.front, count);
             next_primitive = u64::from(run.primitive) + 1;
             let records = &tile.records[run.first as usize..][..run.count as usize];
-            places.start_run(run.draw);
+            places.start_run(&mut last, run.draw);
             if places.tells_regular() {
-                let regular = places.is_regular(records.iter().map(place_of));
+                let regular = places.is_regular(last, records.iter().map(place_of));
                 self.front.bits(regular.into(), 1);
-                places.set_regular(regular);
+                last.regular = regular;
             }
-            self.run(records, &mut places, &mut lineage);
+            last = self.run(records, &mut places, last, &mut lineage);
         }
     }
 
     /// The records of a run.
-    fn run(&mut self, records: &[QuadRecord], places: &mut Places, lineage: &mut Lineage) {
+    fn run(
+        &mut self,
+        records: &[QuadRecord],
+        places: &mut Places,
+        mut last: Last,
+        lineage: &mut Lineage,
+    ) -> Last {
         let mut groups: [Option<Group>; GROUPS] = [const { None }; GROUPS];
         let mut of_run = None;
         for (at, record) in records.iter().enumerate() {
-            places.write(self.codes, place_of(record), self.front);
+            places.write(self.codes, &mut last, place_of(record), self.front);
             let group = &mut groups[usize::from(record.group)];
             if let Some(group) = group {
                 self.later(record, group);
                 continue;
             }
             let after = &records[at + 1..];
-            let likely_others = places.share(after.len() as u32);
+            let likely_others = last.share(after.len() as u32);
             let choice = self.first(record, lineage, of_run, likely_others, after);
-            lineage.note(record.group, choice.plane);
-            of_run = Some(choice.plane);
+            let plane = Surface::from(&choice.plane);
+            lineage.note(record.group, plane);
+            of_run = Some(plane);
             *group = Some(Group {
                 departure: Departure::start(choice.mode, record.x, record.y),
-                plane: choice.plane,
+                plane,
                 noise: first_noise(choice.level),
             });
         }
+        last
     }
 
     /// A departure.
@@ -145,8 +145,8 @@ impl<'a, S: Sink> Encoder<'a, S> {
         let residual = group.departure.write(x, y, &left);
         let (classes, pairs) = classes(&residual);
         let code = self.sizes(group.departure.mode, group.noise);
-        if !self.back.symbol(code, classes.symbol(), ESCAPE_SIZES) {
-            for class in classes.each() {
+        if !self.back.symbol(code, symbol(classes), ESCAPE_SIZES) {
+            for class in classes {
                 self.back.bits(class, CLASS_NUMBER_BITS);
             }
         }
@@ -159,7 +159,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 put_numbers(self.back, *pair, width);
             }
         }
-        group.noise = usize::from(classes.noise);
+        group.noise = Classes::new(classes).noise();
     }
 
     /// The first quad of a run in a group, and the plane for the others.
@@ -167,7 +167,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
         &mut self,
         record: &QuadRecord,
         lineage: &Lineage,
-        of_run: Option<Plane>,
+        of_run: Option<Surface>,
         likely_others: u32,
         after: &[QuadRecord],
     ) -> Choice {
@@ -184,28 +184,35 @@ impl<'a, S: Sink> Encoder<'a, S> {
         });
         let best = parents.min_by_key(|(bits, ..)| *bits);
         let (_, back, expected, pairs) = best.expect("there is always the plane of zeros");
-        self.number(&self.codes.parent, back as u64 + 1);
+        let parent = back as u64 + 1;
+        self.back.symbol(&self.codes.parent, parent.ilog2(), 0);
         let mut before = 0;
         for (code, pair) in self.codes.first.iter().zip(pairs) {
             let width = width(pair);
-            self.front.symbol(code, width_symbol(before, width), 0);
-            put_numbers(self.front, pair, width);
+            self.back.symbol(code, width_symbol(before, width), 0);
             before = width;
         }
+        below_power(self.back, parent);
         let tilt = tilt_of_run(of_run.is_some(), &quad, &expected);
         let plain = Plane::through(x, y, &quad, tilt);
-        let Some(context) = level_context(likely_others) else {
-            return Choice::plain(plain);
+        let mut choice = Choice::plain(plain);
+        if let Some(context) = level_context(likely_others) {
+            let of_group = |other: &&QuadRecord| other.group == group;
+            let others: Vec<QuadRecord> = after.iter().filter(of_group).copied().collect();
+            choice = self.best_plane(&quad, plain, record, &others, context);
+            let told = (choice.mode as u32) << 3 | choice.level;
+            self.back.symbol(&self.codes.level[context], told, 0);
+        }
+        let by = if choice.level > 0 {
+            &choice.correction[..]
+        } else {
+            &[]
         };
-        let of_group = |other: &&QuadRecord| other.group == group;
-        let others: Vec<QuadRecord> = after.iter().filter(of_group).copied().collect();
-        let choice = self.best_plane(&quad, plain, record, &others, context);
-        let symbol = (choice.mode as u32) << 3 | choice.level;
-        self.front.symbol(&self.codes.level[context], symbol, 0);
-        if choice.level > 0 {
-            for (code, pair) in self.codes.correction.iter().zip(choice.correction) {
-                put_pair(self.front, code, pair);
-            }
+        for (code, pair) in self.codes.correction.iter().zip(by) {
+            self.back.symbol(code, width(*pair), 0);
+        }
+        for pair in pairs.iter().chain(by) {
+            put_numbers(self.back, *pair, width(*pair));
         }
         choice
     }
@@ -229,7 +236,12 @@ impl<'a, S: Sink> Encoder<'a, S> {
                     bits += self.pairs_bits(&self.codes.correction, &correction);
                 }
                 let departure = Departure::start(mode, first.x, first.y);
-                bits += self.run_bits(&plane, departure, others, first_noise(level));
+                bits += self.run_bits(
+                    &Surface::from(&plane),
+                    departure,
+                    others,
+                    first_noise(level),
+                );
                 if bits < least {
                     least = bits;
                     best = Choice {
@@ -267,7 +279,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
     /// Bits of some records' residuals.
     fn run_bits(
         &self,
-        plane: &Plane,
+        plane: &Surface,
         mut departure: Departure,
         records: &[QuadRecord],
         mut at: usize,
@@ -279,7 +291,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
             let (classes, pairs) = classes(&left);
             let code = self.sizes(departure.mode, at);
             bits += code.length(
-                classes.symbol(),
+                symbol(classes),
                 code.length(ESCAPE_SIZES, 0) + 4 * CLASS_NUMBER_BITS,
             );
             bits += pairs
@@ -290,7 +302,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 let wide = pairs.iter().filter(is_wide).count() as u32;
                 bits += self.codes.later.length(width, 0) + 2 * width * wide;
             }
-            at = usize::from(classes.noise);
+            at = Classes::new(classes).noise();
         }
         bits
     }
@@ -328,16 +340,16 @@ impl Choice {
 
 fn place_of(record: &QuadRecord) -> Place {
     Place {
-        morton: u32::from(quad_morton(record.x, record.y)),
+        morton: quad_morton(record.x, record.y),
         mask: record.mask,
         group: record.group,
     }
 }
 
-fn put_pair(sink: &mut impl Sink, code: &Code, pair: [i32; 2]) {
-    let width = width(pair);
-    sink.symbol(code, width, 0);
-    put_numbers(sink, pair, width);
+/// The bits of a number below its highest one.
+fn below_power(sink: &mut impl Sink, number: u64) {
+    let power = number.ilog2();
+    sink.bits((number - (1 << power)) as u32, power);
 }
 
 fn put_numbers(sink: &mut impl Sink, pair: [i32; 2], width: u32) {
@@ -380,12 +392,10 @@ fn wide_width(pairs: &[Classified; 4]) -> Option<u32> {
         .max()
 }
 
-/// Residuals in the order in which they are written, dx, dy, cross, uv, with their classes; the
-/// classes as one number, too.
-fn classes(left: &Quad) -> (Classes, [Classified; 4]) {
-    let [uv, dx, dy, cross] = *left;
-    let pairs = [dx, dy, cross, uv].map(|pair| (pair, classify(pair)));
-    (Classes::new(pairs.map(|(_, (class, _))| class)), pairs)
+/// Classes of residuals; and residuals with their classes.
+fn classes(left: &Quad) -> ([u32; 4], [Classified; 4]) {
+    let pairs = left.map(|pair| (pair, classify(pair)));
+    (pairs.map(|(_, (class, _))| class), pairs)
 }
 
 /// The correction in the units of `level` that leads nearest to a plane.

@@ -23,7 +23,7 @@ mod plane;
 mod residual;
 
 use super::Tile;
-use super::bits::BitWriter;
+use super::bits::{BitWriter, PADDING_BYTES};
 use crate::parse::{Fault, Parsed, ensure};
 use codes::Codes;
 use decode::Decoder;
@@ -52,10 +52,15 @@ pub(super) fn decode<'a>(
     input: &'a [u8],
     tile: &mut Tile,
 ) -> Parsed<'a, ()> {
-    let mut decoder = Decoder::new(input);
+    // Each direction with padding of its own, so that both can be read in words.
+    let padding = [0; PADDING_BYTES];
+    let ahead = [input, &padding].concat();
+    let mut back = [&padding, input].concat();
+    back.reverse();
+    let mut decoder = Decoder::new(&ahead, &back);
     let outcome = decoder.tile(runs, records, tile);
-    let (front, back) = decoder.readers();
-    let rest = front.rest();
+    let (front, back) = (decoder.front, decoder.back);
+    let rest = input.get(front.bytes_read()..).unwrap_or_default();
     outcome.map_err(|expected| {
         let found = format_args!("{} bytes left", rest.len());
         nom::Err::Failure(Fault::new(rest, expected, found))

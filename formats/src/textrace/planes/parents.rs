@@ -3,7 +3,7 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::GROUPS;
-use super::plane::{Plane, Quad, cross, tilt_of};
+use super::plane::{Quad, Surface, cross, tilt_of};
 use crate::varint::low_u32;
 
 /// Which code tells the level of a plane's corrections, by how many records of its group are likely to
@@ -25,13 +25,15 @@ pub(super) fn first_noise(level: u32) -> usize {
 
 /// Most planes of a group that can be a parent. More would be smaller by little and take longer.
 const MOST_PARENTS: usize = 64;
+/// Bits below the highest one of the largest number that names a parent.
+pub(super) const MOST_PARENT_BITS: u32 = MOST_PARENTS.ilog2();
 
 /// The planes so far, and the last ones of each group.
 pub(super) struct Lineage {
-    planes: Vec<Plane>,
+    planes: Vec<Surface>,
     /// Indices in `planes` by group: of its n-th plane at n modulo [`MOST_PARENTS`].
     last: [[u32; MOST_PARENTS]; GROUPS],
-    /// Planes of each group.
+    /// Surfaces of each group.
     counts: [usize; GROUPS],
 }
 
@@ -44,7 +46,7 @@ impl Lineage {
         }
     }
 
-    /// Planes of a group that can be a parent.
+    /// Surfaces of a group that can be a parent.
     #[inline(always)]
     pub fn count(&self, group: u8) -> usize {
         let count = self.counts.get(usize::from(group) % GROUPS);
@@ -54,12 +56,12 @@ impl Lineage {
     /// The plane that is `back` planes of the group before the last one; past all that can be a parent
     /// a plane of zeros, then none.
     #[inline(always)]
-    pub fn parent(&self, group: u8, back: usize) -> Option<Plane> {
+    pub fn parent(&self, group: u8, back: usize) -> Option<Surface> {
         let group = usize::from(group) % GROUPS;
         let count = *self.counts.get(group)?;
         let can_be = count.min(MOST_PARENTS);
         if back >= can_be {
-            return (back == can_be).then(Plane::default);
+            return (back == can_be).then(Surface::default);
         }
         let slot = (count - 1 - back) % MOST_PARENTS;
         let index = *self.last.get(group)?.get(slot)?;
@@ -68,7 +70,7 @@ impl Lineage {
 
     /// Takes in a plane.
     #[inline(always)]
-    pub fn note(&mut self, group: u8, plane: Plane) {
+    pub fn note(&mut self, group: u8, surface: Surface) {
         let group = usize::from(group) % GROUPS;
         if let Some((last, count)) = self.last.get_mut(group).zip(self.counts.get_mut(group)) {
             if let Some(slot) = last.get_mut(*count % MOST_PARENTS) {
@@ -76,7 +78,7 @@ impl Lineage {
             }
             *count += 1;
         }
-        self.planes.push(plane);
+        self.planes.push(surface);
     }
 }
 
@@ -91,7 +93,7 @@ impl Expected {
     /// What an earlier plane makes of it; the slope of w is that of the plane last told in the run, if
     /// there is one.
     #[inline(always)]
-    pub fn new(parent: &Plane, of_run: Option<&Plane>, x: u8, y: u8) -> Self {
+    pub fn new(parent: &Surface, of_run: Option<&Surface>, x: u8, y: u8) -> Self {
         Self {
             quad: parent.predict(x, y),
             tilt: of_run.unwrap_or(parent).tilt_at(x, y),

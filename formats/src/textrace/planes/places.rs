@@ -20,7 +20,7 @@ const OUTSIDE: &str = "a quad inside the tile";
 /// Place on the Morton curve, covered lanes, group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
-    pub morton: u32,
+    pub morton: u8,
     pub mask: u8,
     pub group: u8,
 }
@@ -30,7 +30,7 @@ impl Place {
     #[inline(always)]
     pub fn record(self) -> QuadRecord {
         let (x, y) = QUAD_POSITIONS
-            .get(self.morton as usize & 63)
+            .get(usize::from(self.morton & 63))
             .copied()
             .unwrap_or_default();
         QuadRecord {
@@ -51,7 +51,7 @@ struct Follow {
     same_quad: bool,
 }
 
-/// What is remembered from one record to the next.
+/// What is remembered from one record to the next: eight bytes, which stay in a register.
 #[derive(Clone, Copy)]
 pub(super) struct Last {
     /// The run's last record; before the first one 0, 0 and the last run's group.
@@ -61,13 +61,34 @@ pub(super) struct Last {
     /// It came right after the one before it on the curve.
     stepped_one: bool,
     /// Place of the first record of the run, or of the last one's before its first record.
-    start: u32,
+    start: u8,
     first_of_run: bool,
     /// Whatever is expected in the same quad comes: nothing tells it.
-    regular: bool,
+    pub regular: bool,
 }
 
 impl Last {
+    pub fn new() -> Self {
+        Self {
+            place: Place {
+                morton: 0,
+                mask: 0,
+                group: 0,
+            },
+            likeliest: false,
+            stepped_one: false,
+            start: 0,
+            first_of_run: true,
+            regular: false,
+        }
+    }
+
+    /// How many of the records left in the run are likely to be of a group: half of them where groups
+    /// take turns.
+    pub fn share(&self, left_in_run: u32) -> u32 {
+        left_in_run >> u32::from(self.regular)
+    }
+
     /// Which code tells step and mask.
     #[inline(always)]
     fn context(&self) -> usize {
@@ -81,7 +102,7 @@ impl Last {
     /// The same after a run's first record.
     #[inline(always)]
     fn later_context(&self) -> usize {
-        let corner = usize::from(self.place.morton.to_le_bytes()[0] & 3);
+        let corner = usize::from(self.place.morton & 3);
         corner << 2 | usize::from(self.likeliest) << 1 | usize::from(self.stepped_one)
     }
 }
@@ -93,7 +114,6 @@ pub(super) struct Places {
     /// Lanes of each quad that the draw has covered.
     covered: [u8; 64],
     draw: u32,
-    pub last: Last,
 }
 
 impl Places {
@@ -102,32 +122,20 @@ impl Places {
             follows: follow_themselves(),
             covered: [0; 64],
             draw: 0,
-            last: Last {
-                place: Place {
-                    morton: 0,
-                    mask: 0,
-                    group: 0,
-                },
-                likeliest: false,
-                stepped_one: false,
-                start: 0,
-                first_of_run: true,
-                regular: false,
-            },
         }
     }
 
-    pub fn start_run(&mut self, draw: u32) {
+    pub fn start_run(&mut self, last: &mut Last, draw: u32) {
         if draw != self.draw {
             self.draw = draw;
             self.covered = [0; 64];
             self.follows = follow_themselves();
-            self.last.place.group = 0;
+            last.place.group = 0;
         }
-        self.last.place.morton = 0;
-        self.last.place.mask = 0;
-        self.last.first_of_run = true;
-        self.last.regular = false;
+        last.place.morton = 0;
+        last.place.mask = 0;
+        last.first_of_run = true;
+        last.regular = false;
     }
 
     /// Some group is followed by another one in the same quad, so a run tells whether it is regular.
@@ -135,28 +143,17 @@ impl Places {
         self.follows.iter().any(|follow| follow.same_quad)
     }
 
-    /// Sets whether the run is regular.
-    pub fn set_regular(&mut self, regular: bool) {
-        self.last.regular = regular;
-    }
-
-    /// How many of the records left in the run are likely to be of a group: half of them where groups
-    /// take turns.
-    pub fn share(&self, left_in_run: u32) -> u32 {
-        left_in_run >> u32::from(self.last.regular)
-    }
-
     /// A run of these records, which starts now, is regular.
-    pub fn is_regular(&self, mut run: impl Iterator<Item = Place>) -> bool {
+    pub fn is_regular(&self, mut last: Last, mut run: impl Iterator<Item = Place>) -> bool {
         let mut places = self.clone();
         run.all(|place| {
-            let follow = places.follow(places.last.place.group);
+            let follow = places.follow(last.place.group);
             let expected = Place {
                 group: follow.group,
-                ..places.last.place
+                ..last.place
             };
-            let holds = places.last.first_of_run || !follow.same_quad || place == expected;
-            places.note_at(place);
+            let holds = last.first_of_run || !follow.same_quad || place == expected;
+            places.note_at(&mut last, place);
             holds
         })
     }
@@ -174,8 +171,8 @@ impl Places {
     /// Swaps a quad's full mask with the one that leaves no lane of it to other primitives of the
     /// draw, or undoes it: a mesh covers every lane once, so 15 stands for the likeliest mask.
     #[inline(always)]
-    fn swap_mask(&self, morton: u32, mask: u8) -> u8 {
-        let covered = self.covered.get(morton as usize & 63).copied();
+    fn swap_mask(&self, morton: u8, mask: u8) -> u8 {
+        let covered = self.covered.get(usize::from(morton & 63)).copied();
         let rest = 15 & !covered.unwrap_or_default();
         // Without branches, which would be hard to predict.
         let swaps = (rest != 0) & ((mask == 15) | (mask == rest));
@@ -183,14 +180,12 @@ impl Places {
     }
 
     /// Takes in a record.
-    fn note_at(&mut self, place: Place) {
+    fn note_at(&mut self, last: &mut Last, place: Place) {
         let likeliest = self.swap_mask(place.morton, place.mask) == 15;
-        let mut last = self.last;
-        self.note(&mut last, place, likeliest);
-        self.last = last;
+        self.note(last, place, likeliest);
     }
 
-    /// Takes in a record; `last` is the caller's, so that it can stay in registers.
+    /// The same, knowing whether its mask was the likeliest one.
     #[inline(always)]
     fn note(&mut self, last: &mut Last, place: Place, likeliest: bool) {
         let same_quad = !last.first_of_run
@@ -207,7 +202,7 @@ impl Places {
                 same_quad,
             };
         }
-        if let Some(covered) = self.covered.get_mut(place.morton as usize & 63) {
+        if let Some(covered) = self.covered.get_mut(usize::from(place.morton & 63)) {
             *covered |= place.mask;
         }
         if !same_quad {
@@ -234,6 +229,11 @@ impl Places {
         (alone | in_pairs).then_some(next.group)
     }
 
+    /// Group of the first record of a quad where groups take turns, two by two.
+    pub fn first_of_two(&self, last: &Last) -> u8 {
+        self.follow(last.place.group).group
+    }
+
     /// The next quad, if another one is expected: nothing but step and mask; nothing is to be remembered of
     /// groups. `None` where it is told otherwise and [`Self::read`] must read it.
     #[inline(always)]
@@ -253,16 +253,17 @@ impl Places {
         if (symbol == ESCAPE_PLACE) | (step == 0) {
             return Ok(None);
         }
-        let morton = last.place.morton + step;
+        let morton = u32::from(last.place.morton) + step;
         if morton > 63 {
             return Err(OUTSIDE);
         }
+        let morton = morton.to_le_bytes()[0];
         let mask = (symbol & 15).to_le_bytes()[0];
         last.likeliest = mask == 15;
         last.stepped_one = step == 1;
         last.place.morton = morton;
         last.place.mask = self.swap_mask(morton, mask);
-        if let Some(covered) = self.covered.get_mut(morton as usize & 63) {
+        if let Some(covered) = self.covered.get_mut(usize::from(morton & 63)) {
             *covered |= last.place.mask;
         }
         Ok(Some((last.place, length + if far { 6 } else { 0 })))
@@ -278,10 +279,10 @@ impl Places {
     ) -> Result<(Place, u32), &'static str> {
         let follow = self.follow(last.place.group);
         let mut used = 0;
-        let mut before = last.place.morton;
+        let mut before = u32::from(last.place.morton);
         if last.first_of_run {
             let (apart, length) = codes.start.decode(bits);
-            before = (last.start ^ apart).wrapping_sub(1);
+            before = (u32::from(last.start) ^ apart).wrapping_sub(1);
             used = length;
         } else if follow.same_quad {
             used = u32::from(!last.regular);
@@ -300,16 +301,16 @@ impl Places {
         bits >>= length;
         if symbol == ESCAPE_PLACE {
             used += 14;
+            let morton = before.wrapping_add(low_u32(bits & 63));
+            if morton > 63 {
+                return Err(OUTSIDE);
+            }
             let place = Place {
-                morton: before.wrapping_add(low_u32(bits & 63)),
+                morton: morton.to_le_bytes()[0],
                 mask: low_u32(bits >> 6 & 15).to_le_bytes()[0],
                 group: low_u32(bits >> 10 & 15).to_le_bytes()[0],
             };
-            if place.morton > 63 {
-                return Err(OUTSIDE);
-            }
-            let likeliest = self.swap_mask(place.morton, place.mask) == 15;
-            self.note(last, place, likeliest);
+            self.note_at(last, place);
             return Ok((place, used));
         }
         let mask = (symbol & 15).to_le_bytes()[0];
@@ -322,6 +323,7 @@ impl Places {
         if morton > 63 {
             return Err(OUTSIDE);
         }
+        let morton = morton.to_le_bytes()[0];
         let place = Place {
             morton,
             mask: self.swap_mask(morton, mask),
@@ -337,18 +339,17 @@ impl Places {
     }
 
     /// Writes the next record.
-    pub fn write(&mut self, codes: &Codes, place: Place, sink: &mut impl Sink) {
-        self.put(codes, place, sink);
-        self.note_at(place);
+    pub fn write(&mut self, codes: &Codes, last: &mut Last, place: Place, sink: &mut impl Sink) {
+        self.put(codes, last, place, sink);
+        self.note_at(last, place);
     }
 
-    fn put(&self, codes: &Codes, place: Place, sink: &mut impl Sink) {
-        let last = &self.last;
+    fn put(&self, codes: &Codes, last: &Last, place: Place, sink: &mut impl Sink) {
         let follow = self.follow(last.place.group);
-        let mut step = place.morton.wrapping_sub(last.place.morton);
+        let mut step = u32::from(place.morton.wrapping_sub(last.place.morton));
         if last.first_of_run {
             let apart = place.morton ^ last.start;
-            sink.symbol(&codes.start, apart, 0);
+            sink.symbol(&codes.start, apart.into(), 0);
             step = 1;
         } else if follow.same_quad {
             let expected = Place {

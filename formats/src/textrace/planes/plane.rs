@@ -6,6 +6,7 @@
 #![deny(clippy::indexing_slicing)]
 
 use crate::textrace::QuadRecord;
+use glam::{Vec4, Vec4Swizzles};
 
 /// uv, dx, dy and cross of a quad, each u and v.
 pub(super) type Quad = [[i32; 2]; 4];
@@ -16,7 +17,7 @@ pub(super) fn quad_of(record: &QuadRecord) -> Quad {
 }
 
 /// w is taken as at least this, so that nothing becomes infinite.
-const LEAST_W: f64 = 1.0 / 1024.0;
+const LEAST_W: f32 = 1.0 / 1024.0;
 /// Weight of the expected slope of w against what a quad's cross tells: the square of about half a
 /// fixed-point step in units of the slope's usual error, 2^-9 a pixel.
 const PRIOR: f64 = 65536.0;
@@ -35,46 +36,6 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// Pixels from the origin to a quad's top-left lane.
-    #[inline(always)]
-    fn offset(&self, x: u8, y: u8) -> [f64; 2] {
-        let [left, top] = self.origin;
-        [f64::from(2 * x) - left, f64::from(2 * y) - top]
-    }
-
-    /// What the plane says of a quad.
-    #[inline(always)]
-    pub fn predict(&self, x: u8, y: u8) -> Quad {
-        let [right, down] = self.offset(x, y);
-        let [p, q] = self.tilt;
-        let w = 1.0 + p * right + q * down;
-        let (w_right, w_down) = (w + p, w + q);
-        let [scale, scale_right] = inverse([w, w_right]);
-        let [scale_down, scale_both] = inverse([w_down, w_right + q]);
-        let [to_right, to_down] = self.slopes;
-        let bend = plus(times(to_right, right), times(to_down, down));
-        let bend_right = plus(bend, to_right);
-        let top_left = times(bend, scale);
-        let bottom_left = times(plus(bend, to_down), scale_down);
-        let bottom_right = times(plus(bend_right, to_down), scale_both);
-        let dx = less(times(bend_right, scale_right), top_left);
-        [
-            round(plus(self.start, top_left)),
-            round(dx),
-            round(less(bottom_left, top_left)),
-            round(less(less(bottom_right, bottom_left), dx)),
-        ]
-    }
-
-    /// Slope of w around a quad, where w there is 1.
-    #[inline]
-    pub fn tilt_at(&self, x: u8, y: u8) -> [f64; 2] {
-        let [right, down] = self.offset(x, y);
-        let [p, q] = self.tilt;
-        let w = at_least(1.0 + p * right + q * down);
-        [within_one(p / w), within_one(q / w)]
-    }
-
     /// The plane through a quad's own numbers, with a slope of w.
     #[inline]
     pub fn through(x: u8, y: u8, quad: &Quad, tilt: [f64; 2]) -> Self {
@@ -111,6 +72,97 @@ impl Plane {
     }
 }
 
+/// A plane as it is remembered and asked: in `f32`, four lanes at once.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Surface {
+    /// Pixel column and row of the origin in the tile.
+    origin: [f32; 2],
+    /// u and v at the origin: whole steps, and what is left over.
+    base: [i32; 2],
+    start: [f32; 2],
+    slopes: [[f32; 2]; 2],
+    tilt: [f32; 2],
+}
+
+impl From<&Plane> for Surface {
+    #[inline(always)]
+    fn from(plane: &Plane) -> Self {
+        let [u, v] = plane.start;
+        let base = round(plane.start);
+        let [base_u, base_v] = base;
+        let [right, down] = plane.slopes;
+        Self {
+            origin: singles(plane.origin),
+            base,
+            start: singles([u - f64::from(base_u), v - f64::from(base_v)]),
+            slopes: [singles(right), singles(down)],
+            tilt: singles(plane.tilt),
+        }
+    }
+}
+
+impl Surface {
+    /// What the plane says of a quad.
+    #[inline(always)]
+    pub fn predict(&self, x: u8, y: u8) -> Quad {
+        // u and v of a lane and of the one to its right; the upper two lanes, then the lower two.
+        const OF_RIGHT: Vec4 = Vec4::new(0.0, 0.0, 1.0, 1.0);
+        let [left, top] = self.origin;
+        let right = Vec4::splat(f32::from(2 * x) - left) + OF_RIGHT;
+        let down = Vec4::splat(f32::from(2 * y) - top);
+        let [[right_u, right_v], [down_u, down_v]] = self.slopes;
+        let to_right = Vec4::new(right_u, right_v, right_u, right_v);
+        let to_down = Vec4::new(down_u, down_v, down_u, down_v);
+        let [p, q] = self.tilt.map(Vec4::splat);
+        let w = Vec4::ONE + p * right + q * down;
+        let bend = to_right * right + to_down * down;
+        let least = Vec4::splat(LEAST_W);
+        let upper = bend / w.max(least);
+        let lower = (bend + to_down) / (w + q).max(least);
+        let by_row = lower - upper;
+        let ([base_u, base_v], [start_u, start_v]) = (self.base, self.start);
+        let start = Vec4::new(start_u, start_v, 0.0, 0.0);
+        let [uv_u, uv_v, dx_u, dx_v] = rounded(upper + (start - upper.xyxy() * OF_RIGHT));
+        let [dy_u, dy_v, cross_u, cross_v] = rounded(by_row - by_row.xyxy() * OF_RIGHT);
+        [
+            [uv_u.wrapping_add(base_u), uv_v.wrapping_add(base_v)],
+            [dx_u, dx_v],
+            [dy_u, dy_v],
+            [cross_u, cross_v],
+        ]
+    }
+
+    /// Slope of w around a quad, where w there is 1.
+    #[inline]
+    pub fn tilt_at(&self, x: u8, y: u8) -> [f64; 2] {
+        let [left, top] = self.origin;
+        let [right, down] = [f32::from(2 * x) - left, f32::from(2 * y) - top];
+        let [p, q] = self.tilt;
+        let w = 1.0 + p * right + q * down;
+        let w = if w > LEAST_W { w } else { LEAST_W };
+        [within_one(f64::from(p / w)), within_one(f64::from(q / w))]
+    }
+}
+
+/// Nearest integers, ties to even: adding 1.5 * 2^23 leaves them in the low bits. Right below 2^22; beyond,
+/// a prediction is a bad one, but the same everywhere.
+#[inline(always)]
+fn rounded(numbers: Vec4) -> [i32; 4] {
+    const MAGIC: f32 = 12_582_912.0;
+    let of = |magic: f32| {
+        let bits = magic.to_bits();
+        bits.wrapping_sub(MAGIC.to_bits()).cast_signed()
+    };
+    let [a, b, c, d] = (numbers + Vec4::splat(MAGIC)).to_array();
+    [of(a), of(b), of(c), of(d)]
+}
+
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "the nearest f32 is meant")]
+fn singles([a, b]: [f64; 2]) -> [f32; 2] {
+    [a as f32, b as f32]
+}
+
 /// What a correction of 1 stands for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Units {
@@ -145,7 +197,7 @@ fn power(n: u32) -> f64 {
 #[inline]
 pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f64; 2]) -> [i32; 2] {
     let [p, q] = tilt;
-    let w = at_least(1.0 + p + q);
+    let w = (1.0 + p + q).max(LEAST_W.into());
     let of = |dx: i32, dy: i32| (f64::from(dx) * q + f64::from(dy) * p) / -w;
     let ([dx_u, dx_v], [dy_u, dy_v]) = (dx, dy);
     round([of(dx_u, dy_u), of(dx_v, dy_v)])
@@ -185,25 +237,9 @@ fn within_one(slope: f64) -> f64 {
     slope.clamp(-1.0, 1.0)
 }
 
-/// Not `f64::max`, which minds NaN: nothing here can be NaN.
-#[inline(always)]
-fn at_least(w: f64) -> f64 {
-    if w > LEAST_W { w } else { LEAST_W }
-}
-
-#[inline(always)]
-fn inverse([a, b]: [f64; 2]) -> [f64; 2] {
-    [1.0 / at_least(a), 1.0 / at_least(b)]
-}
-
 #[inline(always)]
 fn plus([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
     [a + c, b + d]
-}
-
-#[inline(always)]
-fn less([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
-    [a - c, b - d]
 }
 
 #[inline(always)]

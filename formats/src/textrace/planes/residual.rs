@@ -2,7 +2,7 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::plane::Quad;
-use crate::varint::{low_u32, unzigzag, zigzag};
+use crate::varint::{low_u32, zigzag};
 
 /// A pair (u, v).
 pub(super) type Pair = [i32; 2];
@@ -64,21 +64,23 @@ const fn class_of(u: i32, v: i32) -> u32 {
     }
 }
 
-/// What the classes of a quad's four pairs come to.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Classes {
-    /// The classes, four bits each, of dx, dy, cross and uv from the lowest.
-    pub digits: u16,
-    /// Which code tells of the group's next residuals.
-    pub noise: u8,
-    /// One of them is wide.
-    pub wide: bool,
-}
+/// What the classes of a quad's four pairs come to, in fields.
+///
+/// | bits | content |
+/// | --- | --- |
+/// | 0 to 4 | bits of all that names small pairs |
+/// | 5 to 8 | of those, the bits of the first two pairs |
+/// | 9 to 11 | which code tells of the group's next residuals |
+/// | 12 | a pair is wide |
+/// | 13 | the classes follow as numbers |
+/// | 16 to 31, 32 to 47 | first of the first two pairs in [`TWO_PAIRS`], and of the last two |
+/// | 48 to 51, 52 to 55 | bits of the last two; which pairs are wide |
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Classes(u64);
 
 impl Classes {
-    /// From each class.
-    #[allow(clippy::cast_possible_truncation, reason = "classes take three bits")]
-    pub const fn new([dx, dy, cross, uv]: [u32; 4]) -> Self {
+    /// The classes of uv, dx, dy and cross.
+    pub const fn new([uv, dx, dy, cross]: [u32; 4]) -> Self {
         const SIZE: u32 = 0x3_2110;
         let size = nibble(SIZE, dx) + nibble(SIZE, dy) + nibble(SIZE, cross) + nibble(SIZE, uv);
         let noise = match size {
@@ -89,45 +91,75 @@ impl Classes {
             7..=9 => 4,
             _ => 5,
         };
-        Self {
-            digits: (dx | dy << 4 | cross << 8 | uv << 12) as u16,
-            noise,
-            wide: dx >= WIDE || dy >= WIDE || cross >= WIDE || uv >= WIDE,
-        }
+        let first = class_bits(uv) + class_bits(dx);
+        let last = class_bits(dy) + class_bits(cross);
+        let mut wide = (uv >= WIDE) as u32 | ((dx >= WIDE) as u32) << 1;
+        wide |= ((dy >= WIDE) as u32) << 2 | ((cross >= WIDE) as u32) << 3;
+        let low = (first + last) | first << 5 | noise << 9 | ((wide != 0) as u32) << 12;
+        let high = (last | wide << 4) as u64;
+        let starts = (two_start(uv, dx) | two_start(dy, cross) << 16) as u64;
+        Self(low as u64 | starts << 16 | high << 48)
     }
 
-    /// From a symbol below [`ESCAPE_SIZES`].
+    /// Those of a symbol.
     #[inline(always)]
     pub fn of_symbol(symbol: u32) -> Self {
         OF_SYMBOL.get(symbol as usize).copied().unwrap_or_default()
     }
 
-    /// Of each pair.
+    /// Bits that name the small pairs.
     #[inline(always)]
-    pub fn each(self) -> [u32; 4] {
-        let digits = u32::from(self.digits);
-        // `map` of an array is not always inlined, and costs a tenth of a tile's time then.
+    pub fn bits(self) -> u32 {
+        low_u32(self.0) & 31
+    }
+
+    /// Which code tells of the group's next residuals.
+    #[inline(always)]
+    pub fn noise(self) -> usize {
+        (low_u32(self.0) >> 9 & 7) as usize
+    }
+
+    /// The small pairs that bits name; a wide one is taken for 0.
+    #[inline(always)]
+    pub fn small_pairs(self, bits: u64) -> Quad {
+        let two = |start: u64, count: u64, bits: u64| {
+            let at = (start & 0x3ff) + (bits & ((1 << (count & 15)) - 1));
+            let found = TWO_PAIRS.get(low_u32(at) as usize);
+            found.copied().unwrap_or_default()
+        };
+        let first = self.0 >> 5 & 15;
+        let [a, b, c, d] = two(self.0 >> 16, first, bits);
+        let [e, f, g, h] = two(self.0 >> 32, self.0 >> 48, bits >> first);
         [
-            digits & 15,
-            digits >> 4 & 15,
-            digits >> 8 & 15,
-            digits >> 12,
+            [a.into(), b.into()],
+            [c.into(), d.into()],
+            [e.into(), f.into()],
+            [g.into(), h.into()],
         ]
     }
 
-    /// The symbol.
-    pub fn symbol(self) -> u32 {
-        let joined = self.each().into_iter().rev();
-        joined.fold(0, |joined, class| joined * CLASSES + class)
+    /// There is more to do: pairs are wide, or the classes follow as numbers.
+    #[inline(always)]
+    pub fn is_special(self) -> bool {
+        low_u32(self.0) >> 12 & 3 != 0
+    }
+
+    /// The classes follow as numbers.
+    #[inline(always)]
+    pub fn is_escape(self) -> bool {
+        low_u32(self.0) >> 13 & 1 != 0
+    }
+
+    /// Which pairs are wide: 1 for each of uv, dx, dy and cross, else 0.
+    #[inline(always)]
+    pub fn wide(self) -> [u32; 4] {
+        let wide = low_u32(self.0 >> 52);
+        [wide & 1, wide >> 1 & 1, wide >> 2 & 1, wide >> 3 & 1]
     }
 }
 
-const OF_SYMBOL: [Classes; ESCAPE_SIZES as usize] = {
-    let mut table = [Classes {
-        digits: 0,
-        noise: 0,
-        wide: false,
-    }; ESCAPE_SIZES as usize];
+static OF_SYMBOL: [Classes; ESCAPE_SIZES as usize + 1] = {
+    let mut table = [Classes(1 << 13); ESCAPE_SIZES as usize + 1];
     let mut s = 0;
     while s < ESCAPE_SIZES {
         #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
@@ -139,51 +171,56 @@ const OF_SYMBOL: [Classes; ESCAPE_SIZES as usize] = {
     table
 };
 
-/// By class and the next four bits: the pair that as many of them as the class has name. Further
-/// classes fill it up to a power of two.
-const BY_BITS: [[i32; 2]; 128] = {
-    let mut pairs = [[0; 2]; 128];
-    let mut at = 0u32;
-    while at < 128 {
-        let class = at >> 4;
-        let index = at & ((1 << class_bits(class)) - 1);
-        #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
-        {
-            let [u, v] = SMALL[(nibble(STARTS, class) + index) as usize];
-            pairs[at as usize] = [u as i32, v as i32];
+/// The symbol of four classes.
+pub(super) fn symbol([uv, dx, dy, cross]: [u32; 4]) -> u32 {
+    uv + CLASSES * (dx + CLASSES * (dy + CLASSES * cross))
+}
+
+/// Two pairs by their classes, then by the bits that name them.
+static TWO_PAIRS: [[i8; 4]; 26 * 26] = {
+    let mut pairs = [[0; 4]; 26 * 26];
+    let mut classes = 0;
+    while classes < CLASSES * CLASSES {
+        let (one, other) = (classes / CLASSES, classes % CLASSES);
+        let mut bits = 0;
+        while bits < 1 << (class_bits(one) + class_bits(other)) {
+            #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+            {
+                let [a, b] = small(one, bits);
+                let [c, d] = small(other, bits >> class_bits(one));
+                pairs[(two_start(one, other) + bits) as usize] = [a, b, c, d];
+            }
+            bits += 1;
         }
-        at += 1;
+        classes += 1;
     }
     pairs
 };
 
+/// Index in [`TWO_PAIRS`] of the first pairs of two classes.
+const fn two_start(one: u32, other: u32) -> u32 {
+    let mut start = 0;
+    let mut before = 0;
+    while before < one * CLASSES + other {
+        start += 1 << (class_bits(before / CLASSES) + class_bits(before % CLASSES));
+        before += 1;
+    }
+    start
+}
+
 /// The pair of a class that some bits name.
-#[inline(always)]
-pub(super) fn small(class: u32, bits: u64) -> Pair {
-    let at = class << 4 | low_u32(bits) & 15;
-    BY_BITS.get(at as usize & 127).copied().unwrap_or_default()
+#[allow(
+    clippy::indexing_slicing,
+    reason = "evaluated when compiled, or a test"
+)]
+pub(super) const fn small(class: u32, bits: u32) -> [i8; 2] {
+    let index = bits & ((1 << class_bits(class)) - 1);
+    SMALL[(nibble(STARTS, class) + index) as usize]
 }
 
 #[inline(always)]
 const fn nibble(digits: u32, at: u32) -> u32 {
     digits >> (4 * at) & 15
-}
-
-/// Residuals none of which is wide, and their bits; a wide one is taken for 0.
-#[inline(always)]
-pub(super) fn small_pairs(classes: Classes, bits: u64) -> (Quad, u32) {
-    let [of_dx, of_dy, of_cross, of_uv] = classes.each();
-    let dx_end = class_bits(of_dx);
-    let dy_end = dx_end + class_bits(of_dy);
-    let cross_end = dy_end + class_bits(of_cross);
-    let end = cross_end + class_bits(of_uv);
-    let quad = [
-        small(of_uv, bits >> cross_end),
-        small(of_dx, bits),
-        small(of_dy, bits >> dx_end),
-        small(of_cross, bits >> dy_end),
-    ];
-    (quad, end)
 }
 
 /// Bits of a class.
@@ -232,9 +269,11 @@ pub(super) fn fold(number: i32) -> u32 {
     low_u32(zigzag(number.into()))
 }
 
+/// The number that is stored so.
 #[inline(always)]
-pub(super) fn unfold(bits: u64) -> i32 {
-    low_u32(unzigzag(u64::from(low_u32(bits))).cast_unsigned()).cast_signed()
+pub(super) fn unfold(stored: u64) -> i32 {
+    let stored = low_u32(stored);
+    (stored >> 1 ^ (stored & 1).wrapping_neg()).cast_signed()
 }
 
 /// `quad - expected`, wrapping.

@@ -8,10 +8,11 @@ use super::codes::{Codes, MOST_BITS};
 use super::lengths::LENGTHS;
 use super::mode::{Departure, Mode};
 use super::places::ESCAPE_PLACE;
-use super::plane::{Plane, Quad};
-use super::residual::{Classes, ESCAPE_SIZES, class_bits, classify, small};
+use super::plane::{Plane, Quad, Surface};
+use super::residual::{Classes, ESCAPE_SIZES, class_bits, classify, small, symbol};
 use super::*;
 use crate::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, quad_morton};
+use crate::varint::low_u32;
 use proptest::prelude::*;
 
 /// Coordinates in perspective in two groups, as a capture rounds them.
@@ -136,7 +137,10 @@ fn other_counts_than_the_index_tells_are_refused() {
         let mut out = Tile::default();
         let refused = decode(runs, records, &bytes, &mut out).is_err();
         assert!(refused, "{runs} runs of {records}");
-        assert!(out.records.len() <= bytes.len() * 8, "bounded by the bytes");
+        assert!(
+            out.records.len() <= bytes.len() * 8 + 8,
+            "bounded by the bytes"
+        );
     }
 }
 
@@ -196,7 +200,7 @@ fn small_pairs_come_back_from_class_and_index() {
             };
             assert_eq!(class, expected);
             assert!(index < 1 << class_bits(class));
-            assert_eq!(small(class, index.into()), [u, v]);
+            assert_eq!(small(class, index).map(i32::from), [u, v]);
         }
     }
     assert_eq!(classify([0, -3]).0, 4);
@@ -204,12 +208,26 @@ fn small_pairs_come_back_from_class_and_index() {
 }
 
 #[test]
-fn classes_come_back_from_their_symbol() {
-    for symbol in 0..ESCAPE_SIZES {
-        let classes = Classes::of_symbol(symbol);
-        assert_eq!(classes.symbol(), symbol);
-        assert_eq!(classes.wide, classes.each().contains(&4));
+fn four_pairs_come_back_from_their_symbol_and_bits() {
+    for each in 0..ESCAPE_SIZES {
+        let of = [each % 5, each / 5 % 5, each / 25 % 5, each / 125];
+        assert_eq!(symbol(of), each);
+        let classes = Classes::of_symbol(each);
+        assert_eq!(classes.wide(), of.map(|class| u32::from(class == 4)));
+        assert_eq!(classes.is_special(), of.contains(&4));
+        assert!(!classes.is_escape());
+        assert_eq!(classes.bits(), of.map(class_bits).iter().sum::<u32>());
+        let bits = u64::from(each).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mut used = 0;
+        let one_by_one = of.map(|class| {
+            let found = small(class, low_u32(bits >> used) & 255);
+            used += class_bits(class);
+            found.map(i32::from)
+        });
+        assert_eq!(classes.small_pairs(bits), one_by_one);
     }
+    assert!(Classes::of_symbol(ESCAPE_SIZES).is_escape());
+    assert!(Classes::of_symbol(ESCAPE_SIZES).is_special());
 }
 
 #[test]
@@ -237,6 +255,7 @@ fn a_plane_passes_through_the_quad_it_was_made_from() {
     // In the quad's own frame, by the closed form of w around it.
     let w = 1.0 + 0.004 * 6.0 - 0.009 * 10.0;
     let plane = Plane::through(3, 5, &quad, [0.004 / w, -0.009 / w]);
+    let plane = Surface::from(&plane);
     let found = plane.predict(3, 5);
     assert_eq!(found[..3], quad[..3]);
     for (found, exact) in found[3].iter().zip(quad[3]) {
@@ -267,7 +286,7 @@ proptest! {
             prop_assert_eq!(tile.runs.len() as u32, runs);
             prop_assert_eq!(tile.records.len() as u32, records);
         }
-        prop_assert!(tile.records.len() <= bytes.len() * 8 + 1);
+        prop_assert!(tile.records.len() <= bytes.len() * 8 + 8);
     }
 
     #[test]
