@@ -27,9 +27,7 @@ impl Stacks {
         let first = (line & self.set_mask) as usize * self.depth;
         to_front(&mut self.lines[first..first + self.depth], line) as u8
     }
-}
 
-impl Stacks {
     /// Accesses lines; their stacks' depth is `N`, known to the compiler.
     fn access_each<const N: usize>(
         &mut self,

@@ -85,7 +85,7 @@ impl OnTheWay {
     }
 }
 
-/// Lines that share a set, which wait for each other's places in it, share their low bits.
+/// By the high bits of a product: lines of one set, of which many may be on their way, share their low bits.
 #[inline(always)]
 fn bucket(line: u32) -> usize {
     line.wrapping_mul(0x9e37_79b1) as usize >> (u32::BITS - BUCKETS.ilog2())

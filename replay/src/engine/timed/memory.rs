@@ -111,21 +111,20 @@ impl<D: DelayedFill> Memory<D> {
         let missing = std::mem::take(&mut self.l1[core].missing);
         if missing.is_empty() {
             self.one_by_one(core, now, quad, &mut trips);
-        }
-        if quad.is_one_segment() {
+        } else if quad.is_one_segment() {
+            // Nearly all quads: nothing to search for where a segment ends.
             self.segment(core, now, quad, &missing, 0, &mut trips);
-            self.l1[core].missing = missing;
-            return &mut self.pending;
-        }
-        let mut rest = &*missing;
-        for (segment, end) in (0..).zip(quad.segments()) {
-            if rest.is_empty() {
-                break;
+        } else {
+            let mut rest = &*missing;
+            for (segment, end) in (0..).zip(quad.segments()) {
+                if rest.is_empty() {
+                    break;
+                }
+                let inside = |missing: &&Missing| (missing.index as usize) < end;
+                let (own, others) = rest.split_at(rest.iter().take_while(inside).count());
+                self.segment(core, now, quad, own, segment, &mut trips);
+                rest = others;
             }
-            let inside = |missing: &&Missing| (missing.index as usize) < end;
-            let (own, others) = rest.split_at(rest.iter().take_while(inside).count());
-            self.segment(core, now, quad, own, segment, &mut trips);
-            rest = others;
         }
         self.l1[core].missing = missing;
         &mut self.pending
