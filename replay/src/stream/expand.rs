@@ -184,7 +184,7 @@ impl<'a> Expander<'a> {
     pub(super) fn work(&self) -> Work {
         Work {
             tile: Tile::default(),
-            scratch: self.footprints.scratch(),
+            scratch: self.footprints.scratch(self.distinct),
             counts: TraceCounts::without_tiles(&self.bins),
             distinct: self.distinct.then(Distinct::default),
             idle: self.idle_sets.map(LastUsed::new),
@@ -216,15 +216,23 @@ impl<'a> Expander<'a> {
                 counts.lanes += u64::from(lanes);
                 sums.lanes += u64::from(lanes);
                 let mut footprints = 0;
+                if let Some(distinct) = distinct {
+                    distinct.begin(lines.distinct.len());
+                }
                 self.footprints
                     .for_quad(run.draw, records, scratch, |sample, bundle| {
                         let cell = self.bins.cell(sample.texture, bundle.level);
+                        if let Some(distinct) = distinct {
+                            let (found, uses) = (&mut lines.distinct, &mut lines.uses);
+                            distinct.add(cell, sample.base_line, bundle, found, uses);
+                        }
                         let (hash, lookups) = match idle {
                             Some(idle) => {
                                 let is_idle = |line| idle.uses_again(line);
                                 self.append(cell, sample, bundle, is_idle, lines)
                             }
-                            None => self.append(cell, sample, bundle, |_| false, lines),
+                            None if self.all => self.append(cell, sample, bundle, |_| false, lines),
+                            None => (0, bundle.distinct().lookups()),
                         };
                         counts.hash = counts.hash.wrapping_add(hash);
                         let cell = &mut counts.cells[first_cell + cell as usize];
@@ -235,14 +243,10 @@ impl<'a> Expander<'a> {
                     });
                 sums.footprints += u64::from(footprints);
                 if let Some(distinct) = distinct {
-                    let start = lines.quads.last().map_or(0, |quad| quad.end as usize);
-                    let (lines_of, tags) = (&lines.lines[start..], &lines.tags[start..]);
-                    let (found, uses) = (&mut lines.distinct, &mut lines.uses);
-                    distinct.list(footprints, lines_of, tags, found, uses);
+                    distinct.end(&mut lines.distinct, &mut lines.uses);
                 }
                 if !self.all {
-                    lines.lines.clear();
-                    lines.tags.clear();
+                    counts.hash = counts.hash.wrapping_add(self.touch(lines));
                 }
                 lines.quads.push(QuadEnd {
                     end: lines.lines.len() as u32,
@@ -291,6 +295,18 @@ impl<'a> Expander<'a> {
             lookups += relative.len() as u32 * times;
         }
         (hash, lookups)
+    }
+
+    /// The sum of [`access_hash`] over the last quad's footprints, where only distinct lines are listed.
+    #[inline(always)]
+    fn touch(&self, lines: &TileLines) -> u64 {
+        let start = lines.quads.last().map_or(0, |quad| quad.distinct_end as usize);
+        let used = lines.distinct[start..].iter().zip(&lines.uses[start..]);
+        used.fold(0, |hash, (&line, of)| {
+            self.touched.insert(line);
+            let times = of.footprints().count_ones();
+            hash.wrapping_add(access_hash(line).wrapping_mul(times.into()))
+        })
     }
 }
 

@@ -5,14 +5,12 @@ use formats::texture::Wrap;
 /// Everything about one axis of one level of a texture under one sampler.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// Texels.
-    size: i64,
+    /// Texels: below 2^31, as a layer has fewer bytes than that.
+    size: i32,
     wrap: Wrap,
     /// Texel offset of the sample.
-    offset: i64,
+    offset: i32,
     step: Step,
-    /// Repeating a power of two is a mask.
-    repeat_mask: Option<usize>,
     /// Byte offset within the level of a texel's block, by texel.
     bytes: Vec<u32>,
 }
@@ -20,14 +18,14 @@ pub struct Axis {
 /// What `f` makes of each lane. The library's `map` is not inlined here, which costs a fifth of a
 /// replay.
 #[inline(always)]
-fn each<T>([a, b, c, d]: [i32; 4], f: impl Fn(i32) -> T) -> [T; 4] {
+fn each<A: Copy, T>([a, b, c, d]: [A; 4], f: impl Fn(A) -> T) -> [T; 4] {
     [f(a), f(b), f(c), f(d)]
 }
 
 /// How many fixed-point steps a texel has.
 #[derive(Clone, Copy, Debug)]
 enum Step {
-    /// `1 << n` steps: the usual case, since sizes in a group differ by powers of two.
+    /// `1 << n` steps, n at least 2: the usual case, since sizes in a group differ by powers of two.
     Shift(u32),
     /// `numerator / size` steps.
     Ratio(i64),
@@ -38,19 +36,17 @@ impl Axis {
     /// each of the level's texels.
     pub fn new(steps: i64, wrap: Wrap, offset: i8, bytes: Vec<u32>) -> Self {
         let size = bytes.len() as i64;
-        let exact =
-            steps % size == 0 && ((steps / size) as u64).is_power_of_two() && steps / size > 1;
+        let of_texel = steps / size;
+        let exact = steps % size == 0 && (of_texel as u64).is_power_of_two() && of_texel >= 4;
         Self {
-            size,
+            size: size as i32,
             wrap,
             offset: offset.into(),
             step: if exact {
-                Step::Shift((steps / size).ilog2())
+                Step::Shift(of_texel.ilog2())
             } else {
                 Step::Ratio(steps)
             },
-            repeat_mask: (wrap == Wrap::Repeat && bytes.len().is_power_of_two())
-                .then(|| bytes.len() - 1),
             bytes,
         }
     }
@@ -61,26 +57,41 @@ impl Axis {
     /// once, and what remains has no branches.
     #[inline(always)]
     pub fn linear(&self, coordinates: [i32; 4]) -> [[u32; 2]; 4] {
-        match self.step {
-            Step::Shift(shift) => {
-                let half = 1_i64 << (shift - 1);
-                let first = |c: i32| ((i64::from(c) - half) >> shift) + self.offset;
-                if let Some(mask) = self.repeat_mask {
-                    return each(coordinates, |c| {
-                        let texel = first(c) as usize;
-                        [
-                            self.bytes[texel & mask],
-                            self.bytes[texel.wrapping_add(1) & mask],
-                        ]
-                    });
-                }
-                each(coordinates, |c| self.pair(first(c)))
-            }
-            Step::Ratio(steps) => each(coordinates, |c| {
-                let twice = 2 * i64::from(c) * self.size - steps;
-                self.pair(twice.div_euclid(2 * steps) + self.offset)
-            }),
+        let shift = match self.step {
+            Step::Shift(shift) => shift,
+            Step::Ratio(steps) => return self.linear_by_ratio(steps, coordinates),
+        };
+        // The coordinate less half a texel, in texels: rounded to half ones first, it cannot overflow.
+        let first = each(coordinates, |c| {
+            (((c >> (shift - 1)) - 1) >> 1) + self.offset
+        });
+        let last = self.size - 1;
+        match self.wrap {
+            Wrap::Repeat if self.size & last == 0 => self.pairs(first, |texel| texel & last),
+            Wrap::Repeat => self.pairs(first, |texel| texel.rem_euclid(self.size)),
+            Wrap::MirroredRepeat => self.pairs(first, |texel| mirrored(texel.into(), self.size)),
+            Wrap::ClampToEdge => self.pairs(first, |texel| texel.max(0).min(last)),
         }
+    }
+
+    /// Byte offsets of each texel and the next, `wrapped`.
+    #[inline(always)]
+    fn pairs(&self, first: [i32; 4], wrapped: impl Fn(i32) -> i32) -> [[u32; 2]; 4] {
+        let bytes = &self.bytes[..];
+        each(first, |texel| {
+            [
+                bytes[wrapped(texel) as usize],
+                bytes[wrapped(texel + 1) as usize],
+            ]
+        })
+    }
+
+    #[inline(never)]
+    fn linear_by_ratio(&self, steps: i64, coordinates: [i32; 4]) -> [[u32; 2]; 4] {
+        each(coordinates, |c| {
+            let twice = 2 * i64::from(c) * i64::from(self.size) - steps;
+            self.pair_at(twice.div_euclid(2 * steps))
+        })
     }
 
     /// For each lane, byte offset of the texel that holds its coordinate.
@@ -88,10 +99,10 @@ impl Axis {
     pub fn nearest(&self, coordinates: [i32; 4]) -> [u32; 4] {
         each(coordinates, |c| {
             let texel = match self.step {
-                Step::Shift(shift) => i64::from(c) >> shift,
-                Step::Ratio(steps) => (i64::from(c) * self.size).div_euclid(steps),
+                Step::Shift(shift) => i64::from(c >> shift),
+                Step::Ratio(steps) => (i64::from(c) * i64::from(self.size)).div_euclid(steps),
             };
-            self.byte(texel + self.offset)
+            self.byte(texel + i64::from(self.offset))
         })
     }
 
@@ -102,12 +113,8 @@ impl Axis {
 
     /// Byte offsets of a texel and the next, before the sample's offset and wrapping.
     pub fn pair_at(&self, texel: i64) -> [u32; 2] {
-        self.pair(texel + self.offset)
-    }
-
-    #[inline(always)]
-    fn pair(&self, first: i64) -> [u32; 2] {
-        [self.byte(first), self.byte(first + 1)]
+        let texel = texel + i64::from(self.offset);
+        [self.byte(texel), self.byte(texel + 1)]
     }
 
     #[inline(always)]
@@ -116,15 +123,20 @@ impl Axis {
     }
 
     #[inline(always)]
-    fn wrapped(&self, texel: i64) -> i64 {
+    fn wrapped(&self, texel: i64) -> i32 {
+        let size = i64::from(self.size);
         match self.wrap {
-            Wrap::Repeat if (texel as u64) < self.size as u64 => texel,
-            Wrap::Repeat => texel.rem_euclid(self.size),
-            Wrap::MirroredRepeat => {
-                let there_and_back = texel.rem_euclid(2 * self.size);
-                there_and_back.min(2 * self.size - 1 - there_and_back)
-            }
-            Wrap::ClampToEdge => texel.clamp(0, self.size - 1),
+            Wrap::Repeat => texel.rem_euclid(size) as i32,
+            Wrap::MirroredRepeat => mirrored(texel, self.size),
+            Wrap::ClampToEdge => texel.clamp(0, size - 1) as i32,
         }
     }
+}
+
+/// Mirrored repetition of so many texels.
+#[inline(always)]
+fn mirrored(texel: i64, size: i32) -> i32 {
+    let size = i64::from(size);
+    let there_and_back = texel.rem_euclid(2 * size);
+    there_and_back.min(2 * size - 1 - there_and_back) as i32
 }

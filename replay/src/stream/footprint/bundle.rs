@@ -1,5 +1,7 @@
 //! The footprints of one quad at one level of one sample, as cache lines.
 
+use std::hint::select_unpredictable;
+
 /// Footprints of up to four lanes at one level.
 ///
 /// Lines are relative to the texture, so that all textures of a material with the same size share
@@ -15,6 +17,8 @@ pub struct Bundle {
     /// Distinct lines of each footprint, 1 to 4.
     lens: [u8; 4],
     lines: [[u32; 4]; 4],
+    /// Where somebody asked for them.
+    distinct: DistinctLines,
 }
 
 impl Bundle {
@@ -38,39 +42,203 @@ impl Bundle {
     /// lanes in a row have it.
     #[inline(always)]
     pub fn runs(&self) -> impl Iterator<Item = (usize, u32)> + use<> {
-        // A bit for the first of each run, and one after the last lane.
-        let all = 1_u32 << self.count;
-        let mut firsts = (all - 1) & !u32::from(self.repeats) | all;
-        std::iter::from_fn(move || {
-            let first = firsts.trailing_zeros();
-            firsts &= firsts - 1;
-            (firsts != 0).then(|| (first as usize, firsts.trailing_zeros() - first))
-        })
+        runs(self.count, self.repeats)
+    }
+
+    /// Lists its distinct lines, for [`Self::distinct`].
+    #[inline(always)]
+    pub fn list_distinct(&mut self) {
+        let distinct = &mut self.distinct;
+        distinct.begin();
+        for (index, times) in runs(self.count, self.repeats) {
+            let users = ((1_u32 << times) - 1) << index;
+            let len = usize::from(self.lens[index & 3]).min(4);
+            distinct.add(self.lines[index & 3], len, users);
+        }
+    }
+
+    /// Its distinct lines, if [`Footprints::scratch`](super::Footprints::scratch) was told that they are
+    /// asked for.
+    #[inline(always)]
+    #[must_use]
+    pub fn distinct(&self) -> &DistinctLines {
+        &self.distinct
     }
 
     /// Adds the footprint of the lines of its four texels (top left, top right, bottom left,
-    /// bottom right).
+    /// bottom right). `last` is the one before, for which the caller keeps room.
+    ///
+    /// All in registers and without branches: whether a footprint crosses a line is a coin toss to the
+    /// processor, and what is stored by word cannot be loaded as a whole right after.
     #[inline(always)]
-    pub fn push(&mut self, texels: [u32; 4]) {
+    pub fn push(&mut self, texels: [u32; 4], last: &mut [u32; 4]) {
         let [a, b, c, d] = texels;
         let index = usize::from(self.count & 3);
-        // Unused entries repeat the first line, so that whole arrays can be compared. No branches:
-        // whether a footprint crosses a line is a coin toss to the processor.
-        let mut lines = [a; 4];
         let new_b = b != a;
-        lines[1] = b;
-        let mut len = 1 + usize::from(new_b);
         let new_c = (c != a) & (c != b);
-        lines[len] = if new_c { c } else { a };
-        len += usize::from(new_c);
         let new_d = (d != a) & (d != b) & (d != c);
-        lines[len & 3] = if new_d { d } else { lines[len & 3] };
-        len += usize::from(new_d);
-        let repeats = (index > 0) & (self.lines[index.wrapping_sub(1) & 3] == lines);
-        self.repeats |= u8::from(repeats) << index;
+        // Unused entries repeat the first line, so that whole arrays can be compared.
+        let d = if new_d { d } else { a };
+        let c_or_d = if new_c { c } else { d };
+        let lines = [
+            a,
+            if new_b { b } else { c_or_d },
+            if new_b & new_c {
+                c
+            } else if new_b | new_c {
+                d
+            } else {
+                a
+            },
+            if new_b & new_c { d } else { a },
+        ];
+        let [e, f, g, h] = *last;
+        let [_, second, third, fourth] = lines;
+        let same = (a == e) & (second == f) & (third == g) & (fourth == h);
+        self.repeats |= u8::from((index > 0) & same) << index;
         self.lines[index] = lines;
-        self.lens[index] = len as u8;
+        self.lens[index] = 1 + u8::from(new_b) + u8::from(new_c) + u8::from(new_d);
         self.count += 1;
+        *last = lines;
+    }
+}
+
+/// See [`Bundle::runs`].
+#[inline(always)]
+fn runs(count: u8, repeats: u8) -> impl Iterator<Item = (usize, u32)> {
+    // A bit for the first of each run, and one after the last lane.
+    let all = 1_u32 << count;
+    let mut firsts = (all - 1) & !u32::from(repeats) | all;
+    std::iter::from_fn(move || {
+        let first = firsts.trailing_zeros();
+        firsts &= firsts - 1;
+        (firsts != 0).then(|| (first as usize, firsts.trailing_zeros() - first))
+    })
+}
+
+/// The lines of a bundle, each once, in the order of last use.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DistinctLines {
+    count: usize,
+    /// Lines of footprints that do not repeat the one before: some of them again.
+    listed: u32,
+    /// Of all footprints.
+    lookups: u32,
+    /// The lowest line and the highest one.
+    span: [u32; 2],
+    lines: [DistinctLine; Self::MOST],
+}
+
+/// A line of a bundle, in one word.
+///
+/// | bits | content |
+/// | --- | --- |
+/// | 0 to 31 | line relative to the texture |
+/// | 32 to 47 | footprints of the bundle that use it, a bit each |
+/// | 48 to 63 | where it stands first among the lines of footprints that do not repeat the one before |
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DistinctLine(u64);
+
+impl DistinctLine {
+    /// Relative to the texture.
+    #[inline(always)]
+    #[must_use]
+    pub fn line(self) -> u32 {
+        self.0 as u32
+    }
+
+    /// Footprints of the bundle that use it, a bit each.
+    #[inline(always)]
+    #[must_use]
+    pub fn users(self) -> u32 {
+        (self.0 >> 32) as u32 & 0xffff
+    }
+
+    /// Where it stands first among the lines of footprints that do not repeat the one before.
+    #[inline(always)]
+    #[must_use]
+    pub fn first(self) -> u32 {
+        (self.0 >> 48) as u32
+    }
+}
+
+impl DistinctLines {
+    /// Four lanes, four texels each.
+    const MOST: usize = 16;
+
+    #[inline(always)]
+    fn begin(&mut self) {
+        (self.count, self.listed, self.lookups) = (0, 0, 0);
+        self.span = [u32::MAX, 0];
+    }
+
+    /// Adds the lines of some footprints, `len` of them; the others repeat the first one.
+    ///
+    /// Branches on how many lines there are so far, but not on which of them come again: that is a coin
+    /// toss to the processor.
+    #[inline(always)]
+    fn add(&mut self, lines: [u32; 4], len: usize, users: u32) {
+        let [a, b, c, d] = lines;
+        let [lowest, highest] = self.span;
+        self.span = [
+            lowest.min(a).min(b).min(c.min(d)),
+            highest.max(a).max(b).max(c.max(d)),
+        ];
+        let users_bits = u64::from(users) << 32;
+        let new = |line: u32, number: u32| {
+            u64::from(line) | users_bits | u64::from(self.listed + number) << 48
+        };
+        let mut new = [new(a, 0), new(b, 1), new(c, 2), new(d, 3)];
+        let mut kept = 0;
+        for at in 0..self.count.min(Self::MOST - 4) {
+            let before = self.lines[at];
+            let mut again = false;
+            for new in &mut new {
+                let same = *new as u32 == before.line();
+                again |= same;
+                *new = select_unpredictable(same, before.0 | users_bits, *new);
+            }
+            self.lines[kept] = before;
+            kept += usize::from(!again);
+        }
+        for (number, new) in new.into_iter().enumerate() {
+            self.lines[kept + number] = DistinctLine(new);
+        }
+        self.count = kept + len;
+        self.listed += len as u32;
+        self.lookups += len as u32 * users.count_ones();
+    }
+
+    /// All of them: so many at a time, the first ones in use.
+    #[inline(always)]
+    pub fn chunks(&self) -> impl Iterator<Item = ([DistinctLine; 4], usize)> {
+        let count = self.count;
+        let chunks = self.lines.as_chunks::<4>().0.iter();
+        let counts = (0..count.min(Self::MOST))
+            .step_by(4)
+            .map(move |at| (count - at).min(4));
+        chunks.copied().zip(counts)
+    }
+
+    /// Line look-ups of all footprints.
+    #[inline(always)]
+    #[must_use]
+    pub fn lookups(&self) -> u32 {
+        self.lookups
+    }
+
+    /// The lowest line and the highest one.
+    #[inline(always)]
+    #[must_use]
+    pub fn span(&self) -> [u32; 2] {
+        self.span
+    }
+
+    /// Lines of footprints that do not repeat the one before.
+    #[inline(always)]
+    #[must_use]
+    pub fn listed(&self) -> u32 {
+        self.listed
     }
 }
 
@@ -81,7 +249,10 @@ mod tests {
     fn bundle(footprints: &[[u32; 4]]) -> Bundle {
         let mut bundle = Bundle::default();
         bundle.begin(0);
-        footprints.iter().for_each(|&texels| bundle.push(texels));
+        let mut last = [0; 4];
+        footprints
+            .iter()
+            .for_each(|&texels| bundle.push(texels, &mut last));
         bundle
     }
 

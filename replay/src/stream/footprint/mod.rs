@@ -31,6 +31,8 @@ pub struct SampleRef {
 /// Memory for the footprints of one record, kept from quad to quad.
 #[derive(Clone, Debug)]
 pub struct Scratch {
+    /// Bundles list their distinct lines.
+    distinct: bool,
     /// By kind of texture: its one or two levels.
     bundles: Vec<[Bundle; 2]>,
     both: Vec<bool>,
@@ -87,9 +89,9 @@ impl Footprints {
         build::Builder::new(tables, config)?.finish()
     }
 
-    /// Memory for [`Self::for_quad`].
+    /// Memory for [`Self::for_quad`]; `distinct`: bundles are to list their distinct lines.
     #[must_use]
-    pub fn scratch(&self) -> Scratch {
+    pub fn scratch(&self, distinct: bool) -> Scratch {
         let kinds = self
             .draws
             .iter()
@@ -98,6 +100,7 @@ impl Footprints {
             .max()
             .unwrap_or(0);
         Scratch {
+            distinct,
             bundles: vec![[Bundle::default(); 2]; kinds],
             both: vec![false; kinds],
             many: vec![Vec::new(); kinds],
@@ -133,6 +136,10 @@ impl Footprints {
             let slots = scratch.bundles.iter_mut().zip(&mut scratch.both);
             for (kind, (bundles, both)) in group.kinds.iter().zip(slots) {
                 *both = self.bundles(kind, record, bundles);
+                if scratch.distinct {
+                    let read = &mut bundles[..1 + usize::from(*both)];
+                    read.iter_mut().for_each(Bundle::list_distinct);
+                }
             }
             for &(slot, sample) in &group.samples {
                 let [first, second] = &scratch.bundles[slot];
@@ -160,6 +167,9 @@ impl Footprints {
             };
             for (kind, many) in group.kinds.iter().zip(&mut scratch.many) {
                 self.long(kind, record, many);
+                if scratch.distinct {
+                    many.iter_mut().for_each(Bundle::list_distinct);
+                }
             }
             for &(slot, sample) in &group.samples {
                 for bundle in &scratch.many[slot] {
@@ -214,6 +224,7 @@ impl Footprints {
                 let size = [u.texels(), v.texels()];
                 let blocks =
                     lanes_of(lanes).flat_map(|lane| ellipse.blocks(uv[lane], size, kind.extent));
+                let mut last = [0; 4];
                 for (number, [x, y]) in blocks.enumerate() {
                     if number % 4 == 0 {
                         out.push(Bundle::default());
@@ -225,7 +236,10 @@ impl Footprints {
                         bundle.begin(ellipse.level as u8);
                     }
                     let ([x0, x1], [y0, y1]) = (u.pair_at(x), v.pair_at(y));
-                    bundle.push([line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)]);
+                    bundle.push(
+                        [line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)],
+                        &mut last,
+                    );
                 }
             }
         }
@@ -335,18 +349,22 @@ impl Footprints {
         let base = base_bytes + kind.skew_bytes;
         let line = |offset: u32| (base + offset) >> self.line_shift;
         let [us, vs] = [0, 1].map(|axis| uv.map(|lane| lane[axis]));
+        let mut last = [0; 4];
         match filter {
             Filter::Linear => {
                 let (columns, rows) = (u.linear(us), v.linear(vs));
                 for lane in lanes_of(lanes) {
                     let ([x0, x1], [y0, y1]) = (columns[lane], rows[lane]);
-                    out.push([line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)]);
+                    out.push(
+                        [line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)],
+                        &mut last,
+                    );
                 }
             }
             Filter::Nearest => {
                 let (columns, rows) = (u.nearest(us), v.nearest(vs));
                 for lane in lanes_of(lanes) {
-                    out.push([line(columns[lane] + rows[lane]); 4]);
+                    out.push([line(columns[lane] + rows[lane]); 4], &mut last);
                 }
             }
         }

@@ -17,7 +17,7 @@ fn fast(tables: &Tables, config: &RunConfig, record: &QuadRecord) -> Vec<Read> {
     footprints.for_quad(
         0,
         &[*record],
-        &mut footprints.scratch(),
+        &mut footprints.scratch(true),
         |sample, bundle| {
             let mut firsts = bundle.runs().map(|(first, _)| first).peekable();
             for index in 0..usize::from(bundle.count) {

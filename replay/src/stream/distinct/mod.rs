@@ -1,0 +1,338 @@
+//! A quad's distinct lines: all that a cache has to be asked where the quad's own accesses change
+//! nothing in it but the order of last use.
+//!
+//! A quad is cut into *segments* of so many footprints that a word has a bit for each. In a segment,
+//! each line of each cell is listed once, with the footprints that use it.
+
+mod merge;
+
+use super::QuadLines;
+use super::footprint::Bundle;
+use super::lines::Tag;
+use merge::Merge;
+
+/// Footprints of a segment at most, repeats counted: four lanes of three trilinear textures.
+const FOOTPRINTS: u32 = 24;
+
+/// Who uses a distinct line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Use {
+    bits: u32,
+    /// Its cell within the view, and a bit.
+    cell: u32,
+}
+
+impl Use {
+    const LAST: u32 = 1 << 31;
+
+    /// First lines are below this.
+    pub const FIRST_LINES: usize = 1 << (31 - FOOTPRINTS);
+
+    /// Bits of `cell` that name none.
+    const LISTED: u32 = Tag::CELLS as u32;
+
+    fn new(footprints: u32, first_line: u32, cell: u32) -> Self {
+        Self {
+            bits: footprints | first_line << FOOTPRINTS,
+            cell,
+        }
+    }
+
+    /// Its cell within the view.
+    #[inline(always)]
+    pub(super) fn cell(self) -> u32 {
+        self.cell & (Self::LISTED - 1)
+    }
+
+    /// True if the quad may have listed the line already: for another cell, or in another segment.
+    #[inline(always)]
+    #[must_use]
+    pub fn may_be_listed(self) -> bool {
+        self.cell & Self::LISTED != 0
+    }
+
+    /// A bit for each footprint of the segment, repeats counted.
+    #[inline(always)]
+    #[must_use]
+    pub fn footprints(self) -> u32 {
+        self.bits & ((1 << FOOTPRINTS) - 1)
+    }
+
+    /// Where it stands first among the segment's lines.
+    #[inline(always)]
+    #[must_use]
+    pub fn first_line(self) -> usize {
+        ((self.bits & !Self::LAST) >> FOOTPRINTS) as usize
+    }
+
+    /// True for the last distinct line of a segment.
+    #[inline(always)]
+    fn ends_segment(self) -> bool {
+        self.bits & Self::LAST != 0
+    }
+}
+
+impl<'a> QuadLines<'a> {
+    /// True if all its footprints fit into one segment.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_one_segment(&self) -> bool {
+        self.footprints <= FOOTPRINTS
+    }
+
+    /// Where the distinct lines of each segment end.
+    #[inline(always)]
+    pub fn segments(self) -> impl Iterator<Item = usize> + use<'a> {
+        let mut start = 0;
+        std::iter::from_fn(move || {
+            let uses = &self.uses[start..];
+            start += if self.is_one_segment() && !uses.is_empty() {
+                // All of them fit into one.
+                uses.len()
+            } else {
+                1 + uses.iter().position(|of| of.ends_segment())?
+            };
+            Some(start)
+        })
+    }
+}
+
+/// Finds the distinct lines of one quad after another.
+///
+/// A bundle brings its own, and mostly no other bundle of the quad has any of them: textures and levels
+/// lie in lines of their own, but for the smallest. Only from the first bundle on that has neighbours are
+/// lines looked for among others.
+#[derive(Debug, Default)]
+pub(super) struct Distinct {
+    /// Footprints of the segment so far, and their lines.
+    footprints: u32,
+    lines: u32,
+    /// Where the segment starts among all distinct lines, and the first bundle that another one meets.
+    start: usize,
+    met: usize,
+    /// [`Use::LISTED`] for all but a quad's first segment.
+    listed: u32,
+    bundles: u32,
+    /// Of all the segment's bundles.
+    hull: Span,
+    /// Bundles of the segment.
+    spans: [Span; FOOTPRINTS as usize],
+    merge: Merge,
+}
+
+/// Where a bundle starts among all distinct lines, and the lines that all of its own are between.
+#[derive(Clone, Copy, Debug, Default)]
+struct Span {
+    start: usize,
+    first: u32,
+    last: u32,
+}
+
+/// A footprint has four lines at most.
+const _: () = assert!(4 * FOOTPRINTS as usize <= Use::FIRST_LINES);
+
+impl Distinct {
+    /// A quad begins, behind so many distinct lines.
+    #[inline(always)]
+    pub(super) fn begin(&mut self, start: usize) {
+        self.begin_segment(start);
+        self.listed = 0;
+    }
+
+    #[inline(always)]
+    fn begin_segment(&mut self, start: usize) {
+        (self.footprints, self.lines, self.bundles) = (0, 0, 0);
+        (self.start, self.met) = (start, usize::MAX);
+        self.listed = Use::LISTED;
+        self.hull = Span {
+            first: u32::MAX,
+            ..Span::default()
+        };
+    }
+
+    /// Appends the distinct lines and their uses of a bundle whose lines count from `base_line`.
+    #[inline(always)]
+    pub(super) fn add(
+        &mut self,
+        cell: u32,
+        base_line: u32,
+        bundle: &Bundle,
+        distinct: &mut Vec<u32>,
+        uses: &mut Vec<Use>,
+    ) {
+        if bundle.count == 0 {
+            return;
+        }
+        if self.footprints + u32::from(bundle.count) > FOOTPRINTS {
+            self.end(distinct, uses);
+            self.begin_segment(distinct.len());
+        }
+        let own = bundle.distinct();
+        let [first, last] = own.span().map(|line| base_line + line);
+        let start = distinct.len();
+        let span = Span { start, first, last };
+        if self.hull.meets(&span) {
+            self.meet(&span);
+        }
+        self.hull.first = self.hull.first.min(first);
+        self.hull.last = self.hull.last.max(last);
+        self.spans[self.bundles as usize % FOOTPRINTS as usize] = span;
+        for (lines, count) in own.chunks() {
+            // All four, then those in use: how many is a coin toss to the processor.
+            let end = distinct.len() + count;
+            distinct.extend_from_slice(&lines.map(|of| base_line.wrapping_add(of.line())));
+            distinct.truncate(end);
+            uses.extend_from_slice(&lines.map(|of| {
+                let footprints = of.users() << self.footprints;
+                let first_line = self.lines + of.first();
+                Use::new(footprints, first_line, cell | self.listed)
+            }));
+            uses.truncate(end);
+        }
+        self.bundles += 1;
+        self.footprints += u32::from(bundle.count);
+        self.lines += own.listed();
+    }
+
+    /// Notes whom a bundle meets.
+    #[inline(never)]
+    fn meet(&mut self, span: &Span) {
+        let before = &self.spans[..self.bundles as usize % FOOTPRINTS as usize];
+        if let Some(other) = before.iter().find(|other| other.meets(span)) {
+            self.met = self.met.min(other.start);
+        }
+    }
+
+    /// The quad, or its segment, ends.
+    #[inline(always)]
+    pub(super) fn end(&mut self, distinct: &mut Vec<u32>, uses: &mut Vec<Use>) {
+        if self.met < distinct.len() {
+            self.merge.again(self.met, distinct, uses);
+        }
+        if let Some(last) = uses[self.start..].last_mut() {
+            last.bits |= Use::LAST;
+        }
+    }
+}
+
+impl Span {
+    #[inline(always)]
+    fn meets(&self, other: &Self) -> bool {
+        (self.first <= other.last) & (other.first <= self.last)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::lines::{QuadEnd, TileLines};
+    use proptest::prelude::*;
+    use std::collections::HashMap;
+
+    /// A bundle of footprints, four lines each.
+    fn bundle(footprints: &[[u32; 4]]) -> Bundle {
+        let mut bundle = Bundle::default();
+        bundle.begin(0);
+        let mut last = [0; 4];
+        for &texels in footprints {
+            bundle.push(texels, &mut last);
+        }
+        bundle.list_distinct();
+        bundle
+    }
+
+    /// Bundles of up to four footprints: their cell, a base for their lines, the lines.
+    fn bundles() -> impl Strategy<Value = Vec<(u32, u32, Vec<[u32; 4]>)>> {
+        let line = || prop_oneof![0_u32..3, 0_u32..30];
+        let footprints = prop::collection::vec([line(), line(), line(), line()], 0..5);
+        prop::collection::vec((0_u32..3, 0_u32..40, footprints), 0..14)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(512))]
+
+        /// Lines are shared within bundles, and by bundles of the same cell and of others.
+        #[test]
+        fn segments_say_of_each_line_who_uses_it_and_in_which_order(
+            quads in prop::collection::vec(bundles(), 1..4),
+        ) {
+            // Numbers of merges start again.
+            let mut distinct = Distinct::default();
+            distinct.merge.number = u32::MAX - 1;
+            let mut tile = TileLines::default();
+            for bundles in &quads {
+                distinct.begin(tile.distinct.len());
+                let mut footprints = 0;
+                for (cell, base, texels) in bundles {
+                    let bundle = bundle(texels);
+                    footprints += u32::from(bundle.count);
+                    let mut lookups = 0;
+                    for (index, times) in bundle.runs() {
+                        let [first, other] = Tag::of_footprint(*cell, times - 1);
+                        for (number, line) in bundle.lines_of(index).iter().enumerate() {
+                            tile.lines.push(base + line);
+                            tile.tags.push(if number == 0 { first } else { other });
+                            lookups += times;
+                        }
+                    }
+                    prop_assert!(bundle.count == 0 || bundle.distinct().lookups() == lookups);
+                    distinct.add(*cell, *base, &bundle, &mut tile.distinct, &mut tile.uses);
+                }
+                distinct.end(&mut tile.distinct, &mut tile.uses);
+                tile.quads.push(QuadEnd {
+                    end: tile.lines.len() as u32,
+                    distinct_end: tile.distinct.len() as u32,
+                    footprints,
+                });
+            }
+            for index in 0..quads.len() {
+                let quad = tile.quad(index);
+                let (mut begin, mut first_line) = (0, 0);
+                for segment_end in quad.segments() {
+                    let listed = begin..segment_end;
+                    let all = |all, of: &Use| all | of.footprints();
+                    let mut footprints = quad.uses[listed.clone()].iter().fold(0, all).count_ones();
+                    let mut end = first_line;
+                    while footprints > 0 {
+                        footprints -= 1 + quad.tags[end].repeats();
+                        end = quad.end_of_footprint(end);
+                    }
+                    // Footprints and last position by line and cell.
+                    let mut plain: HashMap<(u32, u32), (u32, usize, usize)> = HashMap::new();
+                    let (mut bit, mut bits) = (0, 0);
+                    for at in first_line..end {
+                        if quad.tags[at].is_first() {
+                            let times = 1 + quad.tags[at].repeats();
+                            bits = ((1 << times) - 1) << bit;
+                            bit += times;
+                        }
+                        let key = (quad.lines[at], quad.tags[at].cell());
+                        let first = at - first_line;
+                        let entry = plain.entry(key).or_insert((0, first, 0));
+                        *entry = (entry.0 | bits, entry.1, at);
+                    }
+                    prop_assert!(bit <= FOOTPRINTS);
+                    begin = segment_end;
+                    prop_assert_eq!(listed.len(), plain.len());
+                    let other_cell = |line, cell, first| {
+                        let earlier = |(key, of): (&(u32, u32), &(u32, usize, usize))| {
+                            key.0 == line && key.1 != cell && of.1 < first
+                        };
+                        plain.iter().any(earlier)
+                    };
+                    let mut before = 0;
+                    for (line, of) in quad.distinct[listed.clone()].iter().zip(&quad.uses[listed]) {
+                        let (footprints, first, last) = plain[&(*line, of.cell())];
+                        prop_assert_eq!((of.footprints(), of.first_line()), (footprints, first));
+                        let listed = first_line > 0 || other_cell(*line, of.cell(), first);
+                        prop_assert_eq!(of.may_be_listed(), listed);
+                        prop_assert!(before <= last);
+                        before = last;
+                    }
+                    first_line = end;
+                }
+                prop_assert_eq!((begin, first_line), (quad.distinct.len(), quad.lines.len()));
+            }
+        }
+    }
+}
