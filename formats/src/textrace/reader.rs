@@ -126,6 +126,17 @@ impl Textrace {
         )
     }
 
+    /// Quad records of all tiles.
+    #[must_use]
+    pub fn records(&self) -> u64 {
+        let passes = (0..).zip(&self.tables().passes);
+        let tiles = passes.flat_map(|(pass, info)| {
+            let tiles = 0..info.tile_count() as usize;
+            tiles.map(move |tile| self.tile_stats(pass, tile).records)
+        });
+        tiles.map(u64::from).sum()
+    }
+
     /// How a tile is encoded.
     ///
     /// # Errors

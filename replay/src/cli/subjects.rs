@@ -32,16 +32,7 @@ impl Traces {
     /// Quad records of each trace.
     #[must_use]
     pub fn records(&self) -> Vec<u64> {
-        let of_trace = |trace: &Textrace| -> u64 {
-            let passes = trace.tables().passes.iter().enumerate();
-            let tiles = passes.flat_map(|(pass, info)| {
-                (0..info.tile_count() as usize).map(move |tile| (pass, tile))
-            });
-            tiles
-                .map(|(pass, tile)| u64::from(trace.tile_stats(pass, tile).records))
-                .sum()
-        };
-        self.0.iter().map(|(trace, ..)| of_trace(trace)).collect()
+        self.0.iter().map(|(trace, ..)| trace.records()).collect()
     }
 
     /// The traces under the names of their files.

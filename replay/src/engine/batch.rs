@@ -7,7 +7,7 @@
 use super::counts::CacheCounts;
 use super::first_miss::FirstMiss;
 use super::functional::Functional;
-use super::in_turn::in_turn;
+use super::in_turn::{Stage, in_turn};
 use super::one_pass::{LevelGeometry, OnePass, geometry};
 use super::timed::Timed;
 use super::wave::Wave;
@@ -161,16 +161,21 @@ pub fn replay_jobs(
             waves.push((tiles, (waves.len(), job, wave)));
         }
     }
+    if jobs.len() > 1 {
+        // The smallest last, so that all threads are done at nearly the same time.
+        let records: Vec<u64> = jobs.iter().map(|job| job.trace.records()).collect();
+        waves.sort_by_key(|(_, (_, job, _))| std::cmp::Reverse(records[*job]));
+    }
     // A stream's tiles are expanded by all threads: what has fewer leaves some of them idle.
     let enough = Expander::CHUNK * rayon::current_num_threads();
     let failed = Mutex::new(Vec::new());
     let run = |(index, job, passes): (usize, usize, Vec<Pass<'_>>),
-               expanded: &(dyn Fn() + Sync)| {
+               comes_to: &(dyn Fn(Stage) + Sync)| {
         let first = passes[0].points[0];
         let wave = Wave {
             job: jobs[job],
             memory,
-            expanded,
+            comes_to,
         };
         if let Err(error) = wave.run(passes) {
             let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,20 +1,23 @@
 //! The passes of one stream, frame after frame.
 
 use super::batch::{Job, Pass};
+use super::in_turn::Stage;
 use super::summary::summary;
 use super::{Machine, ReplayError};
 use crate::config::{BetweenFrames, Mode, Order, RunConfig};
 use crate::order::{self, Phase};
 use crate::result::RunResult;
-use crate::stream::{Cores, Expander, LineMemory, TraceCounts, shaded};
+use crate::stream::{Cores, Expander, Frame, LineMemory, TraceCounts, shaded};
 use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What passes that read the same lines need.
 pub(super) struct Wave<'a> {
     pub(super) job: Job<'a>,
     pub(super) memory: &'a LineMemory,
-    /// Is told when a frame's lines are in memory.
-    pub(super) expanded: &'a (dyn Fn() + Sync),
+    /// Is told when a frame's lines are in memory, and when no pass waits for a thread any more.
+    pub(super) comes_to: &'a (dyn Fn(Stage) + Sync),
 }
 
 impl Wave<'_> {
@@ -35,9 +38,14 @@ impl Wave<'_> {
                 Some(frame) => frame,
                 None => expander.frame(number, self.memory, &mut counts)?,
             };
-            (self.expanded)();
+            (self.comes_to)(Stage::Grown);
             let plans = orders.plans(trace_passes, number);
-            let replay = |pass: &mut Pass<'_>| -> Result<Box<dyn Machine>, ReplayError> {
+            let waiting = AtomicUsize::new(passes.len());
+            let is_last = index + 1 == frames.len();
+            let replay = |pass: &mut Pass<'_>, frame: &Frame<'_>| {
+                if waiting.fetch_sub(1, Ordering::Relaxed) == 1 && is_last {
+                    (self.comes_to)(Stage::Ending);
+                }
                 let config = *pass.config();
                 let mut machine = match pass.machine.take() {
                     Some(mut machine) => {
@@ -48,21 +56,27 @@ impl Wave<'_> {
                     }
                     None => pass.build(&expander)?,
                 };
-                let mut cores = Cores::new(&frame, config.cores as usize);
+                let mut cores = Cores::new(frame, config.cores as usize);
                 machine.run(&mut cores, orders.plan(&plans, &config), config.assign)?;
-                Ok(machine)
+                Ok::<_, ReplayError>(machine)
             };
-            let all = passes.par_iter_mut().with_max_len(1);
+            // The last pass gives the frame's memory back, whatever this thread does then.
+            let frame = Arc::new(frame);
+            let share = |pass| (pass, Arc::clone(&frame));
+            let all: Vec<_> = passes.iter_mut().map(share).collect();
+            drop(frame);
+            let all = all.into_par_iter().with_max_len(1);
             let Some(&next) = frames.get(index + 1) else {
-                return all.try_for_each(|pass| {
-                    let machine = replay(pass)?;
+                return all.try_for_each(|(pass, frame)| {
+                    let machine = replay(pass, &frame)?;
+                    drop(frame);
                     self.finish(pass, &*machine, &expander, &counts);
                     Ok(())
                 });
             };
             let keep = || {
-                all.try_for_each(|pass| {
-                    pass.machine = Some(replay(pass)?);
+                all.try_for_each(|(pass, frame)| {
+                    pass.machine = Some(replay(pass, &frame)?);
                     Ok::<(), ReplayError>(())
                 })
             };

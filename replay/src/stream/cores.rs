@@ -128,6 +128,7 @@ fn fill<'f>(slot: &mut Slot<'f>, frame: &'f Frame<'f>, at: TileRef) -> Result<()
     }
     if let Slot::Own(work) = slot {
         expander.expand(at, work)?;
+        frame.keep(at, &work.lines);
     }
     Ok(())
 }

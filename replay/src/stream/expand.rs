@@ -2,8 +2,8 @@
 //! order, cache and clock then reads the lines.
 //!
 //! A frame is expanded when its turn comes and dropped after it, so memory does not grow with the
-//! frames. Tiles for which the [`LineMemory`] has no room are counted and expanded again whenever
-//! a core comes to them.
+//! frames. Tiles for which the [`LineMemory`] has no room are counted and expanded again when a core
+//! comes to them, until there is room.
 
 use super::distinct::Distinct;
 use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
@@ -14,6 +14,7 @@ use crate::config::RunConfig;
 use crate::order::TileRef;
 use formats::textrace::Tile;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Memory for the lines of all frames that are replayed at the same time.
@@ -40,13 +41,19 @@ impl LineMemory {
     /// Whether half of it is left: room for more frames at the same time.
     #[must_use]
     pub fn half_is_left(&self) -> bool {
-        self.left_bytes.load(Ordering::Relaxed) >= self.bytes / 2
+        self.left() >= self.bytes / 2
     }
 
-    fn take(&self, bytes: u64) -> bool {
-        let less = |left: u64| left.checked_sub(bytes);
+    fn left(&self) -> u64 {
+        self.left_bytes.load(Ordering::Relaxed)
+    }
+
+    /// A copy of lines, if there is room for it.
+    fn keep(&self, lines: &TileLines) -> Option<TileLines> {
+        let less = |left: u64| left.checked_sub(lines.bytes());
         let (set, get) = (Ordering::Relaxed, Ordering::Relaxed);
-        self.left_bytes.fetch_update(set, get, less).is_ok()
+        let taken = self.left_bytes.fetch_update(set, get, less).is_ok();
+        taken.then(|| lines.clone())
     }
 
     fn give_back(&self, bytes: u64) {
@@ -153,28 +160,41 @@ impl<'a> Expander<'a> {
         let tiles: Vec<TileRef> = of_frame
             .flat_map(|(pass, p)| (0..p.tile_count()).map(move |tile| TileRef { pass, tile }))
             .collect();
+        // Memory may come back while other chunks are expanded: those for which there is none are left for
+        // later.
+        let largest = AtomicU64::new(0);
         let chunk = |tiles: &[TileRef]| {
             let mut work = self.work();
             let mut expanded = Vec::with_capacity(tiles.len());
+            let mut bytes = 0;
             for &at in tiles {
                 let accesses = self.expand(at, &mut work)?;
-                let kept = memory.take(work.lines.bytes()).then(|| work.lines.clone());
-                expanded.push((at, accesses, kept));
+                bytes += work.lines.bytes();
+                expanded.push((at, accesses, memory.keep(&work.lines)));
             }
+            largest.fetch_max(bytes, Ordering::Relaxed);
             Ok((work.counts, expanded))
         };
+        let chunks = tiles.par_chunks(Self::CHUNK);
+        let now = |tiles| {
+            let room = memory.left() >= largest.load(Ordering::Relaxed);
+            room.then(|| chunk(tiles)).transpose()
+        };
+        let first: Result<Vec<_>, StreamError> = chunks.clone().map(now).collect();
+        let later = |(expanded, tiles)| Option::map_or_else(expanded, || chunk(tiles), Ok);
         let chunks: Result<Vec<_>, StreamError> =
-            tiles.par_chunks(Self::CHUNK).map(chunk).collect();
+            first?.into_par_iter().zip(chunks).map(later).collect();
         let mut frame = Frame {
             expander: self,
             memory,
-            kept: vec![Vec::new(); passes.len()],
+            kept: passes.iter().map(|_| Vec::new()).collect(),
         };
         for (chunk_counts, expanded) in chunks? {
             counts.add(&chunk_counts);
             for (at, accesses, lines) in expanded {
                 counts.tiles[self.bins.tile(at)] = accesses;
-                frame.kept[at.pass as usize].push(lines);
+                let slot = lines.map_or_else(OnceLock::new, OnceLock::from);
+                frame.kept[at.pass as usize].push(slot);
             }
         }
         counts.unique_lines = self.touched.count();
@@ -300,7 +320,10 @@ impl<'a> Expander<'a> {
     /// The sum of [`access_hash`] over the last quad's footprints, where only distinct lines are listed.
     #[inline(always)]
     fn touch(&self, lines: &TileLines) -> u64 {
-        let start = lines.quads.last().map_or(0, |quad| quad.distinct_end as usize);
+        let start = lines
+            .quads
+            .last()
+            .map_or(0, |quad| quad.distinct_end as usize);
         let used = lines.distinct[start..].iter().zip(&lines.uses[start..]);
         used.fold(0, |hash, (&line, of)| {
             self.touched.insert(line);
@@ -348,8 +371,8 @@ fn access_hash(line: u32) -> u64 {
 pub struct Frame<'e> {
     expander: &'e Expander<'e>,
     memory: &'e LineMemory,
-    /// By pass and tile; empty for passes of other frames, none where memory had no room.
-    kept: Vec<Vec<Option<TileLines>>>,
+    /// By pass and tile; empty for passes of other frames, and for what memory had no room for yet.
+    kept: Vec<Vec<OnceLock<TileLines>>>,
 }
 
 impl<'e> Frame<'e> {
@@ -358,26 +381,95 @@ impl<'e> Frame<'e> {
     }
 
     pub(super) fn kept(&self, at: TileRef) -> Option<&TileLines> {
-        self.kept[at.pass as usize].get(at.tile as usize)?.as_ref()
+        self.slot(at)?.get()
     }
 
-    /// Tiles that are expanded again whenever a core comes to them.
+    /// Keeps a tile's lines, which were expanded once more, if there is room for them now.
+    pub(super) fn keep(&self, at: TileRef, lines: &TileLines) {
+        if let Some(slot) = self.slot(at)
+            && slot.get().is_none()
+            && let Some(copy) = self.memory.keep(lines)
+            && let Err(copy) = slot.set(copy)
+        {
+            // Another core was faster.
+            self.memory.give_back(copy.bytes());
+        }
+    }
+
+    fn slot(&self, at: TileRef) -> Option<&OnceLock<TileLines>> {
+        self.kept[at.pass as usize].get(at.tile as usize)
+    }
+
+    /// Tiles that are expanded again when a core comes to them.
     #[must_use]
     pub fn not_kept(&self) -> usize {
-        self.kept.iter().flatten().filter(|t| t.is_none()).count()
+        let slots = self.kept.iter().flatten();
+        slots.filter(|slot| slot.get().is_none()).count()
     }
 }
 
 impl Drop for Frame<'_> {
     fn drop(&mut self) {
-        let bytes = self.kept.iter().flatten().flatten().map(TileLines::bytes);
-        self.memory.give_back(bytes.sum());
+        let kept = self.kept.iter().flatten().filter_map(OnceLock::get);
+        self.memory.give_back(kept.map(TileLines::bytes).sum());
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::order::WorkItem;
+    use crate::stream::testing::{tables, tile};
+    use crate::stream::{Cores, MemoryTrace};
+
+    #[test]
+    fn tiles_without_room_are_kept_once_there_is_room() {
+        let trace = MemoryTrace {
+            tables: tables(&[[64, 64]]),
+            tiles: vec![vec![tile(&[(0, 9), (1, 20)])], vec![tile(&[(0, 7)])]],
+        };
+        let expander = Expander::new(&trace, &RunConfig::default()).unwrap();
+        fn expand<'e>(
+            expander: &'e Expander<'_>,
+            memory: &'e LineMemory,
+        ) -> (Frame<'e>, TraceCounts) {
+            let mut counts = TraceCounts::new(expander.bins());
+            let frame = expander.frame(0, memory, &mut counts).unwrap();
+            (frame, counts)
+        }
+        let plenty = LineMemory::new(1 << 20);
+        let (frame, expected) = expand(&expander, &plenty);
+        let bytes = plenty.bytes - plenty.left();
+        let lines_of = |frame: &Frame<'_>, pass: u32| {
+            let mut cores = Cores::new(frame, 1);
+            cores
+                .load(0, &WorkItem::Tile(TileRef { pass, tile: 0 }))
+                .unwrap();
+            let quads = std::iter::from_fn(|| Some(cores.next_quad(0)?.lines.to_vec()));
+            quads.collect::<Vec<_>>()
+        };
+        let lines = [0, 1].map(|pass| lines_of(&frame, pass));
+        assert!(frame.not_kept() == 0 && !lines[1].is_empty());
+
+        let memory = LineMemory::new(bytes);
+        let (first, _) = expand(&expander, &memory);
+        let (second, counts) = expand(&expander, &memory);
+        assert_eq!((first.not_kept(), second.not_kept()), (0, 2));
+        assert_eq!((counts.hash, counts.quads), (expected.hash, expected.quads));
+        let read = |kept: [usize; 2]| {
+            for (pass, kept) in kept.into_iter().enumerate() {
+                assert_eq!(lines_of(&second, pass as u32), lines[pass]);
+                assert_eq!(second.not_kept(), 2 - kept);
+            }
+        };
+        read([0, 0]);
+        drop(first);
+        read([1, 2]);
+        read([2, 2]);
+        assert_eq!(memory.left(), 0);
+        drop(second);
+        assert_eq!(memory.left(), bytes);
+    }
 
     #[test]
     fn a_tile_whose_counters_would_wrap_is_refused() {

@@ -73,6 +73,10 @@ impl TileSource for Shaded<'_> {
         self.source.tables()
     }
 
+    fn records(&self) -> u64 {
+        self.source.records()
+    }
+
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         self.source.read_tile(pass, index, tile)?;
         if let Some(opaque) = &self.opaque {

@@ -8,6 +8,9 @@ pub trait TileSource: Sync {
     /// Its tables.
     fn tables(&self) -> &Tables;
 
+    /// Quad records of all tiles, as a measure of the work: what reading leaves out included.
+    fn records(&self) -> u64;
+
     /// Decodes a tile into `tile`, which keeps its memory from call to call.
     ///
     /// # Errors
@@ -29,6 +32,11 @@ impl TileSource for MemoryTrace {
         &self.tables
     }
 
+    fn records(&self) -> u64 {
+        let tiles = self.tiles.iter().flatten();
+        tiles.map(|tile| tile.records.len() as u64).sum()
+    }
+
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         let stored = self
             .tiles
@@ -48,6 +56,10 @@ impl TileSource for MemoryTrace {
 impl TileSource for Textrace {
     fn tables(&self) -> &Tables {
         self.tables()
+    }
+
+    fn records(&self) -> u64 {
+        self.records()
     }
 
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {

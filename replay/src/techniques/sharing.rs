@@ -59,6 +59,10 @@ impl TileSource for Part<'_> {
         self.source.tables()
     }
 
+    fn records(&self) -> u64 {
+        self.source.records()
+    }
+
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         let passes = &self.tables().passes;
         if passes
