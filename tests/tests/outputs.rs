@@ -389,3 +389,26 @@ fn a_reader_that_leaves_is_no_error() {
         assert!(child.wait().expect("ends").success(), "{arguments:?}");
     }
 }
+
+#[test]
+fn a_page_whose_picture_is_none_is_refused_before_the_replays() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("text.png"), "no picture").expect("a file");
+    let trace = golden("atrium.textrace");
+    for (image, expected) in [
+        ("text.png", "text.png: not a picture"),
+        ("none.png", "none.png: cannot read"),
+        ("hall=text.png", "expected one of atrium, found hall"),
+    ] {
+        let mut command = program("replay");
+        command.arg("report").arg(&trace).args(["--image", image]);
+        let output = refuse(
+            command.args(["-o", "page.html"]).current_dir(folder.path()),
+            &[expected],
+        );
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(!message.contains("replayed in"), "{message}");
+        assert!(!at("page.html").exists());
+    }
+}

@@ -44,17 +44,17 @@ pub struct ExperimentArgs {
 }
 
 impl ExperimentArgs {
-    /// Replays every point and hands the report to `print`; exit code 1 when the orders replayed
-    /// different accesses. The `outputs` that will be written are checked first.
+    /// Replays every point and hands the report and the pictures that it is to show to `print`; exit code 1
+    /// when the orders replayed different accesses. The `outputs` that will be written are checked first.
     ///
     /// # Errors
-    /// Wrong arguments, an unreadable trace, an output that cannot be written, what `print` says.
+    /// Wrong arguments, an unreadable trace or picture, an output that cannot be written, what `print` says.
     pub fn run(
         &self,
         outputs: &[Output],
         functional: bool,
         tile_maps: bool,
-        print: impl FnOnce(&PaperReport) -> Result<()>,
+        print: impl FnOnce(&PaperReport, &[EmbeddedPicture]) -> Result<()>,
     ) -> Result<ExitCode> {
         self.threads.start()?;
         let base = self.machine.resolve_without_preset()?;
@@ -90,13 +90,14 @@ impl ExperimentArgs {
         let traces = Traces::open(&self.traces)?;
         let mut subjects = traces.subjects();
         self.choose_stand_ins(&mut subjects)?;
+        let pictures = self.pictures(&subjects)?;
         let replays = subjects.len() * plan.points.len();
         let progress = Progress::new("replaying", replays as u64, "replays");
         let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
         drop(progress);
         shell::note(&outcome.shared());
         let report = PaperReport::new(&outcome);
-        print(&report)?;
+        print(&report, &pictures)?;
         if let Some(problem) = report.not_conserved() {
             shell::error(&problem);
             return Ok(ExitCode::FAILURE);
@@ -132,8 +133,8 @@ impl ExperimentArgs {
     ///
     /// # Errors
     /// A label that no trace has, a file that is no picture.
-    fn pictures(&self, report: &PaperReport) -> Result<Vec<EmbeddedPicture>> {
-        let known: Vec<&str> = report.traces.iter().map(|t| t.label.as_str()).collect();
+    fn pictures(&self, subjects: &[Subject]) -> Result<Vec<EmbeddedPicture>> {
+        let known: Vec<&str> = subjects.iter().map(|s| s.label.as_str()).collect();
         let pictures: Vec<Result<EmbeddedPicture>> = self
             .images
             .par_iter()
@@ -157,15 +158,15 @@ impl ExperimentArgs {
         // The first error in the order of the arguments is what is told.
         pictures.into_iter().collect()
     }
+}
 
-    /// Writes the report's page, and the same numbers beside it as JSON and CSV.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn, a file that cannot be written.
-    pub fn write_page(&self, report: &PaperReport, path: &Path) -> Result<()> {
-        let html = page::page(report, &self.pictures(report)?)?;
-        write_page(path, &html, &report.json()?, &report.csv())
-    }
+/// Writes the report's page, and the same numbers beside it as JSON and CSV.
+///
+/// # Errors
+/// A plot that cannot be drawn, a file that cannot be written.
+pub fn write_report(report: &PaperReport, pictures: &[EmbeddedPicture], path: &Path) -> Result<()> {
+    let html = page::page(report, pictures)?;
+    write_page(path, &html, &report.json()?, &report.csv())
 }
 
 /// The page at `path`, and JSON and CSV with the same numbers beside it; a page that goes to

@@ -1,6 +1,6 @@
 //! `replay paper`: the Z2 paper's experiment as a table.
 
-use super::experiment_args::{ExperimentArgs, page_outputs};
+use super::experiment_args::{ExperimentArgs, page_outputs, write_report};
 use super::parquet_arg::ParquetArg;
 use crate::files::write_atomically;
 use crate::report::errors::{self, Of};
@@ -60,23 +60,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let files = args.csv.iter().chain(&args.html);
     let prints = !args.parquet.takes_stdout() && !files.into_iter().any(|path| is_stdout(path));
     let functional = args.functional || page;
-    args.experiment.run(&outputs, functional, page, |report| {
-        if let Some(path) = &args.csv {
-            write_atomically(path, report.csv().as_bytes())?;
-        }
-        args.parquet.write(|| report.table())?;
-        if let Some(path) = &args.html {
-            args.experiment.write_page(report, path)?;
-        }
-        if prints {
-            super::print(&if args.json {
-                report.json()?
-            } else {
-                text(report)
-            })?;
-        }
-        Ok(())
-    })
+    args.experiment
+        .run(&outputs, functional, page, |report, pictures| {
+            if let Some(path) = &args.csv {
+                write_atomically(path, report.csv().as_bytes())?;
+            }
+            args.parquet.write(|| report.table())?;
+            if let Some(path) = &args.html {
+                write_report(report, pictures, path)?;
+            }
+            if prints {
+                super::print(&if args.json {
+                    report.json()?
+                } else {
+                    text(report)
+                })?;
+            }
+            Ok(())
+        })
 }
 
 /// The tables for a terminal.

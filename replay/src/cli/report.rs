@@ -1,6 +1,6 @@
 //! `replay report`: the Z2 paper's experiment as a page.
 
-use super::experiment_args::{ExperimentArgs, page_outputs};
+use super::experiment_args::{ExperimentArgs, page_outputs, write_report};
 use super::parquet_arg::ParquetArg;
 use anyhow::Result;
 use shell::is_stdout;
@@ -30,12 +30,13 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut outputs = page_outputs("--output", &args.output);
     outputs.extend(args.parquet.output());
-    args.experiment.run(&outputs, true, true, |report| {
-        args.experiment.write_page(report, &args.output)?;
-        args.parquet.write(|| report.table())?;
-        if !is_stdout(&args.output) && !args.parquet.takes_stdout() {
-            super::print(&args.output.display().to_string())?;
-        }
-        Ok(())
-    })
+    args.experiment
+        .run(&outputs, true, true, |report, pictures| {
+            write_report(report, pictures, &args.output)?;
+            args.parquet.write(|| report.table())?;
+            if !is_stdout(&args.output) && !args.parquet.takes_stdout() {
+                super::print(&args.output.display().to_string())?;
+            }
+            Ok(())
+        })
 }
