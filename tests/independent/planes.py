@@ -3,6 +3,7 @@
 Written from FORMAT.md alone; even the code lengths are read from there.
 """
 
+import math
 import struct
 from pathlib import Path
 
@@ -82,38 +83,40 @@ class Bits:
 
 
 def one(a):
-    return min(max(a, -1.0), 1.0)
+    """Also of what is no number: the comparisons then fail."""
+    a = a if a < 1.0 else 1.0
+    return a if a > -1.0 else -1.0
 
 
 def least(w):
     return max(w, 2.0**-10)
 
 
-def wide(value):
-    """Python's own rounding is to even, too."""
-    return i32(round(value))
-
-
 def f32(value):
     """A single operation of f64 on f32 numbers, rounded again, is that of f32."""
-    return struct.unpack("<f", struct.pack("<f", value))[0]
+    try:
+        return struct.unpack("<f", struct.pack("<f", value))[0]
+    except OverflowError:
+        return float("inf") if value > 0 else float("-inf")
+
+
+def steps(value):
+    """The integer in the low bits of a sum with 12582912."""
+    (bits,) = struct.unpack("<I", struct.pack("<f", value))
+    return i32(bits - 0x4B400000)
 
 
 def near(value):
-    (bits,) = struct.unpack("<I", struct.pack("<f", value + 12582912.0))
-    return i32(bits - 0x4B400000)
+    return steps(f32(value + 12582912.0))
 
 
 class Plane:
     def __init__(self):
-        self.keep(0, 0, [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], 0.0, 0.0)
+        self.keep(0, 0, [0, 0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], 0.0, 0.0)
 
-    def keep(self, ox, oy, start, right, down, p, q):
-        self.ox, self.oy = ox, oy
-        self.base = [wide(each) for each in start]
-        self.rest = [f32(each - base) for each, base in zip(start, self.base)]
-        self.right, self.down = [f32(each) for each in right], [f32(each) for each in down]
-        self.p, self.q = f32(p), f32(q)
+    def keep(self, ox, oy, base, rest, right, down, p, q):
+        self.ox, self.oy, self.base, self.rest = ox, oy, base, rest
+        self.right, self.down, self.p, self.q = right, down, p, q
 
     def w(self, right, down):
         return f32(f32(1.0 + f32(self.p * right)) + f32(self.q * down))
@@ -141,16 +144,32 @@ class Plane:
         return says
 
 
+def quotient(a, b):
+    """Never of zeros: the divisor is at least 2^32."""
+    return f32(a / b) if math.isfinite(a) or math.isfinite(b) else math.nan
+
+
 def least_squares(dx, dy, cross, p, q):
-    au, av = (float(cross[i] + dy[i]) for i in range(2))
-    bu, bv = (float(cross[i] + dx[i]) for i in range(2))
-    eu = -((cross[0] + p * au) + q * bu)
-    ev = -((cross[1] + p * av) + q * bv)
-    A, B, C = au * au + av * av, bu * bu + bv * bv, au * bu + av * bv
-    E, F, G = au * eu + av * ev, bu * eu + bv * ev, au * bv - av * bu
+    times = lambda a, b: f32(a * b)
+    plus = lambda a, b: f32(a + b)
+    au, av = (plus(f32(cross[i]), f32(dy[i])) for i in range(2))
+    bu, bv = (plus(f32(cross[i]), f32(dx[i])) for i in range(2))
+    eu = -plus(plus(f32(cross[0]), times(p, au)), times(q, bu))
+    ev = -plus(plus(f32(cross[1]), times(p, av)), times(q, bv))
+    dot = lambda a, b, c, d: plus(times(a, b), times(c, d))
+    A, B, C = dot(au, au, av, av), dot(bu, bu, bv, bv), dot(au, bu, av, bv)
+    E, F, G = dot(au, eu, av, ev), dot(bu, eu, bv, ev), plus(times(au, bv), -times(av, bu))
     L = 65536.0
-    D = L * ((L + A) + B) + G * G
-    return one(p + ((B + L) * E - C * F) / D), one(q + ((A + L) * F - C * E) / D)
+    D = plus(times(L, plus(plus(L, A), B)), times(G, G))
+    to_p = quotient(plus(times(plus(B, L), E), -times(C, F)), D)
+    to_q = quotient(plus(times(plus(A, L), F), -times(C, E)), D)
+    return one(plus(p, to_p)), one(plus(q, to_q))
+
+
+# Widths of a first quad's pairs and of corrections, by level.
+EACH = [*range(29), 32, 32, 32]
+CROSS = [*range(12), 13, 16, 20, 32]
+START, SLOPE, TILT = [1, 2, 3, 5], [1, 2, 3, 4, 5, 6, 7, 9], [4, 5, 6, 7, 8, 9, 11, 16]
 
 
 def pairs_of(holds):
@@ -290,41 +309,43 @@ class Tile:
         bits, codes, x, y = self.back, self.codes, told.x, told.y
         power = bits.symbol(codes["parent"][0])
         require(power <= 6, "a plane that is not there")
-        width, widths = 0, []
-        for i in range(4):
-            width += unzigzag(bits.symbol(codes["first"][i]))
-            widths.append(width)
-        back = (1 << power) + bits.take(power) - 1
-        counted = min(len(earlier), 64)
-        require(back <= counted, "a plane that is not there")
-        parent = Plane() if back == counted else earlier[-1 - back]
+        first = bits.symbol(codes["first"][0])
+        rest = bits.symbol(codes["rest"][min(first >> 2 & 7, 5)])
+        widths = [EACH[first & 31], EACH[rest & 31], CROSS[rest >> 5], EACH[first >> 5]]
         mode = level = 0
         if likely_others:
             context = min((likely_others + 1).bit_length() - 2, 3)
             mode, level = divmod(bits.symbol(codes["level"][context]), 8)
+            require(mode <= 3, "a mode")
         if level:
-            widths += [bits.symbol(codes["correction"][i]) for i in range(4)]
+            z = bits.symbol(codes["correction"][0])
+            widths += [START[z & 3], SLOPE[z >> 2 & 7], SLOPE[z >> 5 & 7], TILT[z >> 8]]
+        back = (1 << power) + bits.take(power) - 1
+        counted = min(len(earlier), 64)
+        require(back <= counted, "a plane that is not there")
+        parent = Plane() if back == counted else earlier[-1 - back]
         left = [bits.pair(width) for width in widths]
-        by = left[4:] or [[0, 0]] * 4
         p, q = (of_run or parent).tilt(x, y)
         uv, dx, dy, _ = parent.says(x, y)
         add = lambda a, b: wrapped(a[0] + b[0], a[1] + b[1])
         dx, dy = add(dx, left[0]), add(dy, left[1])
-        below = -least((1.0 + p) + q)
-        cross = add([wide((dx[k] * q + dy[k] * p) / below) for k in range(2)], left[2])
+        turns = [f32(f32(f32(dx[k]) * q) + f32(f32(dy[k]) * p)) for k in range(2)]
+        cross = add([steps(f32(12582912.0 - turn)) for turn in turns], left[2])
         uv = add(uv, left[3])
         if not of_run:
             p, q = least_squares(dx, dy, cross, p, q)
+        by = left[4:] or [[0, 0]] * 4
         if level:
-            size = max(abs(d) for d in dx + dy).bit_length()
-            p = one(p + by[3][0] * 2.0 ** -(2 * level + size))
-            q = one(q + by[3][1] * 2.0 ** -(2 * level + size))
+            size = max(d ^ d >> 31 for d in dx + dy).bit_length()
+            unit = 2.0 ** -(2 * level + size)
+            p, q = (one(f32(a + f32(f32(change) * unit))) for a, change in zip((p, q), by[3]))
         plane = Plane()
         unit = 2.0**-level
-        start = [uv[k] + by[0][k] * 0.25 for k in range(2)]
-        right = [dx[k] * (1.0 + p) + by[1][k] * unit for k in range(2)]
-        down = [dy[k] * (1.0 + q) + by[2][k] * unit for k in range(2)]
-        plane.keep(2 * x, 2 * y, start, right, down, p, q)
+        right, down = (
+            [f32(f32(f32(d) * f32(1.0 + bend)) + change * unit) for d, change in zip(slope, changes)]
+            for slope, bend, changes in ((dx, p, by[1]), (dy, q, by[2]))
+        )
+        plane.keep(2 * x, 2 * y, uv, [change * 0.25 for change in by[0]], right, down, p, q)
         told.plane, told.quad = plane, (uv, dx, dy, cross)
         told.mode, told.noise, told.context = mode, 2 if level else 3, Context(x, y)
 

@@ -8,7 +8,7 @@
 //! Layout: the runs as bytes, then the records as bits, then [`PADDING_BYTES`] zero bytes.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-pub(super) mod predict;
+mod predict;
 mod records;
 mod runs;
 

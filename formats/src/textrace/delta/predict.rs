@@ -4,11 +4,11 @@ use crate::textrace::QuadRecord;
 use std::num::Wrapping;
 
 /// u and v; all arithmetic wraps, so that prediction is total and lossless.
-pub(in crate::textrace) type Pair = [Wrapping<i32>; 2];
+pub(super) type Pair = [Wrapping<i32>; 2];
 
 /// dx, dy and cross of a quad.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::textrace) struct Derivatives {
+pub(super) struct Derivatives {
     pub dx: Pair,
     pub dy: Pair,
     pub cross: Pair,
@@ -16,7 +16,7 @@ pub(in crate::textrace) struct Derivatives {
 
 /// What is known of a uv group: its last record and how its derivatives change.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::textrace) struct Context {
+pub(super) struct Context {
     x: i32,
     y: i32,
     uv: Pair,
@@ -37,15 +37,9 @@ macro_rules! zip {
 }
 
 impl Context {
-    /// The last record's derivatives.
-    #[inline(always)]
-    pub(in crate::textrace) fn last(&self) -> Derivatives {
-        self.last
-    }
-
     /// Predicts the derivatives of the quad at column `x` and row `y`.
     #[inline(always)]
-    pub(in crate::textrace) fn derivatives(&self, x: i32, y: i32) -> Derivatives {
+    pub(super) fn derivatives(&self, x: i32, y: i32) -> Derivatives {
         let (right, down) = (Wrapping(x - self.x), Wrapping(y - self.y));
         let two = Wrapping(2);
         let Derivatives { dx, dy, cross } = self.last;
@@ -63,7 +57,7 @@ impl Context {
     /// Predicts the coordinates of the quad whose derivatives are known: first along the row,
     /// then down the column, each by the trapezoid rule over one-pixel differences.
     #[inline(always)]
-    pub(in crate::textrace) fn uv(&self, x: i32, y: i32, now: &Derivatives) -> Pair {
+    pub(super) fn uv(&self, x: i32, y: i32, now: &Derivatives) -> Pair {
         let (right, down) = (Wrapping(x - self.x), Wrapping(y - self.y));
         let two = Wrapping(2);
         let last = &self.last;
@@ -81,14 +75,7 @@ impl Context {
 
     /// Takes in a record of the same primitive as the last one (`same_run`) or of another.
     #[inline(always)]
-    pub(in crate::textrace) fn learn(
-        &mut self,
-        x: i32,
-        y: i32,
-        uv: Pair,
-        now: Derivatives,
-        same_run: bool,
-    ) {
+    pub(super) fn learn(&mut self, x: i32, y: i32, uv: Pair, now: Derivatives, same_run: bool) {
         if same_run {
             let (right, down) = (Wrapping(x - self.x), Wrapping(y - self.y));
             let two = Wrapping(2);
@@ -118,7 +105,7 @@ fn along(quads: Wrapping<i32>, from: Wrapping<i32>, to: Wrapping<i32>) -> Wrappi
 }
 
 /// Numbers of a record as the predictor sees them.
-pub(in crate::textrace) fn split(record: &QuadRecord) -> (Pair, Derivatives) {
+pub(super) fn split(record: &QuadRecord) -> (Pair, Derivatives) {
     let wrapping = |pair: [i32; 2]| pair.map(Wrapping);
     let derivatives = Derivatives {
         dx: wrapping(record.dx),

@@ -4,8 +4,9 @@
 use super::lengths::LENGTHS;
 use super::mode::Mode;
 use super::residual::NOISES;
-use std::array::from_fn;
-use std::sync::LazyLock;
+use super::widths::{CORRECTION, Choices, DX_AND_UV, DY_AND_CROSS};
+use crate::varint::low_u32;
+use std::sync::{LazyLock, OnceLock};
 
 /// Longest code.
 pub(super) const MOST_BITS: u32 = 10;
@@ -75,26 +76,34 @@ impl Code {
     }
 }
 
+/// Most codes of a family.
+const MOST_CONTEXTS: usize = 32;
+
 /// Codes of which a context chooses one.
 pub(super) struct Family {
     pub codes: Vec<Code>,
     /// [`Code::by_bits`] of each, one after the other.
-    by_bits: Vec<u16>,
+    by_bits: Box<[u16; MOST_CONTEXTS << MOST_BITS]>,
 }
 
 impl Family {
     fn new(codes: Vec<Code>) -> Self {
-        let by_bits = codes.iter().flat_map(|code| code.by_bits).collect();
-        Self { codes, by_bits }
+        let mut by_bits: Vec<u16> = codes.iter().flat_map(|code| code.by_bits).collect();
+        by_bits.resize(MOST_CONTEXTS << MOST_BITS, 0);
+        let by_bits = by_bits.try_into();
+        Self {
+            codes,
+            by_bits: by_bits.expect("it has this size now"),
+        }
     }
 
     /// Symbol and length of the code that the bits start with; (0, 0) where the context has no code.
     #[inline(always)]
     pub fn decode(&self, context: usize, bits: u64) -> (u32, u32) {
-        #[allow(clippy::cast_possible_truncation, reason = "less than ENTRIES")]
-        let low = (bits & (ENTRIES as u64 - 1)) as usize;
-        let entry = self.by_bits.get(context << MOST_BITS | low);
-        let entry = entry.copied().unwrap_or_default();
+        let low = low_u32(bits) as usize & (ENTRIES - 1);
+        let at = (context % MOST_CONTEXTS) << MOST_BITS | low;
+        // Never beyond the end, which the compiler sees.
+        let entry = self.by_bits.get(at).copied().unwrap_or_default();
         (u32::from(entry >> 4), u32::from(entry & 15))
     }
 }
@@ -105,14 +114,16 @@ pub(super) struct Codes {
     pub place: Family,
     /// Classes of a quad's residuals, by [`sizes_context`].
     pub sizes: Family,
-    /// Widths of a first quad's dx, dy, cross and uv.
-    pub first: [Code; 4],
+    /// Widths of a first quad's dx and uv.
+    pub first: Code,
+    /// Widths of its dy and cross, by [`rest_context`].
+    pub rest: Family,
     /// Widths of what no class holds.
     pub later: Code,
     /// Widths of a correction's start, slopes to the right, slopes down, and tilt.
-    pub correction: [Code; 4],
-    /// Level of the correction, by the records of the run.
-    pub level: [Code; 4],
+    pub correction: Code,
+    /// Mode and level, by [`super::parents::level_context`]; nothing tells them in its first one.
+    pub level: Family,
     /// Highest bit of the step to a run's primitive; and whether the draw is another.
     pub header: Code,
     /// Highest bit of a run's records.
@@ -121,19 +132,41 @@ pub(super) struct Codes {
     pub parent: Code,
     /// Where a run starts, against where the last one did.
     pub start: Code,
+    choices: OnceLock<WidthChoices>,
+}
+
+/// Which symbols the encoder chooses to tell widths.
+pub(super) struct WidthChoices {
+    pub first: Choices<2>,
+    /// By [`rest_context`].
+    pub rest: Vec<Choices<2>>,
+    pub correction: Choices<4>,
 }
 
 /// Codes of step and mask.
 const PLACES: usize = 17;
 /// Codes of classes.
 const SIZES: usize = NOISES * Mode::ALL.len();
+/// Codes of a first quad's dy and cross; wider dx than the last one's are few, and have that one.
+const RESTS: usize = 6;
+/// Codes of mode and level.
+const LEVELS: usize = 4;
 /// Number of codes.
-pub(super) const CODES: usize = PLACES + SIZES + 4 + 1 + 4 + 4 + 4;
+pub(super) const CODES: usize = PLACES + SIZES + 1 + RESTS + 1 + 1 + LEVELS + 4;
 
 /// Which code tells the classes of a quad's residuals.
 #[inline(always)]
 pub(super) fn sizes_context(mode: Mode, noise: usize) -> usize {
     mode as usize * NOISES + noise
+}
+
+/// Contexts that [`rest_context`] gives.
+const REST_CONTEXTS: usize = 8;
+
+/// Which code tells the widths of a first quad's dy and cross, by the symbol of the other two.
+#[inline(always)]
+pub(super) fn rest_context(first: u32) -> usize {
+    (first >> 2 & 7) as usize
 }
 
 static ALL: LazyLock<Codes> = LazyLock::new(|| Codes::new(&LENGTHS));
@@ -152,14 +185,37 @@ impl Codes {
         Self {
             place: Family::new((0..PLACES).map(|_| next()).collect()),
             sizes: Family::new((0..SIZES).map(|_| next()).collect()),
-            first: from_fn(|_| next()),
+            first: next(),
+            rest: Family::new({
+                let mut codes: Vec<Code> = (0..RESTS).map(|_| next()).collect();
+                let last = &lengths[PLACES + SIZES + RESTS];
+                codes.resize_with(REST_CONTEXTS, || {
+                    Code::new(PLACES + SIZES + RESTS, last.as_ref())
+                });
+                codes
+            }),
             later: next(),
-            correction: from_fn(|_| next()),
-            level: from_fn(|_| next()),
+            correction: next(),
+            level: Family::new((0..LEVELS).map(|_| next()).collect()),
             header: next(),
             count: next(),
             parent: next(),
             start: next(),
+            choices: OnceLock::new(),
         }
+    }
+
+    /// For the encoder alone.
+    pub fn choices(&self) -> &WidthChoices {
+        self.choices.get_or_init(|| WidthChoices {
+            first: Choices::new(&self.first, DX_AND_UV),
+            rest: self
+                .rest
+                .codes
+                .iter()
+                .map(|code| Choices::new(code, DY_AND_CROSS))
+                .collect(),
+            correction: Choices::new(&self.correction, CORRECTION),
+        })
     }
 }

@@ -2,18 +2,19 @@
 //! The two readers do not wait for each other, nor does either wait for what the planes say.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::codes::{Codes, sizes_context};
+use super::codes::{Codes, rest_context, sizes_context};
 use super::mode::{Departure, Mode};
 use super::parents::{
     Expected, Lineage, MOST_PARENT_BITS, first_noise, level_context, tilt_of_run,
 };
 use super::places::{Last, Place, Places};
-use super::plane::{Plane, Quad, Surface};
+use super::plane::{Plane, Quad};
 use super::residual::{CLASS_NUMBER_BITS, Classes, Pair, WIDE, sum, symbol, unfold};
+use super::widths::{CROSS, EACH, MOST_WIDTH, SLOPE, START, TILT, of_level};
 use super::{GROUPS, SHORT};
-use crate::textrace::bits::{BitReader, PEEK_BITS};
+use crate::textrace::bits::BitReader;
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile};
-use crate::varint::{low_u32, unzigzag};
+use crate::varint::low_u32;
 
 /// What was expected where the bits went wrong.
 pub(super) type Outcome<T> = Result<T, &'static str>;
@@ -21,7 +22,7 @@ pub(super) type Outcome<T> = Result<T, &'static str>;
 /// A group of a run.
 #[derive(Clone, Copy, Default)]
 struct Told {
-    plane: Surface,
+    plane: Plane,
     departure: Departure,
     noise: usize,
 }
@@ -36,13 +37,13 @@ pub(super) struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// Bytes from the front and bytes from the back, both with padding.
-    pub fn new(front: &'a [u8], back: &'a [u8]) -> Self {
+    /// Bytes from the front and bytes from the back, both with padding, and how many runs they tell.
+    pub fn new(front: &'a [u8], back: &'a [u8], runs: u32) -> Self {
         Self {
             front: BitReader::new(front),
             back: BitReader::new(back),
             codes: Codes::get(),
-            lineage: Lineage::new(),
+            lineage: Lineage::new(runs),
             told: [Told::default(); GROUPS],
         }
     }
@@ -129,7 +130,11 @@ impl<'a> Decoder<'a> {
                 tilt_from = Some(group);
             } else {
                 let told = self.told.get_mut(group).ok_or(SHORT)?;
-                records.push(later::<false>(&mut self.back, self.codes, place, told)?);
+                if told.departure.mode == Mode::Plain {
+                    later::<true>(&mut self.back, self.codes, place, told, records)?;
+                } else {
+                    later::<false>(&mut self.back, self.codes, place, told, records)?;
+                }
             }
             if let Some(starts) = places.starts_next_quad(&last) {
                 let starts = usize::from(starts);
@@ -157,12 +162,11 @@ impl<'a> Decoder<'a> {
         let told = self.told.get_mut(usize::from(last.place.group));
         let told = told.ok_or(SHORT)?;
         let readers = (&mut self.front, &mut self.back);
-        let all = if told.departure.mode == Mode::Plain {
-            one::<true>
+        if told.departure.mode == Mode::Plain {
+            one::<true>(readers, self.codes, places, last, told, left, records)
         } else {
-            one::<false>
-        };
-        all(readers, self.codes, places, last, told, left, records)
+            one::<false>(readers, self.codes, places, last, told, left, records)
+        }
     }
 
     /// The same of two groups in the same quads, in their order.
@@ -177,12 +181,18 @@ impl<'a> Decoder<'a> {
     ) -> Outcome<(u32, Last)> {
         let told = self.told.get_disjoint_mut(groups).map_err(|_| SHORT)?;
         let readers = (&mut self.front, &mut self.back);
-        let all = if told.iter().all(|told| told.departure.mode == Mode::Plain) {
-            two::<true>
-        } else {
-            two::<false>
-        };
-        all(readers, self.codes, places, last, told, left, records)
+        let codes = self.codes;
+        match told
+            .each_ref()
+            .map(|told| told.departure.mode == Mode::Plain)
+        {
+            [true, true] => two::<true, true>(readers, codes, places, last, told, left, records),
+            [true, false] => two::<true, false>(readers, codes, places, last, told, left, records),
+            [false, true] => two::<false, true>(readers, codes, places, last, told, left, records),
+            [false, false] => {
+                two::<false, false>(readers, codes, places, last, told, left, records)
+            }
+        }
     }
 
     /// The first quad of a group in a run, and its plane; `tilt_from` is the group of the run's plane before.
@@ -197,58 +207,63 @@ impl<'a> Decoder<'a> {
         let QuadRecord { x, y, group, .. } = record;
         let codes = self.codes;
         let mut back = self.back;
-        // Five codes of 10 bits at most.
+        // Five codes of 10 bits at most, and the 6 bits of the parent's number.
         let bits = back.peek().ok_or(SHORT)?;
         let (power, mut used) = codes.parent.decode(bits);
-        let mut widths = [0; 4];
-        let mut width = 0;
-        for (to, code) in widths.iter_mut().zip(&codes.first) {
-            let (symbol, length) = code.decode(bits >> used);
-            width += unzigzag(symbol.into());
-            *to = u32::try_from(width).unwrap_or(u32::MAX);
+        let (first, length) = codes.first.decode(bits >> used);
+        used += length;
+        let (rest, length) = codes.rest.decode(rest_context(first), bits >> used);
+        used += length;
+        let context = level_context(likely_others).wrapping_sub(1);
+        let (mode_and_level, length) = codes.level.decode(context, bits >> used);
+        used += length;
+        let level = mode_and_level & 7;
+        let mut correction = 0;
+        if level > 0 {
+            let length;
+            (correction, length) = codes.correction.decode(bits >> used);
             used += length;
         }
-        if widths.iter().any(|width| *width > 32) {
-            return Err("widths of at most 32 bits");
-        }
-        back.skip(used);
+        let parent = from_one(power, bits >> used) - 1;
         if power > MOST_PARENT_BITS {
             return Err("an earlier run of the group");
         }
-        // The bits of the parent's number and five codes.
-        let bits = back.peek().ok_or(SHORT)?;
-        let parent = usize::try_from(from_one(power, bits) - 1).unwrap_or(usize::MAX);
-        let mut used = power;
-        let (mut mode, mut level) = (Mode::Plain, 0);
-        let mut correction_widths = [0; 4];
-        if let Some(context) = level_context(likely_others) {
-            let code = codes.level.get(context).ok_or(SHORT)?;
-            let (symbol, length) = code.decode(bits >> used);
-            used += length;
-            mode = Mode::of(symbol >> 3).ok_or("one of the modes")?;
-            level = symbol & 7;
-            if level > 0 {
-                for (to, code) in correction_widths.iter_mut().zip(&codes.correction) {
-                    let (width, length) = code.decode(bits >> used);
-                    *to = width;
-                    used += length;
-                }
-            }
-        }
-        back.skip(used);
-        let [dx_bits, dy_bits, cross_bits, uv_bits] = widths;
-        let [dx, dy] = pairs(&mut back, [dx_bits, dy_bits])?;
-        let [cross, uv] = pairs(&mut back, [cross_bits, uv_bits])?;
+        back.skip(used + power);
+        // Widths and levels are the same but for the widest.
+        let [dx, uv, dy] = [first & 31, first >> 5 & 31, rest & 31];
+        let cross = of_level(&CROSS, rest >> 5);
+        let told;
+        (told, back) = if [dx, uv, dy, cross].iter().all(|width| *width <= MOST_WIDTH) {
+            let dx = pair(&mut back, dx)?;
+            let dy = pair(&mut back, dy)?;
+            let cross = pair(&mut back, cross)?;
+            ([dx, dy, cross, pair(&mut back, uv)?], back)
+        } else {
+            let [dx, uv, dy] = [dx, uv, dy].map(|level| of_level(&EACH, level));
+            long_pairs(back, [dx, dy, cross, uv])?
+        };
+        let [dx, dy, cross, uv] = told;
         let mut by = Quad::default();
         if level > 0 {
-            by = pairs(&mut back, correction_widths)?;
+            // At most 46 bits, then 32.
+            let start = of_level(&START, correction);
+            let [right, down] =
+                [correction >> 2, correction >> 5].map(|level| of_level(&SLOPE, level));
+            let bits = back.peek().ok_or(SHORT)?;
+            back.skip(2 * (start + right + down));
+            by = [
+                numbers(bits, start),
+                numbers(bits >> (2 * start), right),
+                numbers(bits >> (2 * (start + right)), down),
+                pair(&mut back, of_level(&TILT, correction >> 8))?,
+            ];
         }
         self.back = back;
 
-        let parent = self.lineage.parent(group, parent);
+        let parent = self.lineage.parent(group, low_u32(parent));
         let parent = parent.ok_or("an earlier run of the group")?;
-        let of_run = tilt_from.and_then(|group| self.told.get(group));
-        let expected = Expected::new(&parent, of_run.map(|told| &told.plane), x, y);
+        let of_run = tilt_from.and_then(|group| self.lineage.last(group));
+        let expected = Expected::new(&parent, of_run, place.morton);
         let [of_dx, of_dy] = expected.slopes();
         let (dx, dy) = (sum(of_dx, dx), sum(of_dy, dy));
         let cross = sum(expected.cross(dx, dy), cross);
@@ -256,14 +271,14 @@ impl<'a> Decoder<'a> {
         (record.uv, record.dx, record.dy, record.cross) = (uv, dx, dy, cross);
         let quad = [uv, dx, dy, cross];
         let tilt = tilt_of_run(of_run.is_some(), &quad, &expected);
-        let plane = if level == 0 {
-            Plane::through(x, y, &quad, tilt)
+        let plane = if level > 0 {
+            Plane::corrected(place.morton, &quad, tilt, level, &by)
         } else {
-            Plane::corrected(x, y, &quad, tilt, level, &by)
+            Plane::through(place.morton, &quad, tilt)
         };
-        let plane = Surface::from(&plane);
         self.lineage.note(group, plane);
-        let told = self.told.get_mut(usize::from(group));
+        let mode = Mode::of(mode_and_level >> 3).ok_or("one of the modes")?;
+        let told = self.told.get_mut(usize::from(group) % GROUPS);
         *told.ok_or(SHORT)? = Told {
             plane,
             departure: Departure::start(mode, x, y),
@@ -293,15 +308,15 @@ fn one<const PLAIN: bool>(
             break;
         };
         front.skip(used);
-        records.push(later::<PLAIN>(&mut back, codes, place, told)?);
+        later::<PLAIN>(&mut back, codes, place, told, records)?;
         left -= 1;
     }
     (*readers.0, *readers.1) = (front, back);
     Ok((left, last))
 }
 
-/// See [`Decoder::quads_of_two`]; `PLAIN`: both modes are the plain one.
-fn two<const PLAIN: bool>(
+/// See [`Decoder::quads_of_two`]; `FIRST`, `SECOND`: their mode is the plain one.
+fn two<const FIRST: bool, const SECOND: bool>(
     readers: Readers<'_, '_>,
     codes: &Codes,
     places: &mut Places,
@@ -319,8 +334,8 @@ fn two<const PLAIN: bool>(
         };
         front.skip(used);
         let place_of_first = Place { group, ..place };
-        records.push(later::<PLAIN>(&mut back, codes, place_of_first, first)?);
-        records.push(later::<PLAIN>(&mut back, codes, place, second)?);
+        later::<FIRST>(&mut back, codes, place_of_first, first, records)?;
+        later::<SECOND>(&mut back, codes, place, second, records)?;
         left -= 2;
     }
     (*readers.0, *readers.1) = (front, back);
@@ -334,7 +349,8 @@ fn later<const PLAIN: bool>(
     codes: &Codes,
     place: Place,
     told: &mut Told,
-) -> Outcome<QuadRecord> {
+    records: &mut Vec<QuadRecord>,
+) -> Outcome<()> {
     let mode = if PLAIN {
         Mode::Plain
     } else {
@@ -348,34 +364,35 @@ fn later<const PLAIN: bool>(
     back.skip(code_bits + classes.bits());
     let mut record = place.record();
     let QuadRecord { x, y, .. } = record;
-    let expected = told.plane.predict(x, y);
+    let expected = told.plane.predict(place.morton);
     if PLAIN {
         add(&mut record, &expected, &residual);
+        records.push(record);
         if classes.is_special() {
-            let rest;
-            (classes, rest) = special(back, codes, classes)?;
-            let [uv, dx, dy, cross] = rest;
-            record.uv = sum(record.uv, uv);
-            record.dx = sum(record.dx, dx);
-            record.dy = sum(record.dy, dy);
-            record.cross = sum(record.cross, cross);
+            let (after, instead, [uv, dx, dy, cross]) = special(*back, codes, classes)?;
+            (*back, classes) = (after, instead);
+            // What was pushed, as what is common does not wait for this.
+            if let Some(record) = records.last_mut() {
+                record.uv = sum(record.uv, uv);
+                record.dx = sum(record.dx, dx);
+                record.dy = sum(record.dy, dy);
+                record.cross = sum(record.cross, cross);
+            }
         }
     } else {
         if classes.is_special() {
             let rest;
-            (classes, rest) = special(back, codes, classes)?;
+            (*back, classes, rest) = special(*back, codes, classes)?;
             for (to, rest) in residual.iter_mut().zip(rest) {
                 *to = sum(*to, rest);
             }
         }
-        add(
-            &mut record,
-            &expected,
-            &told.departure.read(x, y, &residual),
-        );
+        let departure = told.departure.read(x, y, &residual);
+        add(&mut record, &expected, &departure);
+        records.push(record);
     }
     told.noise = classes.noise();
-    Ok(record)
+    Ok(())
 }
 
 #[inline(always)]
@@ -388,13 +405,14 @@ fn add(record: &mut QuadRecord, expected: &Quad, departure: &Quad) {
     record.cross = sum(cross, by_cross);
 }
 
-/// What is to be added where residuals are wide, or where their classes are told as numbers; and the classes.
+/// What is to be added where residuals are wide, or where their classes are told as numbers; the classes; and
+/// the reader after it.
 #[inline(never)]
-fn special(
-    back: &mut BitReader<'_>,
+fn special<'a>(
+    mut back: BitReader<'a>,
     codes: &Codes,
     mut classes: Classes,
-) -> Outcome<(Classes, Quad)> {
+) -> Outcome<(BitReader<'a>, Classes, Quad)> {
     let mut residual = Quad::default();
     if classes.is_escape() {
         let bits = back.peek().ok_or(SHORT)?;
@@ -410,43 +428,50 @@ fn special(
     if wide != [0; 4] {
         let (width, used) = codes.later.decode(back.peek().ok_or(SHORT)?);
         back.skip(used);
-        let numbers = pairs(back, wide.map(|wide| wide * width))?;
+        let widths = wide.map(|wide| wide * width);
+        let numbers;
+        (numbers, back) = if width > MOST_WIDTH {
+            long_pairs(back, widths)?
+        } else {
+            let [uv, dx, dy, cross] = widths;
+            let uv = pair(&mut back, uv)?;
+            let dx = pair(&mut back, dx)?;
+            let dy = pair(&mut back, dy)?;
+            ([uv, dx, dy, pair(&mut back, cross)?], back)
+        };
         for (to, wide) in residual.iter_mut().zip(numbers) {
             *to = sum(*to, wide);
         }
     }
-    Ok((classes, residual))
+    Ok((back, classes, residual))
 }
 
-/// Pairs of numbers, each of a width of at most 32 bits.
+/// A pair of numbers of at most 28 bits.
 #[inline(always)]
-fn pairs<const N: usize>(bits: &mut BitReader<'_>, widths: [u32; N]) -> Outcome<[Pair; N]> {
-    let mut pairs = [[0; 2]; N];
-    let all = 2 * widths.iter().sum::<u32>();
-    if all > PEEK_BITS {
-        for (pair, width) in pairs.iter_mut().zip(widths) {
-            *pair = long_pair(bits, width)?;
-        }
-        return Ok(pairs);
-    }
-    let mut word = bits.peek().ok_or(SHORT)?;
-    bits.skip(all);
-    for (pair, width) in pairs.iter_mut().zip(widths) {
-        let low = (1 << width) - 1;
-        *pair = [unfold(word & low), unfold(word >> width & low)];
-        word >>= 2 * width;
-    }
-    Ok(pairs)
+fn pair(bits: &mut BitReader<'_>, width: u32) -> Outcome<Pair> {
+    let word = bits.peek().ok_or(SHORT)?;
+    bits.skip(2 * width);
+    Ok(numbers(word, width))
 }
 
+/// The pair at the start of some bits.
+#[inline(always)]
+fn numbers(bits: u64, width: u32) -> Pair {
+    let low = (1 << width) - 1;
+    [unfold(bits & low), unfold(bits >> width & low)]
+}
+
+/// Pairs of numbers of at most 32 bits.
 #[cold]
-fn long_pair(bits: &mut BitReader<'_>, width: u32) -> Outcome<Pair> {
-    let mut pair = [0; 2];
-    for number in &mut pair {
-        *number = unfold(bits.peek().ok_or(SHORT)? & ((1 << width) - 1));
-        bits.skip(width);
+fn long_pairs(mut bits: BitReader<'_>, widths: [u32; 4]) -> Outcome<([Pair; 4], BitReader<'_>)> {
+    let mut pairs = [[0; 2]; 4];
+    for (pair, width) in pairs.iter_mut().zip(widths) {
+        for number in pair {
+            *number = unfold(bits.peek().ok_or(SHORT)? & ((1 << width) - 1));
+            bits.skip(width);
+        }
     }
-    Ok(pair)
+    Ok((pairs, bits))
 }
 
 /// A number from 1 on of which the highest bit is known, and `bits` hold the ones below.

@@ -1,19 +1,19 @@
 //! From records to bits, pass by pass as they are read.
 
 use super::GROUPS;
-use super::codes::{Code, Codes, sizes_context};
-use super::fit::fit;
+use super::codes::{Code, Codes, rest_context, sizes_context};
+use super::fit::{Fitted, fit};
 use super::mode::{Departure, Mode};
 use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
 use super::places::{Last, Place, Places};
-use super::plane::{Plane, Quad, Surface, Units, quad_of};
+use super::plane::{Plane, Quad, Units, quad_of};
 use super::residual::{
-    CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, WIDE, class_bits, classify, difference, fold, symbol,
-    width,
+    CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, Pair, WIDE, class_bits, classify, difference, fold,
+    symbol, width,
 };
+use super::widths::{Chosen, SLOPE, START, TILT};
 use crate::textrace::bits::BitWriter;
 use crate::textrace::{QuadRecord, Tile, quad_morton};
-use crate::varint::{low_u32, zigzag};
 
 /// What takes the encoder's output: bits, or counts of symbols.
 pub(super) trait Sink {
@@ -50,7 +50,7 @@ struct Choice {
 /// A group of a run.
 struct Group {
     departure: Departure,
-    plane: Surface,
+    plane: Plane,
     /// Which code tells the classes of its next record.
     noise: usize,
 }
@@ -78,7 +78,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
     fn tile(&mut self, tile: &Tile) {
         let mut places = Places::new();
         let mut last = Last::new();
-        let mut lineage = Lineage::new();
+        let mut lineage = Lineage::new(tile.runs.len() as u32);
         let mut next_primitive = 0;
         let mut draw = 0;
         for run in &tile.runs {
@@ -126,7 +126,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
             let after = &records[at + 1..];
             let likely_others = last.share(after.len() as u32);
             let choice = self.first(record, lineage, of_run, likely_others, after);
-            let plane = Surface::from(&choice.plane);
+            let plane = choice.plane;
             lineage.note(record.group, plane);
             of_run = Some(plane);
             *group = Some(Group {
@@ -141,7 +141,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
     /// A departure.
     fn later(&mut self, record: &QuadRecord, group: &mut Group) {
         let QuadRecord { x, y, .. } = *record;
-        let left = difference(&quad_of(record), &group.plane.predict(x, y));
+        let left = difference(&quad_of(record), &group.plane.predict(quad_morton(x, y)));
         let residual = group.departure.write(x, y, &left);
         let (classes, pairs) = classes(&residual);
         let code = self.sizes(group.departure.mode, group.noise);
@@ -167,52 +167,57 @@ impl<'a, S: Sink> Encoder<'a, S> {
         &mut self,
         record: &QuadRecord,
         lineage: &Lineage,
-        of_run: Option<Surface>,
+        of_run: Option<Plane>,
         likely_others: u32,
         after: &[QuadRecord],
     ) -> Choice {
-        let QuadRecord { x, y, group, .. } = *record;
+        let group = record.group;
+        let morton = quad_morton(record.x, record.y);
         let quad = quad_of(record);
         let known = lineage.count(group);
-        let parents = (0..=known).filter_map(|back| {
+        let parents = (0..=known as u32).filter_map(|back| {
             let parent = lineage.parent(group, back)?;
-            let expected = Expected::new(&parent, of_run.as_ref(), x, y);
+            let expected = Expected::new(&parent, of_run.as_ref(), morton);
             let pairs = first_pairs(&quad, &expected);
-            let power = (back as u64 + 1).ilog2();
-            let bits = self.codes.parent.length(power, 0) + power + self.first_bits(&pairs);
+            let power = (back + 1).ilog2();
+            let (first, rest) = self.first_widths(&pairs);
+            let bits = self.codes.parent.length(power, 0) + power + first.bits + rest.bits;
             Some((bits, back, expected, pairs))
         });
         let best = parents.min_by_key(|(bits, ..)| *bits);
         let (_, back, expected, pairs) = best.expect("there is always the plane of zeros");
-        let parent = back as u64 + 1;
-        self.back.symbol(&self.codes.parent, parent.ilog2(), 0);
-        let mut before = 0;
-        for (code, pair) in self.codes.first.iter().zip(pairs) {
-            let width = width(pair);
-            self.back.symbol(code, width_symbol(before, width), 0);
-            before = width;
-        }
-        below_power(self.back, parent);
+        let parent = u64::from(back) + 1;
         let tilt = tilt_of_run(of_run.is_some(), &quad, &expected);
-        let plain = Plane::through(x, y, &quad, tilt);
+        let plain = Plane::through(morton, &quad, tilt);
         let mut choice = Choice::plain(plain);
-        if let Some(context) = level_context(likely_others) {
+        let context = level_context(likely_others);
+        if context > 0 {
             let of_group = |other: &&QuadRecord| other.group == group;
             let others: Vec<QuadRecord> = after.iter().filter(of_group).copied().collect();
-            choice = self.best_plane(&quad, plain, record, &others, context);
-            let told = (choice.mode as u32) << 3 | choice.level;
-            self.back.symbol(&self.codes.level[context], told, 0);
+            choice = self.best_plane(record, tilt, plain, &others, context);
         }
-        let by = if choice.level > 0 {
-            &choice.correction[..]
-        } else {
-            &[]
-        };
-        for (code, pair) in self.codes.correction.iter().zip(by) {
-            self.back.symbol(code, width(*pair), 0);
+
+        self.back.symbol(&self.codes.parent, parent.ilog2(), 0);
+        let (first, rest) = self.first_widths(&pairs);
+        let ([dx, uv], [dy, cross]) = (first.widths, rest.widths);
+        self.back.symbol(&self.codes.first, first.symbol, 0);
+        self.back.symbol(
+            &self.codes.rest.codes[rest_context(first.symbol)],
+            rest.symbol,
+            0,
+        );
+        if let Some(code) = self.level(context) {
+            self.back.symbol(code, choice.symbol(), 0);
         }
-        for pair in pairs.iter().chain(by) {
-            put_numbers(self.back, *pair, width(*pair));
+        let by = (choice.level > 0).then(|| self.correction_widths(&choice.correction));
+        if let Some(by) = by {
+            self.back.symbol(&self.codes.correction, by.symbol, 0);
+        }
+        below_power(self.back, parent);
+        let widths = [dx, dy, cross, uv];
+        let widths = widths.into_iter().chain(by.iter().flat_map(|by| by.widths));
+        for (pair, width) in pairs.iter().chain(&choice.correction).zip(widths) {
+            put_numbers(self.back, *pair, width);
         }
         choice
     }
@@ -220,36 +225,32 @@ impl<'a, S: Sink> Encoder<'a, S> {
     /// Level, correction, mode and plane with which a group's other records take fewest bits.
     fn best_plane(
         &self,
-        quad: &Quad,
-        plain: Plane,
         first: &QuadRecord,
+        tilt: [f32; 2],
+        plain: Plane,
         others: &[QuadRecord],
         context: usize,
     ) -> Choice {
-        let code = &self.codes.level[context];
         let mut best = Choice::plain(plain);
         let mut least = u32::MAX;
         let mut try_plane = |level: u32, correction: Quad, plane: Plane| {
             for mode in Mode::ALL {
-                let mut bits = code.length((mode as u32) << 3 | level, 0);
+                let choice = Choice {
+                    mode,
+                    level,
+                    correction,
+                    plane,
+                };
+                let code = self.level(context);
+                let mut bits = code.map_or(0, |code| code.length(choice.symbol(), 0));
                 if level > 0 {
-                    bits += self.pairs_bits(&self.codes.correction, &correction);
+                    bits += self.correction_widths(&correction).bits;
                 }
                 let departure = Departure::start(mode, first.x, first.y);
-                bits += self.run_bits(
-                    &Surface::from(&plane),
-                    departure,
-                    others,
-                    first_noise(level),
-                );
+                bits += self.run_bits(&plane, departure, others, first_noise(level));
                 if bits < least {
                     least = bits;
-                    best = Choice {
-                        mode,
-                        level,
-                        correction,
-                        plane,
-                    };
+                    best = choice;
                 }
             }
             least
@@ -258,18 +259,24 @@ impl<'a, S: Sink> Encoder<'a, S> {
         if try_plane(0, Quad::default(), plain) < 24 {
             return best;
         }
-        let Some(fitted) = fit(&plain, quad, others) else {
+        let Some(fitted) = fit(first, tilt, others) else {
             return best;
         };
         let apart = |r: &QuadRecord| r.x.abs_diff(first.x).max(r.y.abs_diff(first.y));
         let extent = others.iter().map(apart).max().unwrap_or(0);
         let likely = u32::from(extent).checked_ilog2().unwrap_or(0) + 2;
         for level in likely.saturating_sub(1).max(1)..=(likely + 2).min(7) {
-            let by = correction(quad, &plain, &fitted, level);
-            let plane = Plane::corrected(first.x, first.y, quad, plain.tilt, level, &by);
+            let by = correction(first, tilt, &fitted, level);
+            let morton = quad_morton(first.x, first.y);
+            let plane = Plane::corrected(morton, &quad_of(first), tilt, level, &by);
             try_plane(level, by, plane);
         }
         best
+    }
+
+    /// The code of mode and level; `None` where nothing tells them.
+    fn level(&self, context: usize) -> Option<&'a Code> {
+        self.codes.level.codes.get(context.checked_sub(1)?)
     }
 
     fn sizes(&self, mode: Mode, noise: usize) -> &'a Code {
@@ -279,14 +286,17 @@ impl<'a, S: Sink> Encoder<'a, S> {
     /// Bits of some records' residuals.
     fn run_bits(
         &self,
-        plane: &Surface,
+        plane: &Plane,
         mut departure: Departure,
         records: &[QuadRecord],
         mut at: usize,
     ) -> u32 {
         let mut bits = 0;
         for record in records {
-            let left = difference(&quad_of(record), &plane.predict(record.x, record.y));
+            let left = difference(
+                &quad_of(record),
+                &plane.predict(quad_morton(record.x, record.y)),
+            );
             let left = departure.write(record.x, record.y, &left);
             let (classes, pairs) = classes(&left);
             let code = self.sizes(departure.mode, at);
@@ -307,23 +317,17 @@ impl<'a, S: Sink> Encoder<'a, S> {
         bits
     }
 
-    fn first_bits(&self, pairs: &[[i32; 2]; 4]) -> u32 {
-        let mut before = 0;
-        let of = |(code, pair): (&Code, &[i32; 2])| {
-            let width = width(*pair);
-            let symbol = width_symbol(before, width);
-            before = width;
-            code.length(symbol, 0) + 2 * width
-        };
-        self.codes.first.iter().zip(pairs).map(of).sum()
+    /// How the widths of a first quad's pairs are told: those of dx and uv, then those of dy and cross.
+    fn first_widths(&self, pairs: &[Pair; 4]) -> (Chosen<2>, Chosen<2>) {
+        let [dx, dy, cross, uv] = *pairs;
+        let first = self.codes.choices().first.choose(&[dx, uv]);
+        let rest = &self.codes.choices().rest[rest_context(first.symbol)];
+        (first, rest.choose(&[dy, cross]))
     }
 
-    fn pairs_bits(&self, codes: &[Code; 4], pairs: &[[i32; 2]; 4]) -> u32 {
-        let of = |(code, pair): (&Code, &[i32; 2])| {
-            let width = width(*pair);
-            code.length(width, 0) + 2 * width
-        };
-        codes.iter().zip(pairs).map(of).sum()
+    /// The same of a correction.
+    fn correction_widths(&self, correction: &Quad) -> Chosen<4> {
+        self.codes.choices().correction.choose(correction)
     }
 }
 
@@ -335,6 +339,11 @@ impl Choice {
             correction: Quad::default(),
             plane,
         }
+    }
+
+    /// Mode and level.
+    fn symbol(&self) -> u32 {
+        (self.mode as u32) << 3 | self.level
     }
 }
 
@@ -358,13 +367,8 @@ fn put_numbers(sink: &mut impl Sink, pair: [i32; 2], width: u32) {
     }
 }
 
-/// The symbol of a width after another.
-fn width_symbol(before: u32, width: u32) -> u32 {
-    low_u32(zigzag(i64::from(width) - i64::from(before)))
-}
-
 /// What is told of a first quad: dx, dy, cross and uv less what is expected.
-fn first_pairs(quad: &Quad, expected: &Expected) -> [[i32; 2]; 4] {
+fn first_pairs(quad: &Quad, expected: &Expected) -> [Pair; 4] {
     let [uv, dx, dy, cross] = *quad;
     let [of_dx, of_dy] = expected.slopes();
     let minus = |[a, b]: [i32; 2], [c, d]: [i32; 2]| [a.wrapping_sub(c), b.wrapping_sub(d)];
@@ -398,19 +402,27 @@ fn classes(left: &Quad) -> ([u32; 4], [Classified; 4]) {
     (pairs.map(|(_, (class, _))| class), pairs)
 }
 
-/// The correction in the units of `level` that leads nearest to a plane.
-fn correction(quad: &Quad, from: &Plane, to: &Plane, level: u32) -> Quad {
-    let units = Units::new(level, quad);
-    let steps = |a: [f64; 2], b: [f64; 2], unit: f64| {
-        [0, 1].map(|axis| ((a[axis] - b[axis]) / unit).round_ties_even() as i32)
+/// The correction in the units of `level` that leads from the plane through a record nearest to another one.
+fn correction(record: &QuadRecord, tilt: [f32; 2], to: &Fitted, level: u32) -> Quad {
+    let quad = quad_of(record);
+    let units = Units::new(level, &quad);
+    let steps = |to: [f64; 2], from: [f64; 2], unit: f32, widest: u8| {
+        let most = f64::from(1 << (widest - 1));
+        [0, 1].map(|axis| {
+            let steps = ((to[axis] - from[axis]) / f64::from(unit)).round_ties_even();
+            steps.clamp(-most, most - 1.0) as i32
+        })
     };
     let mut by = Quad::default();
-    by[3] = steps(to.tilt, from.tilt, units.tilt);
+    let [.., widest] = TILT;
+    by[3] = steps(to.tilt, tilt.map(f64::from), units.tilt, widest);
     // Slopes start from the corrected tilt.
-    let [x, y] = from.origin.map(|at| (at / 2.0) as u8);
-    let tilted = Plane::corrected(x, y, quad, from.tilt, level, &by);
-    by[0] = steps(to.start, tilted.start, units.start);
-    by[1] = steps(to.slopes[0], tilted.slopes[0], units.slope);
-    by[2] = steps(to.slopes[1], tilted.slopes[1], units.slope);
+    let tilted = Plane::corrected(quad_morton(record.x, record.y), &quad, tilt, level, &by);
+    let [right_u, right_v, down_u, down_v] = tilted.slopes.map(f64::from);
+    let ([.., widest], [right, down]) = (SLOPE, to.slopes);
+    by[1] = steps(right, [right_u, right_v], units.slope, widest);
+    by[2] = steps(down, [down_u, down_v], units.slope, widest);
+    let [.., widest] = START;
+    by[0] = steps(to.start, record.uv.map(f64::from), units.start, widest);
     by
 }

@@ -3,20 +3,51 @@
 //! Only the encoder needs it, and whatever it finds is only a matter of size: the residuals make
 //! the records exact.
 
-use super::plane::{Plane, Quad, quad_of};
+use super::plane::{Quad, quad_of};
 use crate::textrace::QuadRecord;
+
+/// A plane in `f64`.
+#[derive(Clone, Copy)]
+pub(super) struct Fitted {
+    /// Pixel column and row of the origin in the tile.
+    pub origin: [f64; 2],
+    /// u and v at the origin.
+    pub start: [f64; 2],
+    /// Slope of u and v to the right and down, both times w.
+    pub slopes: [[f64; 2]; 2],
+    /// Change of w by pixel, to the right and down; w is 1 at the origin.
+    pub tilt: [f64; 2],
+}
+
+impl Fitted {
+    /// The plane through a record's own numbers, with a slope of w.
+    pub fn through(record: &QuadRecord, tilt: [f32; 2]) -> Self {
+        let [p, q] = tilt.map(f64::from);
+        Self {
+            origin: [record.x, record.y].map(|at| f64::from(2 * at)),
+            start: record.uv.map(f64::from),
+            slopes: [
+                record.dx.map(|slope| f64::from(slope) * (1.0 + p)),
+                record.dy.map(|slope| f64::from(slope) * (1.0 + q)),
+            ],
+            tilt: [p, q],
+        }
+    }
+}
 
 /// Unknowns: start, slope to the right and slope down of u and of v, then the tilt.
 const UNKNOWNS: usize = 8;
 /// Steps of the iteration, which starts near the solution.
 const STEPS: usize = 3;
 
-/// The plane of a quad and `others`, near `from`; `None` where the equations have no solution.
-pub(super) fn fit(from: &Plane, quad: &Quad, others: &[QuadRecord]) -> Option<Plane> {
-    let mut plane = *from;
+/// The plane of a quad and `others`, from one through it with a slope of w; `None` where the equations have
+/// no solution.
+pub(super) fn fit(quad: &QuadRecord, tilt: [f32; 2], others: &[QuadRecord]) -> Option<Fitted> {
+    let mut plane = Fitted::through(quad, tilt);
+    let quad = quad_of(quad);
     for _ in 0..STEPS {
         let mut equations = Equations::default();
-        equations.add(&plane, [0.0; 2], quad);
+        equations.add(&plane, [0.0; 2], &quad);
         for record in others {
             let [left, top] = plane.origin;
             let at = [
@@ -50,7 +81,7 @@ impl Equations {
         clippy::needless_range_loop,
         reason = "several arrays have the same index"
     )]
-    fn add(&mut self, plane: &Plane, at: [f64; 2], quad: &Quad) {
+    fn add(&mut self, plane: &Fitted, at: [f64; 2], quad: &Quad) {
         let lanes = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
         let places = lanes.map(|[i, j]| [at[0] + i, at[1] + j]);
         let scales = places.map(|[right, down]| {
@@ -89,7 +120,7 @@ impl Equations {
     }
 
     /// Solves by elimination, with a little weight on no change at all.
-    fn solve(mut self, plane: &Plane) -> Option<[f64; UNKNOWNS]> {
+    fn solve(mut self, plane: &Fitted) -> Option<[f64; UNKNOWNS]> {
         let slopes = plane.slopes.as_flattened();
         let steepest = slopes.iter().fold(1.0f64, |most, s| most.max(s.abs()));
         for at in 0..UNKNOWNS {

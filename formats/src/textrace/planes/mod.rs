@@ -4,10 +4,10 @@
 //! is told exactly, as a difference from what an earlier primitive's plane says there ([`parents`]);
 //! then how finely the plane through that quad is corrected, and the correction. Every other quad is
 //! what the plane says and a residual, mostly 0 or 1 of a fixed-point step ([`mode`], [`residual`]).
-//! Sizes of residuals, and steps and masks ([`places`]), are told by prefix codes with fixed lengths
-//! ([`lengths`]).
+//! Sizes of residuals and of a first quad's numbers ([`widths`]), and steps and masks ([`places`]), are told by
+//! prefix codes with fixed lengths ([`lengths`]).
 //!
-//! A tile is written run by run, from both ends: runs, places and planes from the front, residuals from
+//! A tile is written run by run, from both ends: runs and places from the front, planes and residuals from
 //! the back. So a decoder has two chains of codes that do not wait for each other. The encoder fits the
 //! planes to the exact records ([`fit`]); a decoder does not need to know how.
 
@@ -21,6 +21,7 @@ mod parents;
 mod places;
 mod plane;
 mod residual;
+mod widths;
 
 use super::Tile;
 use super::bits::{BitWriter, PADDING_BYTES};
@@ -52,12 +53,14 @@ pub(super) fn decode<'a>(
     input: &'a [u8],
     tile: &mut Tile,
 ) -> Parsed<'a, ()> {
-    // Each direction with padding of its own, so that both can be read in words.
+    // The bytes in both directions, each with padding of its own, so that both are read in words.
     let padding = [0; PADDING_BYTES];
-    let ahead = [input, &padding].concat();
-    let mut back = [&padding, input].concat();
-    back.reverse();
-    let mut decoder = Decoder::new(&ahead, &back);
+    let mut both = [input, &padding, input, &padding].concat();
+    let (ahead, back) = both.split_at_mut(input.len() + PADDING_BYTES);
+    if let Some((back, _)) = back.split_at_mut_checked(input.len()) {
+        back.reverse();
+    }
+    let mut decoder = Decoder::new(ahead, back, runs);
     let outcome = decoder.tile(runs, records, tile);
     let (front, back) = (decoder.front, decoder.back);
     let rest = input.get(front.bytes_read()..).unwrap_or_default();

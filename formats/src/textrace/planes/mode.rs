@@ -3,8 +3,6 @@
 
 use super::plane::Quad;
 use super::residual::{Pair, sum};
-use crate::textrace::delta::predict::{Context, Derivatives};
-use std::num::Wrapping;
 
 /// How a run's residuals are told, whichever is smallest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,29 +28,30 @@ impl Mode {
     }
 }
 
-/// The departure of a group's last quad, from which that of the next follows.
+/// The departure of a group's last quad, from which that of the next follows as encoding 1's records do.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Departure {
     pub mode: Mode,
-    last: Context,
+    at: [i32; 2],
+    uv: Pair,
+    /// dx, then dy.
+    slopes: Four,
+    cross: Pair,
+    /// Change of dx from a quad to its right neighbour, then of dy to the lower one.
+    steps: Four,
 }
+
+/// Two pairs, of which one instruction takes all.
+type Four = [i32; 4];
 
 impl Departure {
     /// That of a run's first quad: none.
-    pub fn start(mode: Mode, x: u8, y: u8) -> Self {
-        let mut last = Context::default();
-        let none = [Wrapping(0); 2];
-        last.learn(x.into(), y.into(), none, Derivatives::default(), false);
-        Self { mode, last }
-    }
-
-    /// What is expected of dx, dy and cross.
     #[inline(always)]
-    fn guess(&self, x: i32, y: i32) -> Derivatives {
-        if self.mode == Mode::Bending {
-            self.last.derivatives(x, y)
-        } else {
-            self.last.last()
+    pub fn start(mode: Mode, x: u8, y: u8) -> Self {
+        Self {
+            mode,
+            at: [x.into(), y.into()],
+            ..Self::default()
         }
     }
 
@@ -67,16 +66,12 @@ impl Departure {
                 [uv, minus(dx, uv), minus(dy, uv), rest]
             }
             Mode::Bending | Mode::Following => {
-                let (x, y) = (x.into(), y.into());
-                let guess = self.guess(x, y);
-                let now = Derivatives {
-                    dx: plus(guess.dx, dx),
-                    dy: plus(guess.dy, dy),
-                    cross: plus(guess.cross, cross),
-                };
-                let uv = plus(self.last.uv(x, y, &now), uv);
-                self.last.learn(x, y, uv, now, true);
-                [plain(uv), plain(now.dx), plain(now.dy), plain(now.cross)]
+                let way = self.way(x, y);
+                let slopes = four(self.guess(&way), joined(dx, dy), i32::wrapping_add);
+                let uv = sum(self.expected_uv(&way, slopes), uv);
+                self.learn(x, y, [uv, sum(self.cross, cross)], slopes);
+                let [dx, dy] = parted(slopes);
+                [uv, dx, dy, self.cross]
             }
         }
     }
@@ -91,31 +86,103 @@ impl Departure {
                 [uv, dx, dy, minus(sum(cross, sum(dx, dy)), uv)]
             }
             Mode::Bending | Mode::Following => {
-                let (x, y) = (x.into(), y.into());
-                let guess = self.guess(x, y);
-                let [as_uv, dx, dy, cross] = quad.map(|[u, v]| [Wrapping(u), Wrapping(v)]);
-                let now = Derivatives { dx, dy, cross };
-                let guess_uv = self.last.uv(x, y, &now);
-                self.last.learn(x, y, as_uv, now, true);
-                [
-                    minus(uv, plain(guess_uv)),
-                    minus(plain(dx), plain(guess.dx)),
-                    minus(plain(dy), plain(guess.dy)),
-                    minus(plain(cross), plain(guess.cross)),
-                ]
+                let way = self.way(x, y);
+                let slopes = joined(dx, dy);
+                let of_slopes = four(slopes, self.guess(&way), i32::wrapping_sub);
+                let of_uv = minus(uv, self.expected_uv(&way, slopes));
+                let of_cross = minus(cross, self.cross);
+                self.learn(x, y, [uv, cross], slopes);
+                let [of_dx, of_dy] = parted(of_slopes);
+                [of_uv, of_dx, of_dy, of_cross]
             }
         }
     }
+
+    /// The way from the last quad to another one.
+    #[inline(always)]
+    fn way(&self, x: u8, y: u8) -> Way {
+        let [right, down] = minus([x.into(), y.into()], self.at);
+        let ([u, v], [twice_right, twice_down]) = (self.cross, [2 * right, 2 * down]);
+        let turn = [twice_down, twice_down, twice_right, twice_right];
+        Way {
+            quads: [right, right, down, down],
+            turn: four(turn, [u, v, u, v], i32::wrapping_mul),
+        }
+    }
+
+    /// What is expected of dx and dy.
+    #[inline(always)]
+    fn guess(&self, way: &Way) -> Four {
+        if self.mode != Mode::Bending {
+            return self.slopes;
+        }
+        let steps = four(way.quads, self.steps, i32::wrapping_mul);
+        four(
+            four(self.slopes, steps, i32::wrapping_add),
+            way.turn,
+            i32::wrapping_add,
+        )
+    }
+
+    /// What is expected of uv, once dx and dy are known; notes how they change. First along the row, then down
+    /// the column, each by the trapezoid rule over one-pixel differences.
+    #[inline(always)]
+    fn expected_uv(&mut self, way: &Way, slopes: Four) -> Pair {
+        let [right_u, right_v, down_u, down_v] = way.turn;
+        let from = four(self.slopes, [0, 0, down_u, down_v], i32::wrapping_add);
+        let to = four(slopes, [right_u, right_v, 0, 0], i32::wrapping_sub);
+        let change = four(to, from, i32::wrapping_sub);
+        let both = four(
+            four(from, to, i32::wrapping_add),
+            way.quads,
+            i32::wrapping_mul,
+        );
+        let bend = four(
+            change,
+            way.quads,
+            |change, quads| if quads == 0 { 0 } else { change >> 1 },
+        );
+        let [along_row, down_column] = parted(four(both, bend, i32::wrapping_sub));
+        let steps = four(change, way.quads, i32::wrapping_mul);
+        for ((step, new), quads) in self.steps.iter_mut().zip(steps).zip(way.quads) {
+            *step = if quads.wrapping_mul(quads) == 1 {
+                new
+            } else {
+                *step
+            };
+        }
+        sum(sum(self.uv, along_row), down_column)
+    }
+
+    #[inline(always)]
+    fn learn(&mut self, x: u8, y: u8, [uv, cross]: [Pair; 2], slopes: Four) {
+        self.at = [x.into(), y.into()];
+        (self.uv, self.cross, self.slopes) = (uv, cross, slopes);
+    }
+}
+
+/// From one quad to another.
+struct Way {
+    /// Quads to the right (twice, for u and v), then down.
+    quads: Four,
+    /// Change of dx by going down, then of dy by going right.
+    turn: Four,
 }
 
 #[inline(always)]
-fn plus([a, b]: [Wrapping<i32>; 2], [c, d]: Pair) -> [Wrapping<i32>; 2] {
-    [a + Wrapping(c), b + Wrapping(d)]
+fn four(a: Four, b: Four, of: impl Fn(i32, i32) -> i32) -> Four {
+    let ([a, b, c, d], [e, f, g, h]) = (a, b);
+    [of(a, e), of(b, f), of(c, g), of(d, h)]
 }
 
 #[inline(always)]
-fn plain([u, v]: [Wrapping<i32>; 2]) -> Pair {
-    [u.0, v.0]
+fn joined([a, b]: Pair, [c, d]: Pair) -> Four {
+    [a, b, c, d]
+}
+
+#[inline(always)]
+fn parted([a, b, c, d]: Four) -> [Pair; 2] {
+    [[a, b], [c, d]]
 }
 
 #[inline(always)]

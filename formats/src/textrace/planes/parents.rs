@@ -3,19 +3,13 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::GROUPS;
-use super::plane::{Quad, Surface, cross, tilt_of};
-use crate::varint::low_u32;
+use super::plane::{Plane, Quad, cross, tilt_of};
 
 /// Which code tells the level of a plane's corrections, by how many records of its group are likely to
-/// follow in the run; `None` where none are.
-pub(super) fn level_context(likely_others: u32) -> Option<usize> {
-    match likely_others {
-        0 => None,
-        1 | 2 => Some(0),
-        3..=6 => Some(1),
-        7..=14 => Some(2),
-        _ => Some(3),
-    }
+/// follow in the run: none, 1 or 2, 3 to 6, 7 to 14, or more.
+#[inline(always)]
+pub(super) fn level_context(likely_others: u32) -> usize {
+    (likely_others.saturating_add(1).ilog2() as usize).min(4)
 }
 
 /// Which code tells the sizes of a group's second quad: the third where the plane is uncorrected.
@@ -28,57 +22,60 @@ const MOST_PARENTS: usize = 64;
 /// Bits below the highest one of the largest number that names a parent.
 pub(super) const MOST_PARENT_BITS: u32 = MOST_PARENTS.ilog2();
 
-/// The planes so far, and the last ones of each group.
+/// Planes of a group that memory is taken for at once.
+const MOST_RESERVED: u32 = 128;
+
+/// The planes so far, by group.
 pub(super) struct Lineage {
-    planes: Vec<Surface>,
-    /// Indices in `planes` by group: of its n-th plane at n modulo [`MOST_PARENTS`].
-    last: [[u32; MOST_PARENTS]; GROUPS],
-    /// Surfaces of each group.
-    counts: [usize; GROUPS],
+    planes: [Vec<Plane>; GROUPS],
+    /// Planes of a group that there may be.
+    likely: usize,
 }
 
 impl Lineage {
-    pub fn new() -> Self {
+    /// For a tile of so many runs.
+    pub fn new(runs: u32) -> Self {
         Self {
-            planes: vec![],
-            last: [[0; MOST_PARENTS]; GROUPS],
-            counts: [0; GROUPS],
+            planes: [const { vec![] }; GROUPS],
+            likely: runs.min(MOST_RESERVED) as usize,
         }
     }
 
-    /// Surfaces of a group that can be a parent.
+    /// Planes of a group that can be a parent.
     #[inline(always)]
     pub fn count(&self, group: u8) -> usize {
-        let count = self.counts.get(usize::from(group) % GROUPS);
-        count.copied().unwrap_or_default().min(MOST_PARENTS)
+        let planes = self.planes.get(usize::from(group) % GROUPS);
+        planes.map_or(0, |planes| planes.len().min(MOST_PARENTS))
     }
 
     /// The plane that is `back` planes of the group before the last one; past all that can be a parent
     /// a plane of zeros, then none.
     #[inline(always)]
-    pub fn parent(&self, group: u8, back: usize) -> Option<Surface> {
-        let group = usize::from(group) % GROUPS;
-        let count = *self.counts.get(group)?;
-        let can_be = count.min(MOST_PARENTS);
+    pub fn parent(&self, group: u8, back: u32) -> Option<Plane> {
+        let back = back as usize;
+        let planes = self.planes.get(usize::from(group) % GROUPS)?;
+        let can_be = planes.len().min(MOST_PARENTS);
         if back >= can_be {
-            return (back == can_be).then(Surface::default);
+            return (back == can_be).then(Plane::default);
         }
-        let slot = (count - 1 - back) % MOST_PARENTS;
-        let index = *self.last.get(group)?.get(slot)?;
-        self.planes.get(index as usize).copied()
+        planes.get(planes.len() - 1 - back).copied()
+    }
+
+    /// The plane of the group that was taken in last.
+    #[inline(always)]
+    pub fn last(&self, group: usize) -> Option<&Plane> {
+        self.planes.get(group % GROUPS)?.last()
     }
 
     /// Takes in a plane.
     #[inline(always)]
-    pub fn note(&mut self, group: u8, surface: Surface) {
-        let group = usize::from(group) % GROUPS;
-        if let Some((last, count)) = self.last.get_mut(group).zip(self.counts.get_mut(group)) {
-            if let Some(slot) = last.get_mut(*count % MOST_PARENTS) {
-                *slot = low_u32(self.planes.len() as u64);
+    pub fn note(&mut self, group: u8, plane: Plane) {
+        if let Some(planes) = self.planes.get_mut(usize::from(group) % GROUPS) {
+            if planes.capacity() == 0 {
+                planes.reserve(self.likely);
             }
-            *count += 1;
+            planes.push(plane);
         }
-        self.planes.push(surface);
     }
 }
 
@@ -86,17 +83,17 @@ impl Lineage {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expected {
     quad: Quad,
-    tilt: [f64; 2],
+    tilt: [f32; 2],
 }
 
 impl Expected {
     /// What an earlier plane makes of it; the slope of w is that of the plane last told in the run, if
     /// there is one.
     #[inline(always)]
-    pub fn new(parent: &Surface, of_run: Option<&Surface>, x: u8, y: u8) -> Self {
+    pub fn new(parent: &Plane, of_run: Option<&Plane>, morton: u8) -> Self {
         Self {
-            quad: parent.predict(x, y),
-            tilt: of_run.unwrap_or(parent).tilt_at(x, y),
+            quad: parent.predict(morton),
+            tilt: of_run.unwrap_or(parent).tilt_at(morton),
         }
     }
 
@@ -122,7 +119,7 @@ impl Expected {
 
 /// The slope of w to start from: that of the run's other group, or what the quad tells.
 #[inline(always)]
-pub(super) fn tilt_of_run(has_other: bool, quad: &Quad, expected: &Expected) -> [f64; 2] {
+pub(super) fn tilt_of_run(has_other: bool, quad: &Quad, expected: &Expected) -> [f32; 2] {
     if has_other {
         expected.tilt
     } else {

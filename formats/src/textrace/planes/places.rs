@@ -173,10 +173,8 @@ impl Places {
     #[inline(always)]
     fn swap_mask(&self, morton: u8, mask: u8) -> u8 {
         let covered = self.covered.get(usize::from(morton & 63)).copied();
-        let rest = 15 & !covered.unwrap_or_default();
-        // Without branches, which would be hard to predict.
-        let swaps = (rest != 0) & ((mask == 15) | (mask == rest));
-        mask ^ ((15 ^ rest) * u8::from(swaps))
+        let at = usize::from(covered.unwrap_or_default() & 15) << 4 | usize::from(mask & 15);
+        SWAPPED.get(at).copied().unwrap_or_default()
     }
 
     /// Takes in a record.
@@ -381,6 +379,26 @@ impl Places {
         }
     }
 }
+
+/// By covered lanes, then mask: see [`Places::swap_mask`]. A table, as branches would be hard to predict.
+static SWAPPED: [u8; 256] = {
+    let mut masks = [0; 256];
+    let mut at = 0;
+    while at < 256 {
+        let (rest, mask) = (15 & !(at >> 4), at & 15);
+        let swaps = rest != 0 && (mask == 15 || mask == rest);
+        #[allow(
+            clippy::indexing_slicing,
+            clippy::cast_possible_truncation,
+            reason = "evaluated when compiled"
+        )]
+        {
+            masks[at] = if swaps { mask ^ 15 ^ rest } else { mask } as u8;
+        }
+        at += 1;
+    }
+    masks
+};
 
 fn follow_themselves() -> [Follow; GROUPS] {
     let mut group = 0;

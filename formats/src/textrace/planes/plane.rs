@@ -1,12 +1,13 @@
 //! A primitive's plane: its texture coordinates over the screen.
 //!
 //! `u * w`, `v * w` and `w` are linear in screen space. With w scaled to 1 at an origin, seven
-//! numbers besides the origin's coordinates give u and v everywhere. All of it is `f64` with
+//! numbers besides the origin's coordinates give u and v everywhere. All of it is `f32` with
 //! additions, multiplications and divisions in a stated order, so every machine predicts the same.
 #![deny(clippy::indexing_slicing)]
 
 use crate::textrace::QuadRecord;
-use glam::{Vec4, Vec4Swizzles};
+use crate::textrace::invariant::QUAD_POSITIONS;
+use glam::{Vec2, Vec4, Vec4Swizzles};
 
 /// uv, dx, dy and cross of a quad, each u and v.
 pub(super) type Quad = [[i32; 2]; 4];
@@ -20,99 +21,67 @@ pub(super) fn quad_of(record: &QuadRecord) -> Quad {
 const LEAST_W: f32 = 1.0 / 1024.0;
 /// Weight of the expected slope of w against what a quad's cross tells: the square of about half a
 /// fixed-point step in units of the slope's usual error, 2^-9 a pixel.
-const PRIOR: f64 = 65536.0;
+const PRIOR: f32 = 65536.0;
 
 /// A plane in perspective around the top-left lane of a quad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Plane {
     /// Pixel column and row of the origin in the tile.
-    pub origin: [f64; 2],
-    /// u and v at the origin.
-    pub start: [f64; 2],
-    /// Slope of u and v to the right and down, both times w.
-    pub slopes: [[f64; 2]; 2],
+    origin: [f32; 2],
+    /// u and v at the origin: whole steps, and what is left over.
+    base: [i32; 2],
+    start: [f32; 2],
+    /// Slope of u and v to the right, then down, both times w.
+    pub slopes: [f32; 4],
     /// Change of w by pixel, to the right and down; w is 1 at the origin.
-    pub tilt: [f64; 2],
+    tilt: [f32; 2],
 }
 
 impl Plane {
-    /// The plane through a quad's own numbers, with a slope of w.
-    #[inline]
-    pub fn through(x: u8, y: u8, quad: &Quad, tilt: [f64; 2]) -> Self {
-        let [uv, dx, dy, _] = *quad;
-        let (uv, dx, dy) = (floats(uv), floats(dx), floats(dy));
+    /// The plane through the numbers of the quad at a place on the Morton curve, with a slope of w.
+    #[inline(always)]
+    pub fn through(morton: u8, quad: &Quad, tilt: [f32; 2]) -> Self {
+        let [base, [dx_u, dx_v], [dy_u, dy_v], _] = *quad;
         let [p, q] = tilt;
+        let by_w = Vec4::new(1.0 + p, 1.0 + p, 1.0 + q, 1.0 + q);
+        let [right, down] = quad_at(morton);
         Self {
-            origin: [f64::from(2 * x), f64::from(2 * y)],
-            start: uv,
-            slopes: [times(dx, 1.0 + p), times(dy, 1.0 + q)],
+            origin: [right.x, down.x],
+            base,
+            start: [0.0; 2],
+            slopes: (four([dx_u, dx_v, dy_u, dy_v]) * by_w).to_array(),
             tilt,
         }
     }
 
-    /// The plane with slopes of w, slopes and start changed by a correction in the units of `level`.
-    #[inline]
-    pub fn corrected(x: u8, y: u8, quad: &Quad, tilt: [f64; 2], level: u32, by: &Quad) -> Self {
-        let [start, right, down, change] = *by;
-        let (start, right, down) = (floats(start), floats(right), floats(down));
+    /// The same with slopes of w, slopes and start changed by a correction in the units of `level`, from 1 on.
+    #[inline(always)]
+    pub fn corrected(morton: u8, quad: &Quad, tilt: [f32; 2], level: u32, by: &Quad) -> Self {
+        let [start, [right_u, right_v], [down_u, down_v], change] = *by;
         let units = Units::new(level, quad);
         let ([p, q], [dp, dq]) = (tilt, floats(change));
         let tilt = [
             within_one(p + dp * units.tilt),
             within_one(q + dq * units.tilt),
         ];
-        let mut plane = Self::through(x, y, quad, tilt);
-        let [of_right, of_down] = plane.slopes;
-        plane.slopes = [
-            plus(of_right, times(right, units.slope)),
-            plus(of_down, times(down, units.slope)),
-        ];
-        plane.start = plus(plane.start, times(start, units.start));
+        let mut plane = Self::through(morton, quad, tilt);
+        let slopes = four([right_u, right_v, down_u, down_v]) * Vec4::splat(units.slope);
+        plane.slopes = (Vec4::from_array(plane.slopes) + slopes).to_array();
+        let [start_u, start_v] = floats(start);
+        plane.start = [start_u * units.start, start_v * units.start];
         plane
     }
-}
 
-/// A plane as it is remembered and asked: in `f32`, four lanes at once.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Surface {
-    /// Pixel column and row of the origin in the tile.
-    origin: [f32; 2],
-    /// u and v at the origin: whole steps, and what is left over.
-    base: [i32; 2],
-    start: [f32; 2],
-    slopes: [[f32; 2]; 2],
-    tilt: [f32; 2],
-}
-
-impl From<&Plane> for Surface {
+    /// What the plane says of the quad at a place on the Morton curve.
     #[inline(always)]
-    fn from(plane: &Plane) -> Self {
-        let [u, v] = plane.start;
-        let base = round(plane.start);
-        let [base_u, base_v] = base;
-        let [right, down] = plane.slopes;
-        Self {
-            origin: singles(plane.origin),
-            base,
-            start: singles([u - f64::from(base_u), v - f64::from(base_v)]),
-            slopes: [singles(right), singles(down)],
-            tilt: singles(plane.tilt),
-        }
-    }
-}
-
-impl Surface {
-    /// What the plane says of a quad.
-    #[inline(always)]
-    pub fn predict(&self, x: u8, y: u8) -> Quad {
+    pub fn predict(&self, morton: u8) -> Quad {
         // u and v of a lane and of the one to its right; the upper two lanes, then the lower two.
         const OF_RIGHT: Vec4 = Vec4::new(0.0, 0.0, 1.0, 1.0);
-        let [left, top] = self.origin;
-        let right = Vec4::splat(f32::from(2 * x) - left) + OF_RIGHT;
-        let down = Vec4::splat(f32::from(2 * y) - top);
-        let [[right_u, right_v], [down_u, down_v]] = self.slopes;
-        let to_right = Vec4::new(right_u, right_v, right_u, right_v);
-        let to_down = Vec4::new(down_u, down_v, down_u, down_v);
+        let [left, top] = self.origin.map(Vec4::splat);
+        let [right, down] = quad_at(morton);
+        let (right, down) = (right - left, down - top);
+        let slopes = Vec4::from_array(self.slopes);
+        let (to_right, to_down) = (slopes.xyxy(), slopes.zwzw());
         let [p, q] = self.tilt.map(Vec4::splat);
         let w = Vec4::ONE + p * right + q * down;
         let bend = to_right * right + to_down * down;
@@ -122,102 +91,121 @@ impl Surface {
         let by_row = lower - upper;
         let ([base_u, base_v], [start_u, start_v]) = (self.base, self.start);
         let start = Vec4::new(start_u, start_v, 0.0, 0.0);
-        let [uv_u, uv_v, dx_u, dx_v] = rounded(upper + (start - upper.xyxy() * OF_RIGHT));
-        let [dy_u, dy_v, cross_u, cross_v] = rounded(by_row - by_row.xyxy() * OF_RIGHT);
-        [
-            [uv_u.wrapping_add(base_u), uv_v.wrapping_add(base_v)],
-            [dx_u, dx_v],
-            [dy_u, dy_v],
-            [cross_u, cross_v],
-        ]
+        let [uv, dx] = rounded(
+            upper + (start - upper.xyxy() * OF_RIGHT),
+            [base_u, base_v, 0, 0],
+        );
+        let [dy, cross] = rounded(by_row - by_row.xyxy() * OF_RIGHT, [0; 4]);
+        [uv, dx, dy, cross]
     }
 
     /// Slope of w around a quad, where w there is 1.
-    #[inline]
-    pub fn tilt_at(&self, x: u8, y: u8) -> [f64; 2] {
+    #[inline(always)]
+    pub fn tilt_at(&self, morton: u8) -> [f32; 2] {
         let [left, top] = self.origin;
-        let [right, down] = [f32::from(2 * x) - left, f32::from(2 * y) - top];
+        let [right, down] = quad_at(morton);
         let [p, q] = self.tilt;
-        let w = 1.0 + p * right + q * down;
+        let w = 1.0 + p * (right.x - left) + q * (down.x - top);
         let w = if w > LEAST_W { w } else { LEAST_W };
-        [within_one(f64::from(p / w)), within_one(f64::from(q / w))]
+        [within_one(p / w), within_one(q / w)]
     }
 }
 
-/// Nearest integers, ties to even: adding 1.5 * 2^23 leaves them in the low bits. Right below 2^22; beyond,
-/// a prediction is a bad one, but the same everywhere.
+/// By place on the Morton curve: the columns of the left lane (twice, for u and v) and of the right one, and
+/// the row of the upper lanes, in the tile.
+static QUADS: [[[f32; 4]; 2]; 64] = {
+    let mut quads = [[[0.0; 4]; 2]; 64];
+    let mut at = 0;
+    while at < 64 {
+        #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+        {
+            let (x, y) = QUAD_POSITIONS[at];
+            let (left, top) = (2.0 * x as f32, 2.0 * y as f32);
+            quads[at] = [[left, left, left + 1.0, left + 1.0], [top; 4]];
+        }
+        at += 1;
+    }
+    quads
+};
+
+/// Columns and rows from [`QUADS`].
 #[inline(always)]
-fn rounded(numbers: Vec4) -> [i32; 4] {
-    const MAGIC: f32 = 12_582_912.0;
-    let of = |magic: f32| {
-        let bits = magic.to_bits();
-        bits.wrapping_sub(MAGIC.to_bits()).cast_signed()
-    };
-    let [a, b, c, d] = (numbers + Vec4::splat(MAGIC)).to_array();
-    [of(a), of(b), of(c), of(d)]
+fn quad_at(morton: u8) -> [Vec4; 2] {
+    let found = QUADS.get(usize::from(morton) % QUADS.len()).copied();
+    let [right, down] = found.unwrap_or_default();
+    [Vec4::from_array(right), Vec4::from_array(down)]
 }
 
+/// Nearest integers, ties to even, and others added to them: adding 1.5 * 2^23 leaves them in the low bits.
+/// Right below 2^22; beyond, a prediction is a bad one, but the same everywhere.
 #[inline(always)]
-#[allow(clippy::cast_possible_truncation, reason = "the nearest f32 is meant")]
-fn singles([a, b]: [f64; 2]) -> [f32; 2] {
-    [a as f32, b as f32]
+fn rounded(numbers: Vec4, and: [i32; 4]) -> [[i32; 2]; 2] {
+    let [a, b, c, d] = (numbers + Vec4::splat(MAGIC)).to_array();
+    let [to_a, to_b, to_c, to_d] = and;
+    [
+        [near(a, to_a), near(b, to_b)],
+        [near(c, to_c), near(d, to_d)],
+    ]
+}
+
+const MAGIC: f32 = 12_582_912.0;
+
+/// The integer in the low bits of a sum with [`MAGIC`], and another one added to it.
+#[inline(always)]
+fn near(sum: f32, and: i32) -> i32 {
+    let bits = sum.to_bits().cast_signed();
+    bits.wrapping_add(and.wrapping_sub(MAGIC.to_bits().cast_signed()))
 }
 
 /// What a correction of 1 stands for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Units {
-    pub start: f64,
-    pub slope: f64,
-    pub tilt: f64,
+    pub start: f32,
+    pub slope: f32,
+    pub tilt: f32,
 }
 
 impl Units {
     /// The finer, the higher the level; slopes of w the finer, too, the larger dx and dy are.
+    #[inline(always)]
     pub fn new(level: u32, quad: &Quad) -> Self {
         let [_, [a, b], [c, d], _] = *quad;
-        let (ab, cd) = (
-            a.unsigned_abs().max(b.unsigned_abs()),
-            c.unsigned_abs().max(d.unsigned_abs()),
-        );
-        let largest = ab.max(cd);
+        // As many bits as the largest magnitude, or as its complement's.
+        let all = (a ^ a >> 31) | (b ^ b >> 31) | (c ^ c >> 31) | (d ^ d >> 31);
         Self {
             start: 0.25,
             slope: power(level),
-            tilt: power(2 * level + (32 - largest.leading_zeros())),
+            tilt: power(2 * level + (32 - all.leading_zeros())),
         }
     }
 }
 
-/// 2^-n, exact.
-fn power(n: u32) -> f64 {
-    1.0 / (1u64 << n.min(63)) as f64
+/// 2^-n for n up to 126, exact.
+#[inline(always)]
+fn power(n: u32) -> f32 {
+    f32::from_bits((127 - n.min(126)) << 23)
 }
 
-/// cross of a quad whose dx and dy are known, with a slope of w.
-#[inline]
-pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f64; 2]) -> [i32; 2] {
+/// cross of a quad whose dx and dy are known, with a slope of w; as if w were 1 over all of the quad.
+#[inline(always)]
+pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f32; 2]) -> [i32; 2] {
     let [p, q] = tilt;
-    let w = (1.0 + p + q).max(LEAST_W.into());
-    let of = |dx: i32, dy: i32| (f64::from(dx) * q + f64::from(dy) * p) / -w;
-    let ([dx_u, dx_v], [dy_u, dy_v]) = (dx, dy);
-    round([of(dx_u, dy_u), of(dx_v, dy_v)])
+    let ([dx_u, dx_v], [dy_u, dy_v]) = (floats(dx), floats(dy));
+    let of = |dx: f32, dy: f32| near(MAGIC - (dx * q + dy * p), 0);
+    [of(dx_u, dy_u), of(dx_v, dy_v)]
 }
 
 /// The slope of w that a quad's own numbers tell, kept near an expected one: cross is
 /// `-(dx * q + dy * p) / (1 + p + q)` for u and for v, so least squares with a prior.
-#[inline]
-pub(super) fn tilt_of(quad: &Quad, expected: [f64; 2]) -> [f64; 2] {
-    let [_, dx, dy, cross] = *quad;
-    let (dx, dy, cross) = (floats(dx), floats(dy), floats(cross));
+#[inline(always)]
+pub(super) fn tilt_of(quad: &Quad, expected: [f32; 2]) -> [f32; 2] {
+    let [_, dx, dy, cross] = quad.map(|pair| Vec2::from_array(floats(pair)));
     let [p, q] = expected;
-    let ([dx_u, dx_v], [dy_u, dy_v], [c_u, c_v]) = (dx, dy, cross);
-    let (a_u, b_u, a_v, b_v) = (c_u + dy_u, c_u + dx_u, c_v + dy_v, c_v + dx_v);
-    let left_u = -(c_u + p * a_u + q * b_u);
-    let left_v = -(c_v + p * a_v + q * b_v);
-    let (aa, bb) = (a_u * a_u + a_v * a_v, b_u * b_u + b_v * b_v);
-    let ab = a_u * b_u + a_v * b_v;
-    let (ae, be) = (a_u * left_u + a_v * left_v, b_u * left_u + b_v * left_v);
-    let area = a_u * b_v - a_v * b_u;
+    let (a, b) = (cross + dy, cross + dx);
+    let left = -(cross + p * a + q * b);
+    let (aa, bb, ab) = (a.dot(a), b.dot(b), a.dot(b));
+    let (ae, be) = (a.dot(left), b.dot(left));
+    let area = a.x * b.y - a.y * b.x;
     // (aa + PRIOR) * (bb + PRIOR) - ab * ab, without a difference that could round to zero.
     let determinant = PRIOR * (PRIOR + aa + bb) + area * area;
     [
@@ -228,36 +216,20 @@ pub(super) fn tilt_of(quad: &Quad, expected: [f64; 2]) -> [f64; 2] {
 
 /// Not `map`, which is not always inlined.
 #[inline(always)]
-fn floats([a, b]: [i32; 2]) -> [f64; 2] {
-    [a.into(), b.into()]
-}
-
-#[inline]
-fn within_one(slope: f64) -> f64 {
-    slope.clamp(-1.0, 1.0)
+#[allow(clippy::cast_precision_loss, reason = "the nearest f32 is meant")]
+fn floats([a, b]: [i32; 2]) -> [f32; 2] {
+    [a as f32, b as f32]
 }
 
 #[inline(always)]
-fn plus([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
-    [a + c, b + d]
+#[allow(clippy::cast_precision_loss, reason = "the nearest f32 is meant")]
+fn four([a, b, c, d]: [i32; 4]) -> Vec4 {
+    Vec4::new(a as f32, b as f32, c as f32, d as f32)
 }
 
+/// At least -1 and at most 1, which is also what becomes of no number.
 #[inline(always)]
-fn times([a, b]: [f64; 2], by: f64) -> [f64; 2] {
-    [a * by, b * by]
-}
-
-/// Nearest integers, ties to even, modulo 2^32: adding 1.5 * 2^52 leaves them in the low bits.
-///
-/// Right below 2^51, where all predictions are: slopes stay below 2^34, offsets below 2^5, and
-/// w is at least 2^-10.
-#[inline(always)]
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "predictions wrap like the numbers that they predict"
-)]
-fn round([u, v]: [f64; 2]) -> [i32; 2] {
-    const MAGIC: f64 = 6_755_399_441_055_744.0;
-    let of = |value: f64| ((value + MAGIC).to_bits() as u32).cast_signed();
-    [of(u), of(v)]
+fn within_one(slope: f32) -> f32 {
+    let slope = if slope < 1.0 { slope } else { 1.0 };
+    if slope > -1.0 { slope } else { -1.0 }
 }

@@ -73,8 +73,9 @@ const fn class_of(u: i32, v: i32) -> u32 {
 /// | 9 to 11 | which code tells of the group's next residuals |
 /// | 12 | a pair is wide |
 /// | 13 | the classes follow as numbers |
-/// | 16 to 31, 32 to 47 | first of the first two pairs in [`TWO_PAIRS`], and of the last two |
-/// | 48 to 51, 52 to 55 | bits of the last two; which pairs are wide |
+/// | 16 to 25, 32 to 41 | first of the first two pairs in [`TWO_PAIRS`], and of the last two |
+/// | 26 to 29 | which pairs are wide |
+/// | 48 to 55, 56 to 63 | ones in the bits that name the first two pairs, and the last two |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Classes(u64);
 
@@ -96,15 +97,16 @@ impl Classes {
         let mut wide = (uv >= WIDE) as u32 | ((dx >= WIDE) as u32) << 1;
         wide |= ((dy >= WIDE) as u32) << 2 | ((cross >= WIDE) as u32) << 3;
         let low = (first + last) | first << 5 | noise << 9 | ((wide != 0) as u32) << 12;
-        let high = (last | wide << 4) as u64;
-        let starts = (two_start(uv, dx) | two_start(dy, cross) << 16) as u64;
-        Self(low as u64 | starts << 16 | high << 48)
+        let high = ((1u32 << first) - 1) | (((1 << last) - 1) << 8);
+        let middle = two_start(uv, dx) | wide << 10 | two_start(dy, cross) << 16;
+        Self(low as u64 | (middle as u64) << 16 | (high as u64) << 48)
     }
 
     /// Those of a symbol.
     #[inline(always)]
     pub fn of_symbol(symbol: u32) -> Self {
-        OF_SYMBOL.get(symbol as usize).copied().unwrap_or_default()
+        let found = OF_SYMBOL.get(symbol as usize % OF_SYMBOL.len());
+        found.copied().unwrap_or_default()
     }
 
     /// Bits that name the small pairs.
@@ -122,20 +124,15 @@ impl Classes {
     /// The small pairs that bits name; a wide one is taken for 0.
     #[inline(always)]
     pub fn small_pairs(self, bits: u64) -> Quad {
-        let two = |start: u64, count: u64, bits: u64| {
-            let at = (start & 0x3ff) + (bits & ((1 << (count & 15)) - 1));
-            let found = TWO_PAIRS.get(low_u32(at) as usize);
+        let two = |start: u64, ones: u64, bits: u64| {
+            let at = low_u32(start).wrapping_add(low_u32(bits & ones));
+            let found = TWO_PAIRS.get(at as usize % TWO_PAIRS.len());
             found.copied().unwrap_or_default()
         };
         let first = self.0 >> 5 & 15;
-        let [a, b, c, d] = two(self.0 >> 16, first, bits);
-        let [e, f, g, h] = two(self.0 >> 32, self.0 >> 48, bits >> first);
-        [
-            [a.into(), b.into()],
-            [c.into(), d.into()],
-            [e.into(), f.into()],
-            [g.into(), h.into()],
-        ]
+        let [uv, dx] = two(self.0 >> 16, self.0 >> 48 & 255, bits);
+        let [dy, cross] = two(self.0 >> 32, self.0 >> 56, bits >> first);
+        [uv, dx, dy, cross]
     }
 
     /// There is more to do: pairs are wide, or the classes follow as numbers.
@@ -153,13 +150,14 @@ impl Classes {
     /// Which pairs are wide: 1 for each of uv, dx, dy and cross, else 0.
     #[inline(always)]
     pub fn wide(self) -> [u32; 4] {
-        let wide = low_u32(self.0 >> 52);
+        let wide = low_u32(self.0 >> 26);
         [wide & 1, wide >> 1 & 1, wide >> 2 & 1, wide >> 3 & 1]
     }
 }
 
-static OF_SYMBOL: [Classes; ESCAPE_SIZES as usize + 1] = {
-    let mut table = [Classes(1 << 13); ESCAPE_SIZES as usize + 1];
+/// As long as makes checks of its indices needless.
+static OF_SYMBOL: [Classes; 1024] = {
+    let mut table = [Classes(1 << 13); 1024];
     let mut s = 0;
     while s < ESCAPE_SIZES {
         #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
@@ -177,8 +175,8 @@ pub(super) fn symbol([uv, dx, dy, cross]: [u32; 4]) -> u32 {
 }
 
 /// Two pairs by their classes, then by the bits that name them.
-static TWO_PAIRS: [[i8; 4]; 26 * 26] = {
-    let mut pairs = [[0; 4]; 26 * 26];
+static TWO_PAIRS: [[Pair; 2]; 1024] = {
+    let mut pairs = [[[0; 2]; 2]; 1024];
     let mut classes = 0;
     while classes < CLASSES * CLASSES {
         let (one, other) = (classes / CLASSES, classes % CLASSES);
@@ -188,7 +186,8 @@ static TWO_PAIRS: [[i8; 4]; 26 * 26] = {
             {
                 let [a, b] = small(one, bits);
                 let [c, d] = small(other, bits >> class_bits(one));
-                pairs[(two_start(one, other) + bits) as usize] = [a, b, c, d];
+                pairs[(two_start(one, other) + bits) as usize] =
+                    [[a as i32, b as i32], [c as i32, d as i32]];
             }
             bits += 1;
         }

@@ -4,12 +4,13 @@
     reason = "a test may panic"
 )]
 
-use super::codes::{Codes, MOST_BITS};
+use super::codes::{Code, Codes, MOST_BITS};
 use super::lengths::LENGTHS;
 use super::mode::{Departure, Mode};
 use super::places::ESCAPE_PLACE;
-use super::plane::{Plane, Quad, Surface};
-use super::residual::{Classes, ESCAPE_SIZES, class_bits, classify, small, symbol};
+use super::plane::{Plane, Quad, tilt_of};
+use super::residual::{Classes, ESCAPE_SIZES, class_bits, classify, small, symbol, width};
+use super::widths::{CORRECTION, Choices, DX_AND_UV, DY_AND_CROSS, Layout};
 use super::*;
 use crate::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, quad_morton};
 use crate::varint::low_u32;
@@ -154,6 +155,8 @@ fn every_code_is_complete_and_has_an_escape_where_symbols_lack() {
         let escape = match lengths.len() as u32 - 1 {
             111 => Some(ESCAPE_PLACE),
             ESCAPE_SIZES => Some(ESCAPE_SIZES),
+            // Of widths, the widest.
+            last @ (511 | 1023 | 2047) => Some(last),
             _ => None,
         };
         match escape {
@@ -254,20 +257,62 @@ fn a_plane_passes_through_the_quad_it_was_made_from() {
     let quad = [quad.uv, quad.dx, quad.dy, quad.cross];
     // In the quad's own frame, by the closed form of w around it.
     let w = 1.0 + 0.004 * 6.0 - 0.009 * 10.0;
-    let plane = Plane::through(3, 5, &quad, [0.004 / w, -0.009 / w]);
-    let plane = Surface::from(&plane);
-    let found = plane.predict(3, 5);
+    let tilt = [0.004 / w, -0.009 / w];
+    let plane = Plane::through(quad_morton(3, 5), &quad, tilt);
+    let found = plane.predict(quad_morton(3, 5));
     assert_eq!(found[..3], quad[..3]);
     for (found, exact) in found[3].iter().zip(quad[3]) {
         assert!(found.abs_diff(exact) <= 1, "{found} for {exact}");
     }
     let far = record(7, 7, 0, 15, 0.0);
-    let found = plane.predict(7, 7);
+    let found = plane.predict(quad_morton(7, 7));
     // dx and dy are rounded to a half, 8 pixels away.
     assert!(
         found[0][0].abs_diff(far.uv[0]) < 16,
         "{found:?} for {far:?}"
     );
+}
+
+#[test]
+fn a_quad_tells_how_its_surface_is_tilted() {
+    // Far from what is expected, but cross is large.
+    let [p, q] = [0.02, -0.03];
+    let [dx, dy] = [[9000, -4000], [1500, 8000]];
+    let told = |axis: usize| -f64::from(dx[axis]) * q - f64::from(dy[axis]) * p;
+    let cross = [0, 1].map(|axis| (told(axis) / (1.0 + p + q)).round() as i32);
+    let found = tilt_of(&[[0; 2], dx, dy, cross], [0.0; 2]);
+    for (found, exact) in found.iter().zip([p, q]) {
+        assert!(
+            (f64::from(*found) - exact).abs() < 1e-3,
+            "{found}, not {exact}"
+        );
+    }
+    // The squares of such numbers are beyond f32: the slopes stay numbers.
+    let largest = [[i32::MAX, i32::MIN], [i32::MIN, i32::MAX]];
+    let [one, other] = largest;
+    let found = tilt_of(&[one, one, other, other], [0.5, -0.5]);
+    assert!(found.iter().all(|slope| slope.abs() <= 1.0), "{found:?}");
+}
+
+/// Every symbol of a code, against the one that the encoder chooses.
+fn chosen_is_best<const N: usize>(
+    code: &Code,
+    layout: Layout<N>,
+    choices: &Choices<N>,
+    pairs: [[i32; 2]; N],
+) {
+    let chosen = choices.choose(&pairs);
+    let fewest = (0..layout.symbols() as u32).filter_map(|symbol| {
+        let (_, length) = code.encode(symbol)?;
+        let widths = layout.widths(symbol);
+        let holds = widths
+            .iter()
+            .zip(&pairs)
+            .all(|(bits, pair)| width(*pair) <= *bits);
+        holds.then(|| length + 2 * widths.iter().sum::<u32>())
+    });
+    assert_eq!(Some(chosen.bits), fewest.min(), "{pairs:?}");
+    assert_eq!(chosen.widths, layout.widths(chosen.symbol));
 }
 
 fn quad() -> impl Strategy<Value = Quad> {
@@ -297,6 +342,21 @@ proptest! {
             *byte = value;
         }
         decoded(&tile, &bytes);
+    }
+
+    #[test]
+    fn widths_are_told_in_fewest_bits(shifts in prop::array::uniform4(0..32u32), bits in any::<i32>()) {
+        let codes = Codes::get();
+        let choices = codes.choices();
+        let [a, b, c, d] = shifts.map(|shift| [bits >> shift, !(bits >> shift) / 2]);
+        chosen_is_best(&codes.first, DX_AND_UV, &choices.first, [a, b]);
+        for (code, choices) in codes.rest.codes.iter().zip(&choices.rest) {
+            chosen_is_best(code, DY_AND_CROSS, choices, [c, d]);
+        }
+        // What a correction may hold.
+        let within = |[u, v]: [i32; 2], bits: u32| [u >> (32 - bits), v >> (32 - bits)];
+        let correction = [within(a, 5), within(b, 9), within(c, 9), within(d, 16)];
+        chosen_is_best(&codes.correction, CORRECTION, &choices.correction, correction);
     }
 
     #[test]

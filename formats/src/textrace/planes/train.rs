@@ -1,6 +1,6 @@
 //! Where the code lengths come from: `TEXTRACES=a.textrace:b.textrace cargo test --release
 //! -p formats --lib planes::train -- --ignored --nocapture` counts symbols in traces and prints
-//! `lengths.rs` for them.
+//! `lengths.rs` for them, `ROUNDS` times over, of every `EVERY`th tile; and where the bits of a record go.
 #![allow(
     clippy::indexing_slicing,
     clippy::cast_possible_truncation,
@@ -12,6 +12,7 @@ use super::encode::{self, Sink};
 use super::lengths::LENGTHS;
 use super::places::ESCAPE_PLACE;
 use super::residual::ESCAPE_SIZES;
+use super::widths::{CORRECTION, DX_AND_UV, DY_AND_CROSS};
 use crate::textrace::{Textrace, Tile};
 use std::path::Path;
 
@@ -43,16 +44,56 @@ impl Counts {
     }
 }
 
+/// Rows of the table in benches/encodings.md, and the row of each code.
+const ROWS: [&str; 6] = [
+    "places",
+    "first quads",
+    "corrections",
+    "classes",
+    "wide",
+    "runs",
+];
+
+fn row(code: usize) -> usize {
+    match code {
+        0..17 => 0,
+        17..41 => 3,
+        41..48 => 1,
+        48 => 4,
+        49..54 => 2,
+        _ => 5,
+    }
+}
+
+/// The code of parents' numbers.
+const PARENT: usize = CODES - 2;
+
+/// Bits of the numbers that a symbol of a first quad tells.
+fn told_bits(code: usize, symbol: u32) -> u32 {
+    let both = match code {
+        41 => DX_AND_UV.widths(symbol).iter().sum(),
+        42..=47 => DY_AND_CROSS.widths(symbol).iter().sum(),
+        49 => CORRECTION.widths(symbol).iter().sum(),
+        _ => 0,
+    };
+    2 * both + if code == PARENT { symbol } else { 0 }
+}
+
 impl Sink for Counts {
     fn bits(&mut self, _: u32, count: u32) {
-        self.bits[self.last][1] += u64::from(count);
+        // A first quad's numbers follow all of its symbols, which have told their bits.
+        if !matches!(row(self.last), 1 | 2) {
+            self.bits[self.last][1] += u64::from(count);
+        }
     }
 
     fn symbol(&mut self, code: &Code, symbol: u32, escape: u32) -> bool {
         self.last = code.number;
         self.by_code[code.number][symbol as usize] += 1;
         let length = code.length(symbol, code.length(escape, 0));
-        self.bits[code.number][0] += u64::from(length);
+        let [of_symbols, of_numbers] = &mut self.bits[code.number];
+        *of_symbols += u64::from(length);
+        *of_numbers += u64::from(told_bits(code.number, symbol));
         code.encode(symbol).is_some()
     }
 }
@@ -95,7 +136,8 @@ fn train() {
         .map(|path| Textrace::open(Path::new(path)).unwrap())
         .collect();
     let mut texts: Vec<String> = LENGTHS.iter().map(|l| (*l).to_owned()).collect();
-    for _ in 0..4 {
+    let rounds = std::env::var("ROUNDS").map_or(4, |rounds| rounds.parse().unwrap());
+    for _ in 0..rounds {
         let codes = Codes::new(texts.as_slice().try_into().unwrap());
         let mut sums = vec![];
         for trace in &traces {
@@ -112,19 +154,19 @@ fn train() {
                     counts.add(&back);
                 }
             }
-            let by_code: Vec<String> = counts
-                .bits
+            let mut rows = [0.0; ROWS.len()];
+            for (code, bits) in counts.bits.iter().enumerate() {
+                rows[row(code)] += bits.iter().sum::<u64>() as f64 / records as f64;
+            }
+            let bytes = rows.iter().sum::<f64>() / 8.0;
+            let rows = ROWS
                 .iter()
-                .map(|b| {
-                    b.map(|b| format!("{:.2}", b as f64 / records as f64))
-                        .join("+")
-                })
-                .collect();
-            let bits: u64 = counts.bits.as_flattened().iter().sum();
+                .zip(rows)
+                .map(|(row, bits)| format!("{row} {bits:.2}"));
+            let rows: Vec<String> = rows.collect();
             println!(
-                "{records} records, {:.3} bytes each; {}",
-                bits as f64 / 8.0 / records as f64,
-                by_code.join(" ")
+                "{records} records, {bytes:.3} bytes each; bits: {}",
+                rows.join(", ")
             );
             sums.push((counts.by_code, records));
         }
@@ -137,17 +179,21 @@ fn train() {
                         *sum += count * 100_000_000 / *records as u64;
                     }
                 }
+                // What tells symbols that are not in the code, and whether it is told instead of them: of widths,
+                // other symbols are.
                 let escape = match code {
-                    0..17 => Some(ESCAPE_PLACE as usize),
-                    17..41 => Some(ESCAPE_SIZES as usize),
+                    0..17 => Some((ESCAPE_PLACE as usize, true)),
+                    17..41 => Some((ESCAPE_SIZES as usize, true)),
+                    41..=47 | 49 => Some((counts.len() - 1, false)),
                     _ => None,
                 };
                 let total: u64 = counts.iter().sum();
-                if let Some(escape) = escape {
+                if let Some((escape, instead)) = escape {
                     let rare = total >> MOST_BITS;
                     for symbol in (0..counts.len()).filter(|s| *s != escape) {
                         if counts[symbol] < rare {
-                            counts[escape] += std::mem::take(&mut counts[symbol]);
+                            let count = std::mem::take(&mut counts[symbol]);
+                            counts[escape] += if instead { count } else { 0 };
                         }
                     }
                     counts[escape] = counts[escape].max(1);
