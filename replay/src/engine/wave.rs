@@ -65,7 +65,8 @@ impl Wave<'_> {
             let share = |pass| (pass, Arc::clone(&frame));
             let all: Vec<_> = passes.iter_mut().map(share).collect();
             drop(frame);
-            let all = all.into_par_iter().with_max_len(1);
+            // One after the other, as threads come free: of passes together the first ones take longest.
+            let all = all.into_iter().par_bridge();
             let Some(&next) = frames.get(index + 1) else {
                 return all.try_for_each(|(pass, frame)| {
                     let machine = replay(pass, &frame)?;
