@@ -229,18 +229,6 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::HashMap;
 
-    /// A bundle of footprints, four lines each.
-    fn bundle(footprints: &[[u32; 4]]) -> Bundle {
-        let mut bundle = Bundle::default();
-        bundle.begin(0);
-        let mut last = [0; 4];
-        for &texels in footprints {
-            bundle.push(texels, &mut last);
-        }
-        bundle.list_distinct();
-        bundle
-    }
-
     /// Bundles of up to four footprints: their cell, a base for their lines, the lines.
     fn bundles() -> impl Strategy<Value = Vec<(u32, u32, Vec<[u32; 4]>)>> {
         let line = || prop_oneof![0_u32..3, 0_u32..30];
@@ -264,7 +252,7 @@ mod tests {
                 distinct.begin(tile.distinct.len());
                 let mut footprints = 0;
                 for (cell, base, texels) in bundles {
-                    let bundle = bundle(texels);
+                    let bundle = Bundle::of(texels);
                     footprints += u32::from(bundle.count);
                     let mut lookups = 0;
                     for (index, times) in bundle.runs() {

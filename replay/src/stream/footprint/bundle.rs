@@ -45,9 +45,21 @@ impl Bundle {
         runs(self.count, self.repeats)
     }
 
+    /// Footprints of level 0 and their distinct lines.
+    #[cfg(test)]
+    pub fn of(footprints: &[[u32; 4]]) -> Self {
+        let mut bundle = Self::default();
+        let mut last = [0; 4];
+        for &texels in footprints {
+            bundle.push(texels, &mut last);
+        }
+        bundle.list_distinct();
+        bundle
+    }
+
     /// Lists its distinct lines, for [`Self::distinct`].
     #[inline(always)]
-    pub fn list_distinct(&mut self) {
+    pub(super) fn list_distinct(&mut self) {
         let distinct = &mut self.distinct;
         distinct.begin();
         for (index, times) in runs(self.count, self.repeats) {
@@ -246,16 +258,6 @@ impl DistinctLines {
 mod tests {
     use super::*;
 
-    fn bundle(footprints: &[[u32; 4]]) -> Bundle {
-        let mut bundle = Bundle::default();
-        bundle.begin(0);
-        let mut last = [0; 4];
-        footprints
-            .iter()
-            .for_each(|&texels| bundle.push(texels, &mut last));
-        bundle
-    }
-
     #[test]
     fn lines_of_a_footprint_are_distinct_and_in_texel_order() {
         for (texels, lines) in [
@@ -266,7 +268,7 @@ mod tests {
             ([5, 6, 6, 7], &[5, 6, 7]),
             ([9, 3, 7, 1], &[9, 3, 7, 1]),
         ] {
-            assert_eq!(bundle(&[texels]).lines_of(0), lines);
+            assert_eq!(Bundle::of(&[texels]).lines_of(0), lines);
         }
     }
 
@@ -279,7 +281,11 @@ mod tests {
             (2, &[(0, 2)]),
             (4, &[(0, 2), (2, 1), (3, 1)]),
         ] {
-            assert!(bundle(&footprints[..count]).runs().eq(runs.iter().copied()));
+            assert!(
+                Bundle::of(&footprints[..count])
+                    .runs()
+                    .eq(runs.iter().copied())
+            );
         }
     }
 }
