@@ -25,7 +25,7 @@ fn each<A: Copy, T>([a, b, c, d]: [A; 4], f: impl Fn(A) -> T) -> [T; 4] {
 /// How many fixed-point steps a texel has.
 #[derive(Clone, Copy, Debug)]
 enum Step {
-    /// `1 << n` steps, n at least 2: the usual case, since sizes in a group differ by powers of two.
+    /// `1 << n` steps, n from 2 to 31: the usual case, since sizes in a group differ by powers of two.
     Shift(u32),
     /// `numerator / size` steps.
     Ratio(i64),
@@ -37,7 +37,9 @@ impl Axis {
     pub fn new(steps: i64, wrap: Wrap, offset: i8, bytes: Vec<u32>) -> Self {
         let size = bytes.len() as i64;
         let of_texel = steps / size;
-        let exact = steps % size == 0 && (of_texel as u64).is_power_of_two() && of_texel >= 4;
+        let shifts = 4..=1 << (i32::BITS - 1);
+        let exact =
+            steps % size == 0 && (of_texel as u64).is_power_of_two() && shifts.contains(&of_texel);
         Self {
             size: size as i32,
             wrap,
@@ -139,4 +141,27 @@ fn mirrored(texel: i64, size: i32) -> i32 {
     let size = i64::from(size);
     let there_and_back = texel.rem_euclid(2 * size);
     there_and_back.min(2 * size - 1 - there_and_back) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Texels of any size against the same by division, at the ends of the coordinates, too.
+    #[test]
+    fn shifts_are_divisions_whatever_the_extent() {
+        let bytes: Vec<u32> = (0..8).collect();
+        let coordinates = [i32::MIN, -1_234_567_891, -1, 0];
+        for bits in 3..46 {
+            for wrap in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge] {
+                let steps = 1_i64 << bits;
+                let axis = Axis::new(steps, wrap, -3, bytes.clone());
+                for of in [coordinates, coordinates.map(|c| !c), [7, 8, 9, 1_000_003]] {
+                    assert_eq!(axis.linear(of), axis.linear_by_ratio(steps, of), "{bits}");
+                    let nearest = of.map(|c| axis.byte((8 * i64::from(c)).div_euclid(steps) - 3));
+                    assert_eq!(axis.nearest(of), nearest, "{bits}");
+                }
+            }
+        }
+    }
 }
