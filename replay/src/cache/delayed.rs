@@ -12,20 +12,11 @@ use super::{Cache, FourWayLru};
 /// When a line arrives that nobody has asked for.
 pub const NOT_ASKED: u64 = u64::MAX;
 
-/// A line that is not there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Missing {
-    /// Its index among those that were looked up.
-    pub index: u32,
-    /// When it arrives, or [`NOT_ASKED`].
-    pub arrival: u64,
-}
-
 /// A cache and what is on its way into it.
 pub trait DelayedFill: Send {
-    /// Looks up lines, which marks those that are there as used, and lists the others. When the last of
-    /// these arrives: 0 if all are there, [`NOT_ASKED`] if nobody has asked for one of them.
-    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: &mut Vec<Missing>) -> u64;
+    /// Looks up lines, which marks those that are there as used. Of the others it tells the index, in
+    /// order, and when the line arrives: [`NOT_ASKED`] if nobody has asked for it.
+    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: impl FnMut(usize, u64));
 
     /// Looks up a line, which marks it used. When it arrives: 0 if it is there, [`NOT_ASKED`] if nobody
     /// has asked for it.
@@ -79,20 +70,14 @@ pub struct TimeOrder<C> {
 }
 
 impl<C: Cache> DelayedFill for TimeOrder<C> {
-    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: &mut Vec<Missing>) -> u64 {
+    fn look_up_all(&mut self, lines: &[u32], now: u64, mut missing: impl FnMut(usize, u64)) {
         self.in_flight.arrive(now, &mut self.cache);
-        let (mut latest, mut start) = (0, 0);
+        let mut start = 0;
         while let Some(index) = self.cache.lookup_all(&lines[start..]) {
             let index = start + index;
-            let arrival = self.in_flight.arrival(lines[index]).unwrap_or(NOT_ASKED);
-            missing.push(Missing {
-                index: index as u32,
-                arrival,
-            });
-            latest = latest.max(arrival);
+            missing(index, self.in_flight.arrival(lines[index]).unwrap_or(NOT_ASKED));
             start = index + 1;
         }
-        latest
     }
 
     fn look_up(&mut self, line: u32, now: u64) -> u64 {

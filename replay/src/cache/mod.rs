@@ -15,7 +15,7 @@ mod random;
 mod set_order;
 mod tree_plru;
 
-pub use delayed::{Delay, DelayedFill, Missing, NOT_ASKED};
+pub use delayed::{Delay, DelayedFill, NOT_ASKED};
 pub use forest::Forest;
 pub use levels::Levels;
 #[cfg(test)]

@@ -67,8 +67,13 @@ impl OnTheWay {
     #[inline(always)]
     pub(super) fn enter(&mut self, line: u32, now: u64, arrival: u64) {
         let Bucket { lines, arrivals } = &mut self.buckets[bucket(line)];
-        match arrivals.iter().position(|&other| other <= now) {
-            Some(place) => (lines[place], arrivals[place]) = (line, arrival),
+        let mut place = arrivals.len();
+        for (index, &other) in arrivals.iter().enumerate() {
+            // No branches either.
+            place = select_unpredictable(other <= now, index, place);
+        }
+        match arrivals.get_mut(place) {
+            Some(free) => (lines[place], *free) = (line, arrival),
             None => self.enter_other(line, now, arrival),
         }
     }

@@ -4,10 +4,9 @@
 //! but when somebody comes to the set next. Each set keeps what is on its way into it: no calendar.
 
 use super::EMPTY;
-use super::delayed::{DelayedFill, Missing, NOT_ASKED};
+use super::delayed::{DelayedFill, NOT_ASKED};
 use super::lru::look_up;
 use super::on_the_way::OnTheWay;
-use std::hint::select_unpredictable;
 
 /// A line on its way.
 #[derive(Clone, Copy, Debug)]
@@ -163,24 +162,19 @@ impl Set {
 
 impl DelayedFill for SetOrder {
     #[inline(always)]
-    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: &mut Vec<Missing>) -> u64 {
-        let mut latest = 0;
+    fn look_up_all(&mut self, lines: &[u32], now: u64, mut missing: impl FnMut(usize, u64)) {
         let (sets, laters) = (&mut *self.sets, &mut *self.later);
         let mask = sets.len() - 1;
-        for (at, &line) in (0..).zip(lines) {
+        for (at, &line) in lines.iter().enumerate() {
             let index = line as usize & mask;
             let set = &mut sets[index];
             if set.due <= now {
                 set.settle(&mut laters[index], now);
             }
             if !look_up(&mut set.tags, line) {
-                let arrival = set.arrival(&self.on_the_way, line, now);
-                // Not the larger of both by a branch: a coin toss to the processor.
-                latest = select_unpredictable(arrival > latest, arrival, latest);
-                missing.push(Missing { index: at, arrival });
+                missing(at, set.arrival(&self.on_the_way, line, now));
             }
         }
-        latest
     }
 
     #[inline(always)]
@@ -264,14 +258,11 @@ mod tests {
                     sets.clear();
                 }
                 let [mut expected, mut found] = [Vec::new(), Vec::new()];
-                prop_assert_eq!(
-                    sets.look_up_all(&lines, now, &mut found),
-                    general.look_up_all(&lines, now, &mut expected)
-                );
+                sets.look_up_all(&lines, now, |index, arrival| found.push((index, arrival)));
+                general.look_up_all(&lines, now, |index, arrival| expected.push((index, arrival)));
                 prop_assert_eq!(&found, &expected);
-                let absent = found.iter().filter(|missing| missing.arrival == NOT_ASKED);
-                for missing in absent {
-                    let line = lines[missing.index as usize];
+                for (index, _) in found.iter().filter(|(_, arrival)| *arrival == NOT_ASKED) {
+                    let line = lines[*index];
                     // Somebody before it in the list may have asked for it just now.
                     prop_assert_eq!(sets.look_up(line, now), general.look_up(line, now));
                     if sets.arrival(line, now) == NOT_ASKED && sets.look_up(line, now) != 0 {

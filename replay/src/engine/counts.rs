@@ -70,6 +70,33 @@ impl CacheCounts {
         self.cells[cell].l1.secondary += u64::from(lines);
     }
 
+    /// Counts a line that a footprint fetches. `missed`: whether this footprint has fetched a line into
+    /// the L1 and into the L2; true from now on for what it has.
+    #[inline(always)]
+    pub fn line(
+        &mut self,
+        cell: usize,
+        tile: usize,
+        misses: &FootprintMisses,
+        missed: &mut [bool; 2],
+    ) {
+        let CellMisses { l1, l2 } = &mut self.cells[cell];
+        // Sums without branches: whether it is the footprint of the line before is a coin toss.
+        let from_memory = misses.l2_lines > 0;
+        let [first, first_from_memory] = [!missed[0], from_memory & !missed[1]].map(u32::from);
+        l1.footprints += u64::from(first);
+        l1.lines += u64::from(misses.l1_lines);
+        l1.secondary += u64::from(misses.l1_secondary);
+        l2.footprints += u64::from(first_from_memory);
+        l2.lines += u64::from(misses.l2_lines);
+        l2.secondary += u64::from(misses.l2_secondary);
+        if let Some(tile) = self.tiles.get_mut(tile) {
+            tile.l1_footprints += first;
+            tile.l2_lines += misses.l2_lines;
+        }
+        *missed = [true, missed[1] | from_memory];
+    }
+
     /// Counts a footprint that did not find all its lines.
     #[inline]
     pub fn footprint(&mut self, cell: usize, tile: usize, misses: &FootprintMisses) {

@@ -5,4 +5,4 @@ mod closed_form;
 mod pipeline;
 
 pub use closed_form::closed_form;
-pub use pipeline::{Pending, Pipeline, PipelineStats, Turn};
+pub use pipeline::{Pending, Pipeline, PipelineStats, Turn, Waiting};

@@ -77,12 +77,77 @@ pub struct Pending {
     pub segment: u32,
 }
 
+/// What a thread that enters waits for.
+#[derive(Clone, Debug)]
+pub struct Waiting {
+    /// A segment's follow each other.
+    list: Vec<Pending>,
+    /// Those of its footprints that wait, of all segments one over the other.
+    footprints: u32,
+    /// When the first of what they wait for is there.
+    earliest: u64,
+}
+
+impl Default for Waiting {
+    fn default() -> Self {
+        Self {
+            list: Vec::new(),
+            footprints: 0,
+            earliest: u64::MAX,
+        }
+    }
+}
+
+impl Waiting {
+    /// For nothing.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.footprints = 0;
+        self.earliest = u64::MAX;
+    }
+
+    /// True if all is there.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// For this as well.
+    #[inline(always)]
+    pub fn push(&mut self, pending: Pending) {
+        self.footprints |= pending.footprints;
+        self.earliest = self.earliest.min(pending.ready);
+        self.list.push(pending);
+    }
+
+    /// After pushes in another order than that of segments.
+    pub fn sort_by_segment(&mut self) {
+        self.list.sort_by_key(|pending| pending.segment);
+    }
+
+    /// How many footprints wait.
+    #[inline(always)]
+    fn count(&self) -> u32 {
+        match is_one_segment(&self.list) {
+            true => self.footprints.count_ones(),
+            false => of_segments(&self.list),
+        }
+    }
+}
+
+#[inline(always)]
+fn is_one_segment(list: &[Pending]) -> bool {
+    let segment = |one: Option<&Pending>| one.map(|one| one.segment);
+    segment(list.first()) == segment(list.last())
+}
+
 /// Drops what has arrived by `now`: how many footprints wait still, and when the first of what they wait
 /// for is there.
 #[inline(always)]
 fn drop_arrived(pending: &mut Vec<Pending>, now: u64) -> (u32, u64) {
-    let segment = |one: Option<&Pending>| one.map(|one| one.segment);
-    let one_segment = segment(pending.first()) == segment(pending.last());
+    let one_segment = is_one_segment(pending);
     let (mut footprints, mut earliest) = (0, u64::MAX);
     let mut kept = 0;
     for at in 0..pending.len() {
@@ -219,32 +284,33 @@ impl Pipeline {
         self.trip((waited - thread.waiting).into(), thread);
     }
 
-    /// A new thread enters now. `pending` is what those of its `footprints` that miss wait for, all of it
-    /// after now; the list is taken, and another one is left for it.
+    /// A new thread enters now. What those of its `footprints` that miss wait for is there after now;
+    /// the list is taken, and another one is left for it.
     #[inline(always)]
-    pub fn start(&mut self, footprints: u32, pending: &mut Vec<Pending>) {
+    pub fn start(&mut self, footprints: u32, waiting: &mut Waiting) {
         self.stats.threads += 1;
-        if pending.is_empty() {
+        if waiting.is_empty() {
             self.stats.useful += u64::from(footprints);
             self.clock += u64::from(footprints);
         } else {
-            self.start_looping(footprints, pending);
+            self.start_looping(footprints, waiting);
         }
     }
 
-    fn start_looping(&mut self, footprints: u32, pending: &mut Vec<Pending>) {
+    #[inline(never)]
+    fn start_looping(&mut self, footprints: u32, waiting: &mut Waiting) {
+        debug_assert!(waiting.earliest > self.clock);
         let list = self.spare.pop().unwrap_or_else(|| {
             self.pending.push(Vec::new());
             self.pending.len() as u32 - 1
         });
-        let (waiting, earliest) = drop_arrived(pending, self.clock);
         let thread = Looping {
             back: 0,
-            earliest,
-            waiting,
+            earliest: waiting.earliest,
+            waiting: waiting.count(),
             list,
         };
-        std::mem::swap(&mut self.pending[list as usize], pending);
+        std::mem::swap(&mut self.pending[list as usize], &mut waiting.list);
         self.trip((footprints - thread.waiting).into(), thread);
     }
 
@@ -298,8 +364,9 @@ mod tests {
                             footprints: 1 << (number % 32),
                             segment: number / 32,
                         });
-                        let mut pending: Vec<Pending> = pending.collect();
-                        pipeline.start(hits + pending.len() as u32, &mut pending);
+                        let mut waiting = Waiting::default();
+                        pending.for_each(|one| waiting.push(one));
+                        pipeline.start(hits + latencies.len() as u32, &mut waiting);
                     }
                     None => pipeline.drain(),
                 },

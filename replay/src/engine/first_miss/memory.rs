@@ -3,7 +3,7 @@
 
 use super::super::counts::{CacheCounts, CellMisses};
 use super::thread::{FETCHES_UNTIL_KEPT, Thread};
-use crate::cache::{Delay, DelayedFill, Levels, Missing, NOT_ASKED};
+use crate::cache::{Delay, DelayedFill, Levels, NOT_ASKED};
 use crate::config::TmuConfig;
 use crate::result::FirstLookups;
 
@@ -23,8 +23,8 @@ pub struct Memory<D> {
     l1_penalty_cycles: u64,
     l2_penalty_cycles: u64,
     counts: CacheCounts,
-    /// Lines of the footprint looked up last that were not there, by core.
-    missing: Vec<Vec<Missing>>,
+    /// Lines of the footprint looked up last that were not there, by core: index and arrival.
+    missing: Vec<Vec<(usize, u64)>>,
     first: FirstLookups,
     /// Look-ups that found their data with the thread, not in the cache.
     pub forwarded: u64,
@@ -79,9 +79,11 @@ impl<D: DelayedFill> Memory<D> {
     pub fn look_up(&mut self, core: usize, now: u64, lines: &[u32]) -> Seen {
         let missing = &mut self.missing[core];
         missing.clear();
-        match self.l1[core].look_up_all(lines, now, missing) {
-            0 => Seen::All,
-            _ => Seen::NotAll,
+        self.l1[core].look_up_all(lines, now, |index, arrival| missing.push((index, arrival)));
+        if missing.is_empty() {
+            Seen::All
+        } else {
+            Seen::NotAll
         }
     }
 
@@ -101,8 +103,8 @@ impl<D: DelayedFill> Memory<D> {
         self.first.l1_misses += u64::from(first);
         let CellMisses { l1, l2 } = &mut self.counts.cells[cell];
         let (mut fetched, mut from_memory, mut latest) = (0_u32, 0_u32, now);
-        for &Missing { index, arrival } in &self.missing[core] {
-            let line = footprint.lines[index as usize];
+        for &(index, arrival) in &self.missing[core] {
+            let line = footprint.lines[index];
             let known = arrival != NOT_ASKED;
             // A line on its way into the L1 is a miss of the L2 until memory has sent it.
             let in_l2 = match known {

@@ -7,17 +7,19 @@
 //! footprints only where one of them was not there.
 
 use super::super::counts::{CacheCounts, FootprintMisses};
-use crate::cache::{Delay, DelayedFill, Levels, Missing, NOT_ASKED};
+use crate::cache::{Delay, DelayedFill, Levels, NOT_ASKED};
 use crate::config::TmuConfig;
 use crate::stream::{QuadLines, Use};
-use crate::tmu::Pending;
+use crate::tmu::{Pending, Waiting};
 use std::hint::select_unpredictable;
 
 /// A core's L1, and the thread that was looked up last.
 struct First<D> {
     cache: D,
-    /// Its distinct lines that are not there.
-    missing: Vec<Missing>,
+    /// For what it waits.
+    waiting: Waiting,
+    /// Its distinct lines that nobody has asked for: their indices.
+    absent: Vec<usize>,
 }
 
 /// What a thread finds in its core's own cache.
@@ -37,10 +39,8 @@ pub struct Memory<D> {
     l2: D,
     tmu: TmuConfig,
     counts: CacheCounts,
-    /// What the current thread waits for.
-    pending: Vec<Pending>,
     /// Of a segment the lines that nobody has asked for: index by first use.
-    absent: [u32; Use::FIRST_LINES],
+    by_first_use: [usize; Use::FIRST_LINES],
 }
 
 /// Lines that a thread asked for: so many in each of its trips.
@@ -63,15 +63,15 @@ impl<D: DelayedFill> Memory<D> {
         let Levels { l1, l2 } = levels.delayed(l1_cycles, memory_cycles);
         let first = |cache| First {
             cache,
-            missing: Vec::new(),
+            waiting: Waiting::default(),
+            absent: Vec::new(),
         };
         Self {
             l1: l1.into_iter().map(first).collect(),
             l2,
             tmu,
             counts,
-            pending: Vec::new(),
-            absent: [0; Use::FIRST_LINES],
+            by_first_use: [0; Use::FIRST_LINES],
         }
     }
 
@@ -86,148 +86,176 @@ impl<D: DelayedFill> Memory<D> {
         self.l2.clear();
     }
 
-    /// Looks up all lines of a thread that enters `now`, in its core's own cache. Unless all are
-    /// there, [`Self::ask`] says what it waits for.
+    /// Looks up all lines of a thread that enters `now`, in its core's own cache. If nobody has asked for
+    /// some of them, [`Self::ask`] is to be called.
     #[inline(always)]
     pub fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> Found {
-        let First { cache, missing } = &mut self.l1[core];
-        missing.clear();
+        let First {
+            cache,
+            waiting,
+            absent,
+        } = &mut self.l1[core];
+        waiting.clear();
+        absent.clear();
         if self.tmu.l1_penalty_cycles == 0 || quad.distinct.is_empty() {
             return Found::NotAll;
         }
-        match cache.look_up_all(quad.distinct, now, missing) {
-            0 => Found::All,
-            NOT_ASKED => Found::NotAll,
-            _ => Found::OnTheirWay,
+        let counts = &mut self.counts;
+        let mut look_up = |start: usize, end: usize, segment: u32| {
+            cache.look_up_all(&quad.distinct[start..end], now, |index, arrival| {
+                let index = start + index;
+                if arrival == NOT_ASKED {
+                    absent.push(index);
+                    return;
+                }
+                let footprints = quad.uses[index].footprints();
+                counts.secondary(quad.distinct_cell(index), footprints.count_ones());
+                waiting.push(Pending {
+                    ready: arrival,
+                    footprints,
+                    segment,
+                });
+            });
+        };
+        let mut start = 0;
+        for (segment, end) in (0..).zip(quad.segments()) {
+            look_up(start, end, segment);
+            start = end;
+        }
+        match (absent.is_empty(), waiting.is_empty()) {
+            (false, _) => Found::NotAll,
+            (true, false) => Found::OnTheirWay,
+            (true, true) => Found::All,
         }
     }
 
-    /// Asks for the lines that are missing, once it is the core's turn at the L2: what the thread's
-    /// footprints wait for.
+    /// What the thread that was looked up last waits for.
+    #[inline(always)]
+    pub fn waiting(&mut self, core: usize) -> &mut Waiting {
+        &mut self.l1[core].waiting
+    }
+
+    /// Asks for the lines that nobody has asked for, once it is the core's turn at the L2: what the
+    /// thread's footprints wait for.
     #[inline(never)]
-    pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Vec<Pending> {
-        self.pending.clear();
-        let mut trips = Trips::default();
-        let missing = std::mem::take(&mut self.l1[core].missing);
-        if missing.is_empty() {
-            self.one_by_one(core, now, quad, &mut trips);
+    pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Waiting {
+        let First {
+            cache,
+            waiting,
+            absent,
+        } = &mut self.l1[core];
+        let mut asking = Asking {
+            l1: cache,
+            l2: &mut self.l2,
+            tmu: &self.tmu,
+            counts: &mut self.counts,
+            waiting,
+            now,
+            trips: Trips::default(),
+        };
+        if absent.is_empty() {
+            asking.one_by_one(quad);
         } else if quad.is_one_segment() {
             // Nearly all quads: nothing to search for where a segment ends.
-            self.segment(core, now, quad, &missing, 0, &mut trips);
+            asking.segment(quad, absent, 0, &mut self.by_first_use);
         } else {
-            let mut rest = &*missing;
+            let mut rest = &**absent;
             for (segment, end) in (0..).zip(quad.segments()) {
                 if rest.is_empty() {
                     break;
                 }
-                let inside = |missing: &&Missing| (missing.index as usize) < end;
+                let inside = |index: &&usize| **index < end;
                 let (own, others) = rest.split_at(rest.iter().take_while(inside).count());
-                self.segment(core, now, quad, own, segment, &mut trips);
+                asking.segment(quad, own, segment, &mut self.by_first_use);
                 rest = others;
             }
+            waiting.sort_by_segment();
         }
-        self.l1[core].missing = missing;
-        &mut self.pending
+        waiting
     }
+}
 
-    /// Lines of a segment are not there: asks for those that nobody has asked for, and says who
-    /// waits for them.
+/// A thread that asks for its lines.
+struct Asking<'m, D> {
+    l1: &'m mut D,
+    l2: &'m mut D,
+    tmu: &'m TmuConfig,
+    counts: &'m mut CacheCounts,
+    waiting: &'m mut Waiting,
+    now: u64,
+    trips: Trips,
+}
+
+impl<D: DelayedFill> Asking<'_, D> {
+    /// Asks for the `absent` lines of a segment in the order in which its footprints do.
     #[inline(always)]
     fn segment(
         &mut self,
-        core: usize,
-        now: u64,
         quad: &QuadLines<'_>,
-        missing: &[Missing],
+        absent: &[usize],
         segment: u32,
-        trips: &mut Trips,
+        by_first_use: &mut [usize; Use::FIRST_LINES],
     ) {
-        let mut absent = 0_u128;
-        for &Missing { index, arrival } in missing {
-            let of = quad.uses[index as usize];
-            if arrival == NOT_ASKED {
-                absent |= 1 << of.first_line();
-                self.absent[of.first_line()] = index;
-            } else {
-                let cell = quad.distinct_cell(index as usize);
-                self.counts.secondary(cell, of.footprints().count_ones());
-                self.pending.push(Pending {
-                    ready: arrival,
-                    footprints: of.footprints(),
-                    segment,
-                });
-            }
+        // A bit for the first use of each.
+        let mut rest = 0_u128;
+        for &index in absent {
+            let first = quad.uses[index].first_line();
+            rest |= 1 << first;
+            by_first_use[first] = index;
         }
-        if absent != 0 {
-            self.fetch_absent(core, now, quad, absent, segment, trips);
-        }
-    }
-
-    /// Asks for the absent lines of a segment, a bit for the first use of each, in the order in which
-    /// the footprints do.
-    #[inline(always)]
-    fn fetch_absent(
-        &mut self,
-        core: usize,
-        now: u64,
-        quad: &QuadLines<'_>,
-        mut absent: u128,
-        segment: u32,
-        trips: &mut Trips,
-    ) {
         let mut asking = 0;
-        let mut misses = FootprintMisses::default();
-        let mut cell = 0;
-        while absent != 0 {
-            let index = self.absent[absent.trailing_zeros() as usize] as usize;
-            absent &= absent - 1;
+        // Of the footprint that asks: whether it has fetched, and from memory.
+        let mut missed = [false; 2];
+        while rest != 0 {
+            let index = by_first_use[rest.trailing_zeros() as usize];
+            rest &= rest - 1;
             let (line, of) = (quad.distinct[index], quad.uses[index]);
             let users = of.footprints();
             let first_user = users & users.wrapping_neg();
-            if first_user != asking {
-                if asking != 0 {
-                    self.counts.footprint(cell, quad.tile(), &misses);
-                }
-                misses = FootprintMisses::default();
-                asking = first_user;
-                cell = quad.distinct_cell(index);
-            }
+            missed = missed.map(|missed| missed & (first_user == asking));
+            asking = first_user;
             // Another segment, or another cell of this one, may have asked for it just now.
             let known = match of.may_be_listed() {
-                true => self.l1[core].cache.arrival(line, now),
+                true => self.l1.arrival(line, self.now),
                 false => NOT_ASKED,
             };
+            let cell = quad.distinct_cell(index);
             let ready = if known == NOT_ASKED {
-                misses.l1_lines += 1;
-                misses.l1_secondary += users.count_ones() - 1;
-                self.fetch(core, now, line, &mut misses, trips)
+                let mut misses = FootprintMisses {
+                    l1_lines: 1,
+                    l1_secondary: users.count_ones() - 1,
+                    ..FootprintMisses::default()
+                };
+                let ready = self.fetch(line, &mut misses);
+                self.counts.line(cell, quad.tile(), &misses, &mut missed);
+                ready
             } else {
-                misses.l1_secondary += users.count_ones();
+                self.counts.secondary(cell, users.count_ones());
                 known
             };
-            self.pending.push(Pending {
+            self.waiting.push(Pending {
                 ready,
                 footprints: users,
                 segment,
             });
         }
-        self.counts.footprint(cell, quad.tile(), &misses);
     }
 
     /// Looks up footprint after footprint: where a miss may fill at once, and where distinct lines
     /// are not listed.
     #[inline(never)]
-    fn one_by_one(&mut self, core: usize, now: u64, quad: &QuadLines<'_>, trips: &mut Trips) {
+    fn one_by_one(&mut self, quad: &QuadLines<'_>) {
+        let now = self.now;
         let mut number = 0;
         for footprint in quad.footprints() {
             for _ in 0..=footprint.repeats {
                 let mut misses = FootprintMisses::default();
                 let mut latest = now;
                 for &line in footprint.lines {
-                    let ready = match self.l1[core].cache.look_up(line, now) {
+                    let ready = match self.l1.look_up(line, now) {
                         NOT_ASKED => {
                             misses.l1_lines += 1;
-                            self.fetch(core, now, line, &mut misses, trips)
+                            self.fetch(line, &mut misses)
                         }
                         arrival => {
                             misses.l1_secondary += u32::from(arrival > 0);
@@ -237,7 +265,7 @@ impl<D: DelayedFill> Memory<D> {
                     latest = latest.max(ready);
                 }
                 if latest > now {
-                    self.pending.push(Pending {
+                    self.waiting.push(Pending {
                         ready: latest,
                         footprints: 1 << (number % 32),
                         segment: number / 32,
@@ -251,16 +279,9 @@ impl<D: DelayedFill> Memory<D> {
 
     /// Asks the L2 for a line that is not on its way into the L1; says when it arrives there.
     #[inline(always)]
-    fn fetch(
-        &mut self,
-        core: usize,
-        now: u64,
-        line: u32,
-        misses: &mut FootprintMisses,
-        trips: &mut Trips,
-    ) -> u64 {
-        let tmu = &self.tmu;
-        let trip = trips.next(tmu.fetches_per_trip);
+    fn fetch(&mut self, line: u32, misses: &mut FootprintMisses) -> u64 {
+        let (now, tmu) = (self.now, self.tmu);
+        let trip = self.trips.next(tmu.fetches_per_trip);
         // Without penalties nothing loops, so there is no later trip to wait for.
         let instant = tmu.l1_penalty_cycles == 0 && tmu.l2_penalty_cycles == 0;
         let wait = if instant {
@@ -282,7 +303,7 @@ impl<D: DelayedFill> Memory<D> {
             }
         };
         let in_l1 = in_l2 + u64::from(tmu.l1_penalty_cycles) + wait;
-        self.l1[core].cache.enter(line, now, in_l1);
+        self.l1.enter(line, now, in_l1);
         in_l1
     }
 }

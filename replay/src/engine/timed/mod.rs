@@ -56,8 +56,8 @@ impl<D: DelayedFill> Timed<D> {
             if std::mem::take(&mut asking[core])
                 && let Some(quad) = work.quad(core)
             {
-                let pending = self.memory.ask(core, unit.clock(), &quad);
-                unit.start(quad.footprints, pending);
+                let waiting = self.memory.ask(core, unit.clock(), &quad);
+                unit.start(quad.footprints, waiting);
             }
             clocks[core] = loop {
                 match unit.turn() {
@@ -70,14 +70,16 @@ impl<D: DelayedFill> Timed<D> {
                                 continue;
                             }
                             match self.memory.look_up(core, now, &quad) {
-                                Found::All => unit.start(quad.footprints, &mut Vec::new()),
+                                Found::All | Found::OnTheirWay => {
+                                    unit.start(quad.footprints, self.memory.waiting(core));
+                                }
                                 Found::NotAll if now > until => {
                                     asking[core] = true;
                                     break now;
                                 }
-                                Found::NotAll | Found::OnTheirWay => {
-                                    let pending = self.memory.ask(core, now, &quad);
-                                    unit.start(quad.footprints, pending);
+                                Found::NotAll => {
+                                    let waiting = self.memory.ask(core, now, &quad);
+                                    unit.start(quad.footprints, waiting);
                                 }
                             }
                         } else if now > until {
