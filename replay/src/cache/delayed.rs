@@ -15,8 +15,8 @@ pub const NOT_ASKED: u64 = u64::MAX;
 /// A cache and what is on its way into it.
 pub trait DelayedFill: Send {
     /// Looks up lines, which marks those that are there as used. Of the others it tells the index, in
-    /// order, and when the line arrives: [`NOT_ASKED`] if nobody has asked for it.
-    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: impl FnMut(usize, u64));
+    /// order, the line and when it arrives: [`NOT_ASKED`] if nobody has asked for it.
+    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: impl FnMut(usize, u32, u64));
 
     /// Looks up a line, which marks it used. When it arrives: 0 if it is there, [`NOT_ASKED`] if nobody
     /// has asked for it.
@@ -25,7 +25,8 @@ pub trait DelayedFill: Send {
     /// When a line arrives that is on its way; [`NOT_ASKED`] if it is not.
     fn arrival(&mut self, line: u32, now: u64) -> u64;
 
-    /// Fills a line that is neither there nor on its way: at once, or when it arrives.
+    /// Fills a line that is neither there nor on its way: at once, or when it arrives. It was looked up in
+    /// this cycle.
     fn enter(&mut self, line: u32, now: u64, arrival: u64);
 
     /// Takes all lines out, and forgets those on their way.
@@ -70,12 +71,14 @@ pub struct TimeOrder<C> {
 }
 
 impl<C: Cache> DelayedFill for TimeOrder<C> {
-    fn look_up_all(&mut self, lines: &[u32], now: u64, mut missing: impl FnMut(usize, u64)) {
+    fn look_up_all(&mut self, lines: &[u32], now: u64, mut missing: impl FnMut(usize, u32, u64)) {
         self.in_flight.arrive(now, &mut self.cache);
         let mut start = 0;
         while let Some(index) = self.cache.lookup_all(&lines[start..]) {
             let index = start + index;
-            missing(index, self.in_flight.arrival(lines[index]).unwrap_or(NOT_ASKED));
+            let line = lines[index];
+            let arrival = self.in_flight.arrival(line).unwrap_or(NOT_ASKED);
+            missing(index, line, arrival);
             start = index + 1;
         }
     }

@@ -21,7 +21,8 @@ struct Bucket {
 /// Lines on their way.
 #[derive(Clone, Debug)]
 pub(super) struct OnTheWay {
-    buckets: Vec<Bucket>,
+    /// As many as a hash has values, which spares checks.
+    buckets: Box<[Bucket; BUCKETS]>,
     /// For whose hash there was no place: line and arrival.
     others: Vec<(u32, u64)>,
     /// When the last of these arrives.
@@ -35,7 +36,7 @@ impl OnTheWay {
             arrivals: [0; 4],
         };
         Self {
-            buckets: vec![empty; BUCKETS],
+            buckets: Box::new([empty; BUCKETS]),
             others: Vec::new(),
             others_until: 0,
         }

@@ -162,7 +162,7 @@ impl Set {
 
 impl DelayedFill for SetOrder {
     #[inline(always)]
-    fn look_up_all(&mut self, lines: &[u32], now: u64, mut missing: impl FnMut(usize, u64)) {
+    fn look_up_all(&mut self, lines: &[u32], now: u64, mut missing: impl FnMut(usize, u32, u64)) {
         let (sets, laters) = (&mut *self.sets, &mut *self.later);
         let mask = sets.len() - 1;
         for (at, &line) in lines.iter().enumerate() {
@@ -172,7 +172,7 @@ impl DelayedFill for SetOrder {
                 set.settle(&mut laters[index], now);
             }
             if !look_up(&mut set.tags, line) {
-                missing(at, set.arrival(&self.on_the_way, line, now));
+                missing(at, line, set.arrival(&self.on_the_way, line, now));
             }
         }
     }
@@ -196,7 +196,9 @@ impl DelayedFill for SetOrder {
 
     #[inline(always)]
     fn enter(&mut self, line: u32, now: u64, arrival: u64) {
-        let (set, later) = self.settled(line, now);
+        let index = line as usize & (self.sets.len() - 1);
+        let (set, later) = (&mut self.sets[index], &mut self.later[index]);
+        debug_assert!(set.due > now, "looked up before");
         if arrival <= now {
             set.fill(line);
             return;
@@ -258,11 +260,12 @@ mod tests {
                     sets.clear();
                 }
                 let [mut expected, mut found] = [Vec::new(), Vec::new()];
-                sets.look_up_all(&lines, now, |index, arrival| found.push((index, arrival)));
-                general.look_up_all(&lines, now, |index, arrival| expected.push((index, arrival)));
+                sets.look_up_all(&lines, now, |index, line, arrival| found.push((index, line, arrival)));
+                general.look_up_all(&lines, now, |index, line, arrival| expected.push((index, line, arrival)));
                 prop_assert_eq!(&found, &expected);
-                for (index, _) in found.iter().filter(|(_, arrival)| *arrival == NOT_ASKED) {
-                    let line = lines[*index];
+                prop_assert!(found.iter().all(|(index, line, _)| lines[*index] == *line));
+                let absent = found.iter().filter(|(.., arrival)| *arrival == NOT_ASKED);
+                for &(_, line, _) in absent {
                     // Somebody before it in the list may have asked for it just now.
                     prop_assert_eq!(sets.look_up(line, now), general.look_up(line, now));
                     if sets.arrival(line, now) == NOT_ASKED && sets.look_up(line, now) != 0 {

@@ -218,11 +218,11 @@ impl<'a> QuadLines<'a> {
         self.place.first_cell as usize + self.tags[index].cell() as usize
     }
 
-    /// The cell in which footprints of the distinct line `index` count.
+    /// The cell in which the footprints count that use a distinct line.
     #[inline(always)]
     #[must_use]
-    pub fn distinct_cell(&self, index: usize) -> usize {
-        self.place.first_cell as usize + self.uses[index].cell() as usize
+    pub fn cell_of(&self, of: Use) -> usize {
+        self.place.first_cell as usize + of.cell() as usize
     }
 
     /// Where the footprint that holds line `index` ends.

@@ -2,7 +2,6 @@
 
 use crate::config::TmuConfig;
 use std::collections::VecDeque;
-use std::hint::select_unpredictable;
 
 /// What happens at the first stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,21 +68,46 @@ struct Looping {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pending {
     /// When a line of theirs arrives.
-    pub ready: u64,
-    /// A bit for each of them within their segment.
-    pub footprints: u32,
-    /// Footprints of a thread are counted in segments of up to 32. In a list, a segment's follow each
-    /// other.
-    pub segment: u32,
+    ready: u64,
+    /// A bit for each of them in their group, which is two segments, and above these bits the group's number.
+    footprints: u64,
+}
+
+impl Pending {
+    /// Footprints of a thread are counted in segments of up to so many.
+    pub const SEGMENT: u32 = 24;
+    const GROUP: u32 = 2 * Self::SEGMENT;
+
+    /// A bit for each footprint of a segment that waits until the cycle `ready`.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(ready: u64, footprints: u32, segment: u32) -> Self {
+        let group = u64::from(segment / 2) << Self::GROUP;
+        Self {
+            ready,
+            footprints: u64::from(footprints) << (segment % 2 * Self::SEGMENT) | group,
+        }
+    }
+
+    #[inline(always)]
+    fn group(self) -> u64 {
+        self.footprints >> Self::GROUP
+    }
+}
+
+/// How many footprints of a group these are, its number left out.
+#[inline(always)]
+fn count(footprints: u64) -> u32 {
+    (footprints & ((1 << Pending::GROUP) - 1)).count_ones()
 }
 
 /// What a thread that enters waits for.
 #[derive(Clone, Debug)]
 pub struct Waiting {
-    /// A segment's follow each other.
+    /// A group's follow each other.
     list: Vec<Pending>,
-    /// Those of its footprints that wait, of all segments one over the other.
-    footprints: u32,
+    /// All of it.
+    footprints: u64,
     /// When the first of what they wait for is there.
     earliest: u64,
 }
@@ -124,64 +148,69 @@ impl Waiting {
 
     /// After pushes in another order than that of segments.
     pub fn sort_by_segment(&mut self) {
-        self.list.sort_by_key(|pending| pending.segment);
+        if !is_one_group(&self.list) {
+            self.list.sort_by_key(|pending| pending.group());
+        }
     }
 
     /// How many footprints wait.
     #[inline(always)]
     fn count(&self) -> u32 {
-        match is_one_segment(&self.list) {
-            true => self.footprints.count_ones(),
-            false => of_segments(&self.list),
+        match is_one_group(&self.list) {
+            true => count(self.footprints),
+            false => of_groups(&self.list),
         }
     }
 }
 
+/// True of a list in the order of groups.
 #[inline(always)]
-fn is_one_segment(list: &[Pending]) -> bool {
-    let segment = |one: Option<&Pending>| one.map(|one| one.segment);
-    segment(list.first()) == segment(list.last())
+fn is_one_group(list: &[Pending]) -> bool {
+    let group = |one: Option<&Pending>| one.map(|one| one.group());
+    group(list.first()) == group(list.last())
 }
 
-/// Drops what has arrived by `now`: how many footprints wait still, and when the first of what they wait
-/// for is there.
+/// Drops what has arrived by `now`: how many footprints wait still, and, if any, when the first of what they
+/// wait for is there.
+///
+/// No branches: which lines are there is a coin toss to the processor. What has arrived is a negative time
+/// away, or a very long one.
 #[inline(always)]
-fn drop_arrived(pending: &mut Vec<Pending>, now: u64) -> (u32, u64) {
-    let one_segment = is_one_segment(pending);
-    let (mut footprints, mut earliest) = (0, u64::MAX);
-    let mut kept = 0;
-    for at in 0..pending.len() {
+fn drop_arrived(list: &mut Vec<Pending>, now: u64) -> (u32, u64) {
+    let one_group = is_one_group(list);
+    let (mut footprints, mut soonest) = (0, u64::MAX);
+    let mut kept = 0_usize;
+    let next = now + 1;
+    for at in 0..list.len() {
         // Read whole, then written: else each would wait for the one before.
         let Pending {
             ready,
             footprints: of,
-            segment,
-        } = pending[at];
-        pending[kept] = Pending {
+        } = list[at];
+        list[kept] = Pending {
             ready,
             footprints: of,
-            segment,
         };
-        // No branches: which lines are there is a coin toss to the processor.
-        let late = ready > now;
-        kept += usize::from(late);
-        footprints |= select_unpredictable(late, of, 0);
-        earliest = select_unpredictable(late & (ready < earliest), ready, earliest);
+        let away = ready.wrapping_sub(next);
+        let late = !(away.cast_signed() >> 63).cast_unsigned();
+        kept += (late & 1) as usize;
+        footprints |= of & late;
+        soonest = soonest.min(away);
     }
-    pending.truncate(kept);
-    let waiting = match one_segment {
-        true => footprints.count_ones(),
-        false => of_segments(pending),
+    list.truncate(kept);
+    let waiting = match one_group {
+        true => count(footprints),
+        false => of_groups(list),
     };
-    (waiting, earliest)
+    (waiting, next.wrapping_add(soonest))
 }
 
 /// How many footprints wait.
 #[inline(never)]
-fn of_segments(pending: &[Pending]) -> u32 {
-    let segments = pending.chunk_by(|a, b| a.segment == b.segment);
-    let of_segment = |list: &[Pending]| list.iter().fold(0, |any, one| any | one.footprints);
-    segments.map(|list| of_segment(list).count_ones()).sum()
+fn of_groups(list: &[Pending]) -> u32 {
+    let groups = list.chunk_by(|a, b| a.group() == b.group());
+    let of_group = |list: &[Pending]| list.iter().fold(0, |any, one| any | one.footprints);
+    groups.map(|list| count(of_group(list))).sum()
 }
 
 /// The pipeline of one core.
@@ -359,10 +388,10 @@ mod tests {
                 Turn::Free => match threads.next() {
                     Some((hits, latencies)) => {
                         let now = pipeline.clock();
-                        let pending = (0..).zip(*latencies).map(|(number, latency)| Pending {
-                            ready: now + latency,
-                            footprints: 1 << (number % 32),
-                            segment: number / 32,
+                        let pending = (0..).zip(*latencies).map(|(number, latency)| {
+                            let (segment, number) =
+                                (number / Pending::SEGMENT, number % Pending::SEGMENT);
+                            Pending::new(now + latency, 1 << number, segment)
                         });
                         let mut waiting = Waiting::default();
                         pending.for_each(|one| waiting.push(one));
@@ -413,14 +442,16 @@ mod tests {
 
     #[test]
     fn a_footprint_waits_for_the_last_of_its_lines() {
-        let one = |ready, footprints, segment| Pending {
-            ready,
-            footprints,
-            segment,
-        };
-        let mut list = vec![one(9, 0b11, 0), one(5, 0b110, 0), one(7, 0b1, 3)];
+        let one = Pending::new;
+        let mut list = vec![
+            one(9, 0b11, 0),
+            one(5, 0b110, 0),
+            one(9, 0b1, 1),
+            one(7, 0b1, 3),
+        ];
         let found = [4, 6, 7, 9].map(|now| drop_arrived(&mut list, now));
-        assert_eq!(found, [(4, 5), (3, 7), (2, 9), (0, u64::MAX)]);
+        assert_eq!(found[..3], [(5, 5), (4, 7), (3, 9)]);
+        assert_eq!((found[3].0, list.len()), (0, 0));
     }
 
     #[test]

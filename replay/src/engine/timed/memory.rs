@@ -12,14 +12,24 @@ use crate::config::TmuConfig;
 use crate::stream::{QuadLines, Use};
 use crate::tmu::{Pending, Waiting};
 use std::hint::select_unpredictable;
+use std::ops::Range;
 
 /// A core's L1, and the thread that was looked up last.
 struct First<D> {
     cache: D,
     /// For what it waits.
     waiting: Waiting,
-    /// Its distinct lines that nobody has asked for: their indices.
-    absent: Vec<usize>,
+    /// Its distinct lines that nobody has asked for, segment by segment.
+    absent: Vec<Absent>,
+    /// Where those of each segment end, if there are several.
+    segments: Vec<usize>,
+}
+
+/// A line that nobody has asked for, and who uses it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Absent {
+    line: u32,
+    of: Use,
 }
 
 /// What a thread finds in its core's own cache.
@@ -39,8 +49,8 @@ pub struct Memory<D> {
     l2: D,
     tmu: TmuConfig,
     counts: CacheCounts,
-    /// Of a segment the lines that nobody has asked for: index by first use.
-    by_first_use: [usize; Use::FIRST_LINES],
+    /// Of a segment the lines that nobody has asked for, by first use.
+    by_first_use: [Absent; Use::FIRST_LINES],
 }
 
 /// Lines that a thread asked for: so many in each of its trips.
@@ -65,13 +75,14 @@ impl<D: DelayedFill> Memory<D> {
             cache,
             waiting: Waiting::default(),
             absent: Vec::new(),
+            segments: Vec::new(),
         };
         Self {
             l1: l1.into_iter().map(first).collect(),
             l2,
             tmu,
             counts,
-            by_first_use: [0; Use::FIRST_LINES],
+            by_first_use: [Absent::default(); Use::FIRST_LINES],
         }
     }
 
@@ -94,6 +105,7 @@ impl<D: DelayedFill> Memory<D> {
             cache,
             waiting,
             absent,
+            segments,
         } = &mut self.l1[core];
         waiting.clear();
         absent.clear();
@@ -101,26 +113,29 @@ impl<D: DelayedFill> Memory<D> {
             return Found::NotAll;
         }
         let counts = &mut self.counts;
-        let mut look_up = |start: usize, end: usize, segment: u32| {
-            cache.look_up_all(&quad.distinct[start..end], now, |index, arrival| {
-                let index = start + index;
+        let mut look_up = |lines: Range<usize>, segment: u32| {
+            let uses = &quad.uses[lines.clone()];
+            cache.look_up_all(&quad.distinct[lines], now, |index, line, arrival| {
+                let of = uses[index];
                 if arrival == NOT_ASKED {
-                    absent.push(index);
-                    return;
+                    absent.push(Absent { line, of });
+                } else {
+                    counts.secondary(quad.cell_of(of), of.footprints().count_ones());
+                    waiting.push(Pending::new(arrival, of.footprints(), segment));
                 }
-                let footprints = quad.uses[index].footprints();
-                counts.secondary(quad.distinct_cell(index), footprints.count_ones());
-                waiting.push(Pending {
-                    ready: arrival,
-                    footprints,
-                    segment,
-                });
             });
+            absent.len()
         };
-        let mut start = 0;
-        for (segment, end) in (0..).zip(quad.segments()) {
-            look_up(start, end, segment);
-            start = end;
+        if quad.is_one_segment() {
+            // Nearly all quads: nothing to search for where a segment ends.
+            look_up(0..quad.distinct.len(), 0);
+        } else {
+            segments.clear();
+            let mut start = 0;
+            for (segment, end) in (0..).zip(quad.segments()) {
+                segments.push(look_up(start..end, segment));
+                start = end;
+            }
         }
         match (absent.is_empty(), waiting.is_empty()) {
             (false, _) => Found::NotAll,
@@ -143,6 +158,7 @@ impl<D: DelayedFill> Memory<D> {
             cache,
             waiting,
             absent,
+            segments,
         } = &mut self.l1[core];
         let mut asking = Asking {
             l1: cache,
@@ -156,18 +172,12 @@ impl<D: DelayedFill> Memory<D> {
         if absent.is_empty() {
             asking.one_by_one(quad);
         } else if quad.is_one_segment() {
-            // Nearly all quads: nothing to search for where a segment ends.
             asking.segment(quad, absent, 0, &mut self.by_first_use);
         } else {
-            let mut rest = &**absent;
-            for (segment, end) in (0..).zip(quad.segments()) {
-                if rest.is_empty() {
-                    break;
-                }
-                let inside = |index: &&usize| **index < end;
-                let (own, others) = rest.split_at(rest.iter().take_while(inside).count());
-                asking.segment(quad, own, segment, &mut self.by_first_use);
-                rest = others;
+            let mut start = 0;
+            for (segment, &end) in (0..).zip(&*segments) {
+                asking.segment(quad, &absent[start..end], segment, &mut self.by_first_use);
+                start = end;
             }
             waiting.sort_by_segment();
         }
@@ -192,52 +202,49 @@ impl<D: DelayedFill> Asking<'_, D> {
     fn segment(
         &mut self,
         quad: &QuadLines<'_>,
-        absent: &[usize],
+        absent: &[Absent],
         segment: u32,
-        by_first_use: &mut [usize; Use::FIRST_LINES],
+        by_first_use: &mut [Absent; Use::FIRST_LINES],
     ) {
         // A bit for the first use of each.
-        let mut rest = 0_u128;
-        for &index in absent {
-            let first = quad.uses[index].first_line();
-            rest |= 1 << first;
-            by_first_use[first] = index;
+        let mut first_uses = [0_u64; Use::FIRST_LINES / 64];
+        for one in absent {
+            let first = one.of.first_line();
+            first_uses[first / 64] |= 1 << (first % 64);
+            by_first_use[first] = *one;
         }
         let mut asking = 0;
         // Of the footprint that asks: whether it has fetched, and from memory.
         let mut missed = [false; 2];
-        while rest != 0 {
-            let index = by_first_use[rest.trailing_zeros() as usize];
-            rest &= rest - 1;
-            let (line, of) = (quad.distinct[index], quad.uses[index]);
-            let users = of.footprints();
-            let first_user = users & users.wrapping_neg();
-            missed = missed.map(|missed| missed & (first_user == asking));
-            asking = first_user;
-            // Another segment, or another cell of this one, may have asked for it just now.
-            let known = match of.may_be_listed() {
-                true => self.l1.arrival(line, self.now),
-                false => NOT_ASKED,
-            };
-            let cell = quad.distinct_cell(index);
-            let ready = if known == NOT_ASKED {
-                let mut misses = FootprintMisses {
-                    l1_lines: 1,
-                    l1_secondary: users.count_ones() - 1,
-                    ..FootprintMisses::default()
+        for (by_first_use, mut rest) in by_first_use.chunks_exact(64).zip(first_uses) {
+            while rest != 0 {
+                let Absent { line, of } = by_first_use[rest.trailing_zeros() as usize];
+                rest &= rest - 1;
+                let users = of.footprints();
+                let first_user = users & users.wrapping_neg();
+                missed = missed.map(|missed| missed & (first_user == asking));
+                asking = first_user;
+                // Another segment, or another cell of this one, may have asked for it just now.
+                let known = match of.may_be_listed() {
+                    true => self.l1.arrival(line, self.now),
+                    false => NOT_ASKED,
                 };
-                let ready = self.fetch(line, &mut misses);
-                self.counts.line(cell, quad.tile(), &misses, &mut missed);
-                ready
-            } else {
-                self.counts.secondary(cell, users.count_ones());
-                known
-            };
-            self.waiting.push(Pending {
-                ready,
-                footprints: users,
-                segment,
-            });
+                let cell = quad.cell_of(of);
+                let ready = if known == NOT_ASKED {
+                    let mut misses = FootprintMisses {
+                        l1_lines: 1,
+                        l1_secondary: users.count_ones() - 1,
+                        ..FootprintMisses::default()
+                    };
+                    let ready = self.fetch(line, &mut misses);
+                    self.counts.line(cell, quad.tile(), &misses, &mut missed);
+                    ready
+                } else {
+                    self.counts.secondary(cell, users.count_ones());
+                    known
+                };
+                self.waiting.push(Pending::new(ready, users, segment));
+            }
         }
     }
 
@@ -265,11 +272,8 @@ impl<D: DelayedFill> Asking<'_, D> {
                     latest = latest.max(ready);
                 }
                 if latest > now {
-                    self.waiting.push(Pending {
-                        ready: latest,
-                        footprints: 1 << (number % 32),
-                        segment: number / 32,
-                    });
+                    let (segment, number) = (number / Pending::SEGMENT, number % Pending::SEGMENT);
+                    self.waiting.push(Pending::new(latest, 1 << number, segment));
                 }
                 number += 1;
                 self.counts.footprint(footprint.cell, quad.tile(), &misses);

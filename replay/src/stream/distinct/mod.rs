@@ -9,10 +9,11 @@ mod merge;
 use super::QuadLines;
 use super::footprint::Bundle;
 use super::lines::Tag;
+use crate::tmu::Pending;
 use merge::Merge;
 
 /// Footprints of a segment at most, repeats counted: four lanes of three trilinear textures.
-const FOOTPRINTS: u32 = 24;
+const FOOTPRINTS: u32 = Pending::SEGMENT;
 
 /// Who uses a distinct line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
