@@ -12,6 +12,7 @@ use super::lines::{QuadEnd, QuadRun, Tag, TileLines};
 use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, feed};
 use crate::config::RunConfig;
 use crate::order::TileRef;
+use crate::tmu::Pending;
 use formats::textrace::Tile;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -262,6 +263,7 @@ impl<'a> Expander<'a> {
                         sums.line_lookups += u64::from(lookups);
                     });
                 sums.footprints += u64::from(footprints);
+                checked_quad(at, footprints)?;
                 if let Some(distinct) = distinct {
                     distinct.end(&mut lines.distinct, &mut lines.uses);
                 }
@@ -358,6 +360,21 @@ impl TileSums {
             footprints: fit("footprints", self.footprints)?,
         })
     }
+}
+
+/// A quad has no more footprints than a texture unit's thread may have.
+fn checked_quad(at: TileRef, footprints: u32) -> Result<(), StreamError> {
+    if footprints <= Pending::MOST {
+        return Ok(());
+    }
+    Err(StreamError::Tile {
+        pass: at.pass,
+        tile: at.tile,
+        message: format!(
+            "expected at most {} footprints a quad, found {footprints}",
+            Pending::MOST
+        ),
+    })
 }
 
 /// Hash of one line access; accesses are summed, so their order does not matter.
@@ -469,6 +486,15 @@ mod tests {
         assert_eq!(memory.left(), 0);
         drop(second);
         assert_eq!(memory.left(), bytes);
+    }
+
+    #[test]
+    fn a_quad_of_more_footprints_than_a_thread_may_have_is_refused() {
+        let at = TileRef { pass: 3, tile: 17 };
+        assert!(checked_quad(at, Pending::MOST).is_ok());
+        let error = checked_quad(at, Pending::MOST + 1).unwrap_err().to_string();
+        let expected = "expected at most 1048576 footprints a quad, found 1048577";
+        assert!(error.contains(expected) && error.contains("17"), "{error}");
     }
 
     #[test]

@@ -78,6 +78,10 @@ impl Pending {
     pub const SEGMENT: u32 = 24;
     const GROUP: u32 = 2 * Self::SEGMENT;
 
+    /// Footprints that a thread may have. Of two segments that follow each other, both together have more
+    /// than one can hold, so that groups' numbers fit.
+    pub const MOST: u32 = 1 << 20;
+
     /// A bit for each footprint of a segment that waits until the cycle `ready`.
     #[inline(always)]
     #[must_use]
@@ -94,6 +98,8 @@ impl Pending {
         self.footprints >> Self::GROUP
     }
 }
+
+const _: () = assert!(Pending::MOST / Pending::SEGMENT < 1 << (u64::BITS - Pending::GROUP));
 
 /// How many footprints of a group these are, its number left out.
 #[inline(always)]

@@ -79,7 +79,9 @@ impl<D: DelayedFill> Memory<D> {
     pub fn look_up(&mut self, core: usize, now: u64, lines: &[u32]) -> Seen {
         let missing = &mut self.missing[core];
         missing.clear();
-        self.l1[core].look_up_all(lines, now, |index, _, arrival| missing.push((index, arrival)));
+        self.l1[core].look_up_all(lines, now, |index, _, arrival| {
+            missing.push((index, arrival))
+        });
         if missing.is_empty() {
             Seen::All
         } else {

@@ -273,7 +273,8 @@ impl<D: DelayedFill> Asking<'_, D> {
                 }
                 if latest > now {
                     let (segment, number) = (number / Pending::SEGMENT, number % Pending::SEGMENT);
-                    self.waiting.push(Pending::new(latest, 1 << number, segment));
+                    self.waiting
+                        .push(Pending::new(latest, 1 << number, segment));
                 }
                 number += 1;
                 self.counts.footprint(footprint.cell, quad.tile(), &misses);
