@@ -128,19 +128,42 @@ impl CacheConfig {
         }
         let bytes_per_set = u64::from(self.ways) * u64::from(line_bytes);
         let sets = self.size_bytes / bytes_per_set;
-        if !self.size_bytes.is_multiple_of(bytes_per_set)
-            || !sets.is_power_of_two()
-            || sets > 1 << 24
-        {
+        let is_whole = self.size_bytes.is_multiple_of(bytes_per_set);
+        if !is_whole || !sets.is_power_of_two() || sets > MOST_SETS {
             return Err(ConfigError::Sets {
                 level,
                 size: format_bytes(self.size_bytes),
                 ways: self.ways,
                 line_bytes,
-                found: self.size_bytes as f64 / bytes_per_set as f64,
+                found: if is_whole {
+                    sets.to_string()
+                } else {
+                    (self.size_bytes as f64 / bytes_per_set as f64).to_string()
+                },
             });
         }
+        self.check_lines(level, line_bytes, 1)?;
         Ok(sets as u32)
+    }
+
+    /// Checks that `caches` such caches have lines that this machine's memory can stand for.
+    fn check_lines(
+        &self,
+        level: &'static str,
+        line_bytes: u32,
+        caches: u32,
+    ) -> Result<(), ConfigError> {
+        let lines = self.size_bytes / u64::from(line_bytes);
+        if lines.saturating_mul(caches.into()) > MOST_LINES {
+            return Err(ConfigError::Lines {
+                level,
+                size: format_bytes(self.size_bytes),
+                line_bytes,
+                caches,
+                found: lines,
+            });
+        }
+        Ok(())
     }
 }
 
@@ -233,12 +256,19 @@ impl Default for RunConfig {
     }
 }
 
+/// More sets of a cache than this are taken for a mistake.
+const MOST_SETS: u64 = 1 << 24;
+
+/// More lines of all caches of a level together than this are taken for a mistake: the tags of as many take
+/// up to some 300 MiB of this machine's memory.
+const MOST_LINES: u64 = 1 << 24;
+
 /// A configuration that no machine can have.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ConfigError {
     /// Sets are not a power of two.
     #[error(
-        "{level} cache of {size}, {ways} ways, {line_bytes}-byte lines: expected a power-of-two number of sets, found {found}"
+        "{level} cache of {size}, {ways} ways, {line_bytes}-byte lines: expected a power-of-two number of sets up to {MOST_SETS}, found {found}"
     )]
     Sets {
         /// `L1` or `L2`.
@@ -250,7 +280,23 @@ pub enum ConfigError {
         /// Line size.
         line_bytes: u32,
         /// Size over ways and line size.
-        found: f64,
+        found: String,
+    },
+    /// More lines than this machine can keep.
+    #[error(
+        "{level} cache of {size}, {line_bytes}-byte lines: expected at most {MOST_LINES} lines in all caches of the level, found {caches} x {found}"
+    )]
+    Lines {
+        /// `L1` or `L2`.
+        level: &'static str,
+        /// Size as text.
+        size: String,
+        /// Line size.
+        line_bytes: u32,
+        /// Caches of this size.
+        caches: u32,
+        /// Lines of each.
+        found: u64,
     },
     /// Ways that the policy cannot have.
     #[error("{level} cache with {policy}: expected {expected} ways, found {found}")]
@@ -356,7 +402,7 @@ impl RunConfig {
         }
         self.l1.sets("L1", self.line_bytes)?;
         self.l2.sets("L2", self.line_bytes)?;
-        Ok(())
+        self.l1.check_lines("L1", self.line_bytes, self.cores)
     }
 }
 
@@ -380,8 +426,50 @@ mod tests {
         };
         assert_eq!(
             config.validate().unwrap_err().to_string(),
-            "L1 cache of 6 KiB, 4 ways, 16-byte lines: expected a power-of-two number of sets, found 96"
+            "L1 cache of 6 KiB, 4 ways, 16-byte lines: expected a power-of-two number of sets up to 16777216, found 96"
         );
+        let refused = |size_bytes, ways| {
+            let cache = CacheConfig {
+                ways,
+                ..CacheConfig::lru(size_bytes)
+            };
+            cache.sets("L2", 16).unwrap_err().to_string()
+        };
+        let sets = refused(1 << 62, 4);
+        assert!(sets.ends_with("found 72057594037927936"), "{sets}");
+        let sets = refused((1 << 62) + 1, 4);
+        assert!(sets.contains("found 7205759403792794"), "{sets}");
+    }
+
+    #[test]
+    fn caches_whose_tags_fill_this_machines_memory_are_refused_at_planning() {
+        let with = |l1_bytes, ways, cores| {
+            let mut config = RunConfig {
+                cores,
+                ..RunConfig::default()
+            };
+            config.l1 = CacheConfig {
+                ways,
+                ..CacheConfig::lru(l1_bytes)
+            };
+            config.validate()
+        };
+        assert_eq!(with(1 << 28, 4, 1), Ok(()));
+        assert_eq!(with(4 << 20, 4, 64), Ok(()));
+        for (l1_bytes, ways, cores, found) in [
+            (255 << 28, 255, 1, "65280 MiB, 16-byte lines"),
+            (
+                1 << 28,
+                4,
+                2,
+                "in all caches of the level, found 2 x 16777216",
+            ),
+            (8 << 20, 4, 64, "found 64 x 524288"),
+        ] {
+            let error = with(l1_bytes, ways, cores).unwrap_err().to_string();
+            assert!(error.contains("at most 16777216 lines"), "{error}");
+            assert!(error.contains(found), "{error}");
+        }
     }
 
     #[test]

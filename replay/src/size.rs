@@ -1,6 +1,6 @@
 //! Byte sizes as people write them: `8KiB`, `128 KiB`, `4096`.
 
-use serde::{Deserialize, Deserializer, Serializer, de};
+use serde::{Deserializer, Serializer, de};
 
 /// Parses a byte count with an optional binary unit (`B`, `KiB`, `MiB`; `K`/`KB` are read as KiB
 /// because cache sizes are always binary).
@@ -41,7 +41,8 @@ pub fn format_bytes(bytes: u64) -> String {
 /// For `#[serde(with = "crate::size::serde_bytes")]`: a number in outputs, a number or a text with
 /// a unit in inputs.
 pub mod serde_bytes {
-    use super::{Deserialize, Deserializer, Serializer, de, parse_bytes};
+    use super::{Deserializer, Serializer, de, parse_bytes};
+    use std::fmt;
 
     /// Writes the number.
     ///
@@ -56,16 +57,30 @@ pub mod serde_bytes {
     /// # Errors
     /// Names the text that is no size.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
-        #[derive(Deserialize)]
-        #[serde(untagged)]
-        enum Size {
-            Number(u64),
-            Text(String),
+        struct Size;
+
+        impl de::Visitor<'_> for Size {
+            type Value = u64;
+
+            fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+                out.write_str("a number of bytes or a text such as \"8KiB\"")
+            }
+
+            fn visit_u64<E: de::Error>(self, bytes: u64) -> Result<u64, E> {
+                Ok(bytes)
+            }
+
+            fn visit_i64<E: de::Error>(self, bytes: i64) -> Result<u64, E> {
+                let negative = |_| E::invalid_value(de::Unexpected::Signed(bytes), &self);
+                bytes.try_into().map_err(negative)
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<u64, E> {
+                parse_bytes(text).map_err(E::custom)
+            }
         }
-        match Size::deserialize(deserializer)? {
-            Size::Number(bytes) => Ok(bytes),
-            Size::Text(text) => parse_bytes(&text).map_err(de::Error::custom),
-        }
+
+        deserializer.deserialize_any(Size)
     }
 }
 
@@ -94,6 +109,30 @@ mod tests {
             assert!(
                 parse_bytes(text).unwrap_err().contains("expected a number"),
                 "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_no_size_in_a_file_is_told_with_what_is_one() {
+        #[derive(Debug, serde::Deserialize)]
+        struct File {
+            #[serde(with = "serde_bytes")]
+            size: u64,
+        }
+        let read = |value: &str| toml::from_str::<File>(&format!("size = {value}"));
+        assert_eq!(read("4096").unwrap().size, 4096);
+        assert_eq!(read("\"4KiB\"").unwrap().size, 4096);
+        for (value, found) in [
+            ("nan", "floating point"),
+            ("-1", "integer `-1`"),
+            ("[1]", "sequence"),
+        ] {
+            let error = read(value).unwrap_err().to_string();
+            assert!(error.contains(found), "{error}");
+            assert!(
+                error.contains("a number of bytes or a text such as"),
+                "{error}"
             );
         }
     }

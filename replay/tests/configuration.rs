@@ -13,7 +13,8 @@ const INTRODUCTION: &str = "\
 
 `replay run --config FILE` reads the keys below as TOML; flags win over the file, and what neither says
 is the Z2 paper's machine. `replay run --print-config` prints the whole configuration. An unknown key is
-refused. Sizes (`size_bytes`) are numbers of bytes or texts such as `\"16KiB\"`.
+refused. Sizes (`size_bytes`) are numbers of bytes or texts such as `\"16KiB\"`; the number of sets is a power of two,
+and all caches of a level together have at most 2^24 lines.
 
     order = \"z2-sta\"
     l1.size_bytes = \"16KiB\"

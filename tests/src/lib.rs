@@ -73,6 +73,22 @@ pub fn refuse(command: &mut Command, expected: &[&str]) -> Output {
     output
 }
 
+/// Names of the encodings that a texture trace's tiles have.
+///
+/// # Panics
+/// When `replay info` does not read it.
+#[must_use]
+pub fn encodings(trace: &Path) -> Vec<String> {
+    let info = run_ok(program("replay").args(["info", "--json"]).arg(trace)).stdout;
+    let info: serde_json::Value = serde_json::from_slice(&info).expect("JSON");
+    let tiles = &info["totals"]["tiles_by_encoding"];
+    let tiles = tiles.as_object().expect("tiles by encoding").iter();
+    tiles
+        .filter(|(_, count)| **count != 0)
+        .map(|(name, _)| name.clone())
+        .collect()
+}
+
 /// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout),
 /// or `None`, with a line on stderr that says so.
 #[must_use]

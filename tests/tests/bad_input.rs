@@ -68,6 +68,21 @@ fn a_cache_whose_sets_are_no_power_of_two_is_refused() {
 }
 
 #[test]
+fn caches_that_no_memory_holds_are_refused() {
+    let trace = root().join("traces/atrium-shadows.textrace");
+    let huge = ["--l1-ways", "255", "--l1", "65280MiB", "--cores", "64"];
+    for command in ["run", "locality"] {
+        let mut replay = program("replay");
+        replay.arg(command).arg(&trace).args(huge);
+        refuse(&mut replay, &["L1 cache", "at most 16777216 lines"]);
+    }
+    let mut locality = program("replay");
+    locality.arg("locality").arg(&trace).args(["--l2", "32MiB"]);
+    let expected = ["at most 2097152 for locality", "found 2098176"];
+    refuse(&mut locality, &expected);
+}
+
+#[test]
 fn an_unknown_order_is_refused_with_the_known_ones() {
     let trace = root().join("traces/atrium-shadows.textrace");
     refuse(

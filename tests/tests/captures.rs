@@ -1,6 +1,6 @@
 //! `tracegen sweep`: the captures of a manifest.
 
-use parallax_tests::{program, refuse, run_ok};
+use parallax_tests::{encodings, program, refuse, run_ok};
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
@@ -93,6 +93,26 @@ fn shards_capture_what_the_command_line_does_and_only_once() {
     assert!(captures.run("out", &[]).contains("4 made"));
     fs::remove_file(captures.path("out/teapot-vive.recipe")).expect("removed");
     assert!(captures.run("out", &[]).contains("1 made, 3 there"));
+}
+
+#[test]
+fn captures_are_packed_as_the_manifest_says() {
+    let captures = Captures::new(
+        "[base]\nsize = \"32x24\"\nno-plain = true\n[[captures]]\nscene = \"teapot\"\n\
+         encoding = [\"delta\", \"planes\"]\n",
+    );
+    captures.run("out", &[]);
+    let [delta, planes] = ["delta", "planes"].map(|encoding| {
+        let trace = captures.path(&format!("out/teapot-{encoding}.textrace"));
+        assert_eq!(encodings(&trace), [encoding]);
+        run_ok(program("replay").arg("dump").arg(trace)).stdout
+    });
+    assert!(delta == planes && !delta.is_empty());
+    let captures = Captures::new("[[captures]]\nscene = \"teapot\"\nencoding = \"raw\"\n");
+    refuse(
+        &mut captures.command("out", &[]),
+        &["m.toml", "[[captures]] 1", "'raw'", "--encoding"],
+    );
 }
 
 #[test]

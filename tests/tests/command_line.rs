@@ -113,6 +113,96 @@ fn quiet_prints_the_result_alone() {
     assert!(run_ok(&mut rays).stderr.is_empty());
 }
 
+#[cfg(unix)]
+#[test]
+fn a_log_that_cannot_be_written_is_no_reason_to_fail_and_a_result_is() {
+    let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else {
+        eprintln!("SKIPPED: there is no /dev/full");
+        return;
+    };
+    let full = || full.try_clone().expect("a handle");
+    let trace = root().join("traces/atrium-shadows.textrace");
+    let run = |arguments: &[&str]| {
+        let mut command = program("replay");
+        command.args(arguments).arg(&trace);
+        command
+    };
+    let told = run_ok(&mut run(&["run"]));
+    assert!(!told.stderr.is_empty(), "it tells of the run");
+    let untold = run_ok(run(&["run"]).stderr(full()));
+    assert_eq!(untold.stdout, told.stdout);
+    for arguments in [&["run", "no-such"][..], &["run", "--no\u{7}-such"]] {
+        let output = program("replay").args(arguments).stderr(full()).output();
+        assert_eq!(output.expect("it starts").status.code(), Some(2));
+    }
+    for arguments in [&["run"][..], &["convert", "--to", "din"]] {
+        let output = run(arguments).stdout(full()).output().expect("it starts");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        let expected = "cannot write standard output: No space left";
+        assert!(message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn flags_that_say_nothing_about_what_is_converted_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = root().join("traces/atrium-shadows.textrace");
+    for (arguments, expected) in [
+        (
+            "--to din --encoding raw -o a",
+            "--encoding: only with --to textrace",
+        ),
+        (
+            "--to raytrace --encoding delta -o a",
+            "--encoding: only with --to textrace",
+        ),
+        (
+            "--to textrace --granularity texel -o a",
+            "--granularity: expected accesses",
+        ),
+        (
+            "--to textrace --order morton -o a",
+            "--order: a trace holds records",
+        ),
+        (
+            "--to textrace --texel-format bc7 -o a",
+            "--texel-format: a trace holds records",
+        ),
+        (
+            "--to u32 --compress zstd -o a.gz",
+            "--compress zstd: expected gzip, which the name a.gz asks for",
+        ),
+        (
+            "--to textrace --compress gzip -o a",
+            "--compress: a trace is not",
+        ),
+        ("--to textrace -o a.gz", "--output a.gz: a trace is not"),
+    ] {
+        let mut command = program("replay");
+        command
+            .current_dir(folder.path())
+            .arg("convert")
+            .arg(&trace);
+        refuse(command.args(arguments.split(' ')), &[expected]);
+    }
+    let left = std::fs::read_dir(folder.path())
+        .expect("the folder")
+        .count();
+    assert_eq!(left, 0);
+}
+
+#[test]
+fn orders_are_not_for_addresses_and_tables_go_to_a_folder() {
+    let trace = root().join("traces/atrium-shadows.textrace");
+    let mut command = program("replay");
+    command.args(["locality", "--addresses", "a.u32", "--orders", "all"]);
+    refuse(&mut command, &["--orders", "--addresses"]);
+    let mut command = program("replay");
+    command.args(["locality", "--csv"]).arg(&trace).arg(&trace);
+    refuse(&mut command, &["--csv", "expected a folder, found a file"]);
+}
+
 #[test]
 fn a_capture_that_sees_nothing_warns_with_bounds_and_camera() {
     let away = [

@@ -313,9 +313,26 @@ fn bad_plans_and_outputs_are_refused_before_the_work() {
     ] {
         refuse(
             &mut sweep.command("file", flags),
-            &["file/", "cannot write"],
+            &[
+                "cannot write --out",
+                "file: expected a folder, found a file",
+            ],
         );
     }
+    fs::create_dir(sweep.path("taken")).expect("a folder");
+    fs::write(sweep.path("taken/points"), "").expect("temporary file");
+    refuse(
+        &mut sweep.command("taken", &[]),
+        &["taken/points: expected a folder, found a file"],
+    );
+    let mut command = program("replay");
+    command.current_dir(sweep.folder.path());
+    command.args(["sweep", "a.toml", "--out", "-"]);
+    command.arg(root().join("traces/atrium-shadows.textrace"));
+    refuse(
+        &mut command,
+        &["--out -: expected a folder, found the name of standard output"],
+    );
     let experiment = sweep.path("a.toml").display().to_string();
     for (path, expected) in [
         ("/dev/null", "found a device"),
@@ -323,6 +340,10 @@ fn bad_plans_and_outputs_are_refused_before_the_work() {
         (
             &sweep.path("out/results.csv").display().to_string(),
             "the same output twice",
+        ),
+        (
+            &sweep.path("out/points").display().to_string(),
+            "found the name of the points' folder",
         ),
     ] {
         refuse(&mut sweep.command("out", &["--parquet", path]), &[expected]);

@@ -1,7 +1,7 @@
 //! `tracegen techniques`: the folder of a study, going on after an interruption, the search under a
 //! budget, and what is refused.
 
-use parallax_tests::{program, refuse, run_ok};
+use parallax_tests::{encodings, program, refuse, run_ok};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -159,6 +159,22 @@ fn a_study_that_was_killed_goes_on_where_it_was_and_ends_with_the_same() {
     without_measurements(&mut b);
     assert_eq!(a, b);
     assert!(files(&whole) == files(&killed));
+}
+
+#[test]
+fn the_traces_of_a_study_are_packed_as_asked_and_a_study_packed_otherwise_is_another() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    let folder = root.path().join("study");
+    let run = |encoding: &str| {
+        run_ok(study(&folder, "superfrustum").args(["--encoding", encoding]));
+        assert_eq!(manifest(&folder)["trace_encoding"], encoding);
+        for name in ["per-eye", "superfrustum"] {
+            let trace = folder.join("traces").join(name).with_extension("textrace");
+            assert_eq!(encodings(&trace), [encoding], "{name}");
+        }
+    };
+    run("planes");
+    run("delta");
 }
 
 #[test]

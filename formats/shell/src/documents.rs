@@ -39,7 +39,7 @@ impl Documents {
                 let name = command.get_name().to_owned();
                 let mut script = Vec::new();
                 clap_complete::generate(shell, &mut command, name, &mut script);
-                let mut out = std::io::stdout().lock();
+                let mut out = super::stdout();
                 out.write_all(&script)?;
                 out.flush()?;
             }

@@ -1,7 +1,7 @@
 //! What goes to a terminal: results on stdout, everything else on stderr, no name printed raw.
 
 use formats::text::printable_lines;
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// `--quiet`, set once before the command starts.
@@ -20,14 +20,39 @@ pub(crate) fn is_quiet() -> bool {
 /// # Errors
 /// Those of writing.
 pub fn print(text: &str) -> anyhow::Result<()> {
-    let mut out = io::stdout().lock();
+    let mut out = stdout();
     let text = text.trim_end_matches('\n');
-    if out.is_terminal() {
+    if io::stdout().is_terminal() {
         writeln!(out, "{}", printable_lines(text))?;
     } else {
         writeln!(out, "{text}")?;
     }
     Ok(out.flush()?)
+}
+
+/// Standard output, buffered, with errors that name it. Who writes to it flushes it in the end.
+pub fn stdout() -> impl Write {
+    BufWriter::new(Named(io::stdout().lock()))
+}
+
+/// Standard output with errors that name it.
+struct Named(StdoutLock<'static>);
+
+impl Write for Named {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes).map_err(named)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush().map_err(named)
+    }
+}
+
+fn named(error: io::Error) -> io::Error {
+    io::Error::new(
+        error.kind(),
+        format!("cannot write standard output: {error}"),
+    )
 }
 
 /// Tells a figure about the run on stderr, which varies from run to run and is no result.
@@ -54,5 +79,7 @@ fn tell(label: &str, message: &str) {
     } else {
         ""
     };
-    anstream::eprintln!("{clear}{label}{}", printable_lines(message));
+    // A log that cannot be written (a full disk, a closed handle) is no reason to stop the work.
+    let mut out = anstream::stderr().lock();
+    let _untold = writeln!(out, "{clear}{label}{}", printable_lines(message));
 }

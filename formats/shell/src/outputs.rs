@@ -1,7 +1,7 @@
 //! Checks of a command's outputs before its work, which may take minutes.
 
 use anyhow::{Context, bail, ensure};
-use formats::container::{check_target, is_stdout};
+use formats::container::{check_target, is_stdout, kind_of};
 use std::fs;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -102,6 +102,26 @@ pub fn check_outputs<'a>(
     }
     let taken = |o: &Output| o.kind != Kind::Result && is_stdout(&o.path);
     Ok(!outputs.iter().any(taken))
+}
+
+/// Checks that a folder for outputs is one, or may become one.
+///
+/// # Errors
+/// The name of standard output, or of something else than a folder.
+pub fn check_folder(flag: &str, path: &Path) -> anyhow::Result<()> {
+    ensure!(
+        !is_stdout(path),
+        "{flag} -: expected a folder, found the name of standard output (a folder of that name is ./-)"
+    );
+    if let Ok(found) = fs::metadata(path) {
+        ensure!(
+            found.is_dir(),
+            "cannot write {flag} {}: expected a folder, found {}",
+            path.display(),
+            kind_of(&found)
+        );
+    }
+    Ok(())
 }
 
 /// True if two paths are one file: by spelling, through links of either kind, or as names that do

@@ -4,7 +4,7 @@ use super::{message, signals};
 use clap::{CommandFactory, Parser};
 use formats::container::{VERSION_MAJOR, VERSION_MINOR};
 use formats::text::printable_lines;
-use std::io;
+use std::io::{self, Write};
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
@@ -76,7 +76,7 @@ fn parse<C: Parser>() -> C {
         if arguments.iter().all(|a| printable_lines(a) == a.as_str()) {
             error.exit();
         }
-        eprint!("{}", printable_lines(&error.to_string()));
+        let _untold = write!(io::stderr(), "{}", printable_lines(&error.to_string()));
         std::process::exit(USAGE.into());
     })
 }

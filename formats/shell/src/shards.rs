@@ -35,7 +35,8 @@ pub struct ShardArgs {
 
 fn parse_shard(text: &str) -> Result<Shard, String> {
     if text == FROM_SLURM {
-        return Shard::from_slurm(|name| std::env::var(name).ok());
+        let variable = |name: &str| Some(std::env::var_os(name)?.to_string_lossy().into_owned());
+        return Shard::from_slurm(variable);
     }
     text.parse()
 }

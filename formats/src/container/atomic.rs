@@ -173,7 +173,12 @@ fn check_name(target: &Path) -> io::Result<Option<Metadata>> {
     Ok(Some(found))
 }
 
-fn kind_of(found: &Metadata) -> &'static str {
+/// What something on a disk is, in words.
+#[must_use]
+pub fn kind_of(found: &Metadata) -> &'static str {
+    if found.is_file() {
+        return "a file";
+    }
     #[cfg(unix)]
     {
         use std::os::unix::fs::FileTypeExt;

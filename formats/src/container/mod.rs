@@ -9,7 +9,9 @@ mod header;
 mod reader;
 mod writer;
 
-pub use atomic::{AtomicFile, check_target, discard_unfinished, is_stdout, remove_abandoned};
+pub use atomic::{
+    AtomicFile, check_target, discard_unfinished, is_stdout, kind_of, remove_abandoned,
+};
 pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 pub use reader::Container;
 pub use writer::ContainerWriter;

@@ -28,18 +28,27 @@ const LONGEST_TOML_BYTES: u64 = 4 << 20;
 /// # Errors
 /// The file cannot be read, is too long or is no text; the message names it.
 pub fn read_toml(path: &Path) -> Result<String> {
-    let mut text = String::new();
+    let mut bytes = Vec::new();
     let file = File::open(path).with_context(|| path.display().to_string())?;
     file.take(LONGEST_TOML_BYTES + 1)
-        .read_to_string(&mut text)
+        .read_to_end(&mut bytes)
         .with_context(|| path.display().to_string())?;
     ensure!(
-        text.len() as u64 <= LONGEST_TOML_BYTES,
+        bytes.len() as u64 <= LONGEST_TOML_BYTES,
         "{}: expected at most {} of TOML, found more",
         path.display(),
         format_bytes(LONGEST_TOML_BYTES)
     );
-    Ok(text)
+    String::from_utf8(bytes).map_err(|error| {
+        let good = error.utf8_error().valid_up_to();
+        let bytes = error.as_bytes();
+        let line = 1 + bytes.iter().take(good).filter(|b| **b == b'\n').count();
+        let found = bytes.get(good).copied().unwrap_or_default();
+        anyhow!(
+            "{}: line {line}: expected TOML in UTF-8, found the byte {found:#04x}",
+            path.display()
+        )
+    })
 }
 
 /// Flags of the replay configuration.

@@ -16,7 +16,7 @@ use formats::layout::Layout;
 use formats::raytrace::{RayTile, Raytrace, RaytraceWriter, encode_ray_tile};
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
 use shell::Output;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -126,12 +126,12 @@ pub struct ConvertArgs {
     /// Compress accesses [default: as the output's name asks, .gz or .zst]
     #[arg(long, value_name = "METHOD")]
     pub compress: Option<CompressionName>,
-    /// What counts as an access
-    #[arg(long, value_enum, default_value_t)]
-    pub granularity: GranularityName,
-    /// Tile encoding of --to textrace
-    #[arg(long, value_enum, default_value_t)]
-    pub encoding: EncodingName,
+    /// What counts as an access [default: line]
+    #[arg(long)]
+    pub granularity: Option<GranularityName>,
+    /// Tile encoding of --to textrace [default: delta]
+    #[arg(long)]
+    pub encoding: Option<EncodingName>,
     /// Order, sampling and layout; what concerns caches has no effect here
     #[command(flatten)]
     pub machine: ConfigArgs,
@@ -142,6 +142,7 @@ pub struct ConvertArgs {
 /// # Errors
 /// The trace cannot be read, the configuration is impossible, or the output cannot be written.
 pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
+    args.check()?;
     let config = args.machine.resolve()?;
     let compression = args.compression()?;
     let output = if args.to.is_text() && compression.is_none() {
@@ -155,8 +156,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     if args.to.is_trace() {
         reencode(&trace, args)?;
     } else if is_stdout(&args.output) {
-        let out = BufWriter::new(io::stdout().lock());
-        let mut out = CompressedWriter::new(compression, out);
+        let mut out = CompressedWriter::new(compression, shell::stdout());
         write_accesses(&trace, &config, args, &mut out)?;
         out.finish()?.flush()?;
     } else {
@@ -170,20 +170,58 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
 }
 
 impl ConvertArgs {
-    /// What accesses are compressed by: the flag, or else the name of the output.
-    fn compression(&self) -> Result<Option<Compression>> {
+    /// Refuses flags that say nothing about what is written.
+    fn check(&self) -> Result<()> {
+        ensure!(
+            self.encoding.is_none() || self.to == Target::Textrace,
+            "--encoding: only with --to textrace"
+        );
         if self.to.is_trace() {
             ensure!(
-                self.compress.is_none(),
-                "--compress: a trace's tiles are packed by --encoding"
+                self.granularity.is_none(),
+                "--granularity: expected accesses to write, found a trace"
+            );
+            if let Some(flag) = self.machine.first_of_traces() {
+                bail!("{flag}: a trace holds records, whatever the machine: it is for accesses");
+            }
+        }
+        Ok(())
+    }
+
+    /// What accesses are compressed by: the flag, or else the name of the output.
+    fn compression(&self) -> Result<Option<Compression>> {
+        let named = Compression::of_name(&self.output.to_string_lossy());
+        if self.to.is_trace() {
+            let asked = match named {
+                None => "--compress".to_owned(),
+                Some(_) => format!("--output {}", self.output.display()),
+            };
+            ensure!(
+                self.compress.is_none() && named.is_none(),
+                "{asked}: a trace is not compressed as a whole: its tiles are packed by --encoding"
             );
             return Ok(None);
         }
-        Ok(match self.compress {
+        let flag = match self.compress {
             Some(CompressionName::Gzip) => Some(Compression::Gzip),
             Some(CompressionName::Zstd) => Some(Compression::Zstd),
-            None => Compression::of_name(&self.output.to_string_lossy()),
-        })
+            None => return Ok(named),
+        };
+        if let (Some(flag), Some(named)) = (flag, named)
+            && flag != named
+        {
+            bail!(
+                "--compress {}: expected {}, which the name {} asks for",
+                flag.name(),
+                named.name(),
+                self.output.display()
+            );
+        }
+        Ok(flag)
+    }
+
+    fn granularity(&self) -> GranularityName {
+        self.granularity.unwrap_or_default()
     }
 }
 
@@ -204,13 +242,13 @@ fn write_accesses(
     match (trace, args.to.plain()) {
         (Trace::Texture(trace), Some(form)) => {
             let mut sink = PlainWriter::new(form, out)?;
-            accesses(trace, config, args.granularity, &mut sink)
+            accesses(trace, config, args.granularity(), &mut sink)
         }
         (Trace::Texture(trace), None) if args.to == Target::Csv => {
-            accesses(trace, config, args.granularity, &mut CsvWriter::new(out)?)
+            accesses(trace, config, args.granularity(), &mut CsvWriter::new(out)?)
         }
         (Trace::Texture(trace), None) => {
-            accesses(trace, config, args.granularity, &mut JsonlWriter(out))
+            accesses(trace, config, args.granularity(), &mut JsonlWriter(out))
         }
         (Trace::Ray(trace), Some(form)) => {
             let mut out = PlainWriter::new(form, out)?;
@@ -274,7 +312,7 @@ fn ray_accesses(
     mut write: impl FnMut(&RayAccess) -> io::Result<()>,
 ) -> Result<()> {
     let tables = trace.tables();
-    let by_line = args.granularity == GranularityName::Line;
+    let by_line = args.granularity() == GranularityName::Line;
     let mut tile = RayTile::default();
     for (eye, index) in ray_tiles(tables) {
         trace.decode_tile(eye, index, &mut tile)?;
@@ -301,7 +339,7 @@ fn ray_accesses(
 fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
     match (trace, args.to) {
         (Trace::Texture(trace), Target::Textrace) => {
-            let encoding = match args.encoding {
+            let encoding = match args.encoding.unwrap_or_default() {
                 EncodingName::Raw => Encoding::Raw,
                 EncodingName::Delta => Encoding::Delta,
                 EncodingName::Planes => Encoding::Planes,

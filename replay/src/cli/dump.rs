@@ -6,7 +6,7 @@ use formats::Trace;
 use formats::interop::{Origin, ray_samples, record_to_json};
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
-use std::io::{self, BufWriter, Write};
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -38,7 +38,7 @@ pub struct DumpArgs {
 /// The trace cannot be read, has no such pass or tile, or the output cannot be written.
 pub fn run(args: &DumpArgs) -> Result<ExitCode> {
     let trace = Trace::open(&args.trace)?;
-    let mut out = BufWriter::new(io::stdout().lock());
+    let mut out = shell::stdout();
     dump(&trace, args, &mut out)?;
     out.flush()?;
     Ok(ExitCode::SUCCESS)

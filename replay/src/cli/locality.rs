@@ -15,6 +15,9 @@ use shell::{Output, Progress, is_stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+/// What `--orders` is without a value.
+const USUAL_ORDERS: &str = "morton,z2-lrta,z2-sta,z2-sta-merge";
+
 /// Arguments of `replay locality`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -36,13 +39,9 @@ pub struct Args {
     addresses: AddressInput,
     #[command(flatten)]
     machine: ConfigArgs,
-    /// Orders to compare, comma-separated, or `all`
-    #[arg(
-        long,
-        value_name = "ORDERS",
-        default_value = "morton,z2-lrta,z2-sta,z2-sta-merge"
-    )]
-    orders: String,
+    /// Orders to compare, comma-separated, or `all` [default: morton,z2-lrta,z2-sta,z2-sta-merge]
+    #[arg(long, value_name = "ORDERS", conflicts_with = "addresses")]
+    orders: Option<String>,
     /// Also analyse what all cores ask for as one stream
     #[arg(long)]
     merged: bool,
@@ -70,7 +69,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         config.order == RunConfig::default().order,
         "--order is varied here; use --orders"
     );
-    let orders = parse_orders(&args.orders)?;
+    let orders = parse_orders(args.orders.as_deref().unwrap_or(USUAL_ORDERS))?;
     let prints = check_outputs(args)?;
     let traces = match args.addresses.path(&args.machine)? {
         Some(path) => vec![of_addresses(args, path, &config)?],
@@ -134,6 +133,9 @@ fn of_addresses(args: &Args, path: &Path, config: &RunConfig) -> Result<TraceFig
 
 /// Checks the outputs; true where standard output is left for the result.
 fn check_outputs(args: &Args) -> Result<bool> {
+    if let Some(folder) = &args.csv {
+        shell::check_folder("--csv", folder)?;
+    }
     let csv: Vec<PathBuf> = args
         .csv
         .iter()

@@ -142,9 +142,12 @@ impl<'a> Sweep<'a> {
         );
         let usual = || Path::new("out").join(args.experiment.file_stem().unwrap_or_default());
         let out = args.out.clone().unwrap_or_else(usual);
+        shell::check_folder("--out", &out)?;
+        let store = Store::new(&out);
+        shell::check_folder("--out", store.folder())?;
         Ok(Self {
             traces: Traces::open(&paths)?,
-            store: Store::new(&out),
+            store,
             args,
             file,
             plan,
@@ -163,6 +166,13 @@ impl<'a> Sweep<'a> {
     }
 
     fn check_outputs(&self) -> Result<()> {
+        if let Some(path) = &self.args.parquet.path {
+            ensure!(
+                path != self.store.folder(),
+                "--parquet {}: expected a file, found the name of the points' folder",
+                path.display()
+            );
+        }
         let outputs = self.outputs();
         let outputs = outputs.iter().map(|path| Output::text("--out", path));
         let mut outputs: Vec<Output> = outputs.chain(self.args.parquet.output()).collect();

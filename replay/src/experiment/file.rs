@@ -14,6 +14,7 @@
 use super::plan::{Axis, MOST_POINTS, Plan, PlanError};
 use crate::config::RunConfig;
 use serde::Deserialize;
+use std::collections::HashSet;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
@@ -84,7 +85,7 @@ impl ExperimentFile {
                     }
                 }
                 ("base", DeValue::Table(table)) => {
-                    for (key, offset, value) in leaves(table) {
+                    for (key, offset, value) in leaves(table)? {
                         let set = to_value(value).and_then(|value| {
                             set(&mut base, &key, value);
                             parsed(&base)
@@ -160,7 +161,7 @@ fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
             values,
         })
     };
-    leaves(table)
+    leaves(table)?
         .into_iter()
         .map(|(key, offset, value)| {
             axis(&key, value).map_err(|message| Fault {
@@ -172,8 +173,9 @@ fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
         .collect()
 }
 
-/// The leaves of nested tables with dotted keys, in the order of the file.
-fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Vec<Leaf<'a, 'i>> {
+/// The leaves of nested tables with dotted keys, in the order of the file. One key may be written in several
+/// ways (`"l1.ways"`, `l1.ways`), but only once.
+fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Result<Vec<Leaf<'a, 'i>>, Fault> {
     fn walk<'a, 'i>(table: &'a DeTable<'i>, prefix: &str, out: &mut Vec<Leaf<'a, 'i>>) {
         for (key, value) in table.iter() {
             let path = format!("{prefix}{}", key.get_ref());
@@ -186,7 +188,15 @@ fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Vec<Leaf<'a, 'i>> {
     let mut out = Vec::new();
     walk(table, "", &mut out);
     out.sort_by_key(|(_, offset, _)| *offset);
-    out
+    let mut known = HashSet::new();
+    match out.iter().find(|(key, ..)| !known.insert(key.as_str())) {
+        None => Ok(out),
+        Some((key, offset, _)) => Err(Fault {
+            offset: *offset,
+            key: key.clone(),
+            message: "duplicate key".to_owned(),
+        }),
+    }
 }
 
 fn to_value(value: &DeValue) -> Result<Value, String> {

@@ -3,8 +3,9 @@
 use crate::config::RunConfig;
 use crate::files::write_atomically;
 use crate::result::{RunResult, TOOL, TraceId};
+use formats::container::kind_of;
 use serde::{Deserialize, Serialize};
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -25,6 +26,9 @@ pub struct StoredPoint {
     /// Result.
     pub result: RunResult,
 }
+
+/// Larger than any point, counts by tile included.
+const LARGEST_POINT_BYTES: u64 = 1 << 29;
 
 /// Writing a point takes milliseconds: an unfinished file as old as this has no writer.
 const ABANDONED_AFTER: Duration = Duration::from_secs(600);
@@ -71,6 +75,23 @@ pub fn point_key(trace: &TraceId, config: &RunConfig) -> String {
     format!("{hash:032x}")
 }
 
+/// Reads a point's file, which is looked at before: a pipe would be waited for, and what is larger than any
+/// point would fill the memory.
+fn read_whole(path: &Path) -> io::Result<Vec<u8>> {
+    let found = std::fs::metadata(path)?;
+    let refused = |what: String| Err(io::Error::other(what));
+    if !found.is_file() {
+        return refused(format!("expected a file, found {}", kind_of(&found)));
+    }
+    if found.len() > LARGEST_POINT_BYTES {
+        let length = found.len();
+        return refused(format!(
+            "expected at most {LARGEST_POINT_BYTES} bytes, found {length}"
+        ));
+    }
+    std::fs::read(path)
+}
+
 impl Store {
     /// The points of the sweep whose outputs lie in `folder`.
     #[must_use]
@@ -78,6 +99,12 @@ impl Store {
         Self {
             folder: folder.join("points"),
         }
+    }
+
+    /// Where the points' files lie.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// The file of a point.
@@ -99,11 +126,10 @@ impl Store {
             schema: String,
             tool: String,
         }
-        let bytes =
-            std::fs::read(self.path(trace, config)).map_err(|error| match error.kind() {
-                ErrorKind::NotFound => Absent::Missing,
-                _ => Absent::Damaged(error.to_string()),
-            })?;
+        let bytes = read_whole(&self.path(trace, config)).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => Absent::Missing,
+            _ => Absent::Damaged(error.to_string()),
+        })?;
         let damaged = |error: serde_json::Error| Absent::Damaged(error.to_string());
         let header: Header = serde_json::from_slice(&bytes).map_err(damaged)?;
         if header.tool != TOOL || header.schema != POINT_SCHEMA {
@@ -202,6 +228,29 @@ mod tests {
         assert_eq!(
             store.find(&trace(), &config).unwrap_err().to_string(),
             format!("expected replay.point/1 of {TOOL}, found replay.point/0 of replay 0.0.1")
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_file_or_too_large_for_a_point_is_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path());
+        let config = RunConfig::default();
+        let path = store.path(&trace(), &config);
+        let found = || store.find(&trace(), &config).unwrap_err().to_string();
+        std::fs::create_dir_all(&path).unwrap();
+        assert_eq!(found(), "damaged: expected a file, found a folder");
+        std::fs::remove_dir(&path).unwrap();
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(made.unwrap().success());
+        assert_eq!(found(), "damaged: expected a file, found a pipe");
+        std::fs::remove_file(&path).unwrap();
+        let large = std::fs::File::create(&path).unwrap();
+        large.set_len(LARGEST_POINT_BYTES + 1).unwrap();
+        assert_eq!(
+            found(),
+            "damaged: expected at most 536870912 bytes, found 536870913"
         );
     }
 

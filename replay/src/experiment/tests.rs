@@ -68,6 +68,18 @@ fn what_a_file_may_not_say_is_refused_with_its_line() {
         ),
         ("[base]\nseed = = 1\n", "line 2: "),
         (
+            "[axes]\nl1.ways = [2]\n\"l1.ways\" = [4]\n",
+            "line 3: `l1.ways`: duplicate key",
+        ),
+        (
+            "[base]\n\"l1.ways\" = 2\nl1 = { ways = 4 }\n",
+            "line 3: `l1.ways`: duplicate key",
+        ),
+        (
+            "[axes]\nl1.size_bytes = [-1]\n",
+            "line 2: `l1.size_bytes`: invalid value: integer `-1`, expected a number of bytes or a text",
+        ),
+        (
             "axes = 1\n",
             "line 1: `axes`: expected a table, found integer",
         ),

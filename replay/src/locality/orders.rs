@@ -2,7 +2,7 @@
 
 use super::figures::Figures;
 use super::place::Place;
-use super::profile::{Profile, StreamCache};
+use super::profile::{Profile, StreamCache, check_size};
 use crate::config::{ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::order::{self, Phase};
@@ -98,6 +98,7 @@ pub fn analyse(
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<OrderFigures>, ReplayError> {
     config.validate()?;
+    check_size(config, config.cores + u32::from(merged))?;
     let passes = &trace.tables().passes;
     let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
     frames.sort_unstable();

@@ -2,7 +2,7 @@
 
 use super::orders::{OrderFigures, Sequence, Stream};
 use super::place::Place;
-use super::profile::{Profile, StreamCache};
+use super::profile::{Profile, StreamCache, check_size};
 use crate::addresses::{AddressError, KindSet, for_line_blocks};
 use crate::config::{CacheConfig, ConfigError, RunConfig};
 use formats::interop::plain::AddressFile;
@@ -75,6 +75,7 @@ pub fn analyse_addresses(
     config: &RunConfig,
     kinds: KindSet,
 ) -> Result<OrderFigures, AddressError> {
+    check_size(config, 1)?;
     let sets = [("L1", &config.l1), ("L2", &config.l2)]
         .map(|(level, cache)| most_sets(level, cache, config.line_bytes));
     let [l1_sets, l2_sets] = sets;

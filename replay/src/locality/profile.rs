@@ -15,7 +15,7 @@ use super::set_associative::{CacheHits, SetAssociative};
 use super::split::MissSplit;
 use super::working_set::WorkingSets;
 use crate::cache::{AnyCache, Cache};
-use crate::config::{CacheConfig, ConfigError};
+use crate::config::{CacheConfig, ConfigError, RunConfig};
 
 /// The cache that a stream goes to.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +35,28 @@ const WAYS: [u32; 5] = [1, 2, 4, 8, 16];
 
 /// Sizes of the curves: the configured one over 8 to 16 times it.
 const SIZES: std::ops::RangeInclusive<i32> = -3..=4;
+
+/// More lines of all caches together than this are taken for a mistake: the curves' caches, up to sixteen times
+/// as large and of several associativities, take some 800 MiB for as many.
+const MOST_LINES: u64 = 1 << 21;
+
+/// Checks that memory holds what stands for caches of a configuration, `first_levels` of them L1s.
+///
+/// # Errors
+/// Too many lines.
+pub(super) fn check_size(config: &RunConfig, first_levels: u32) -> Result<(), ConfigError> {
+    let lines = |cache: &CacheConfig| cache.size_bytes / u64::from(config.line_bytes);
+    let of_first = lines(&config.l1).saturating_mul(first_levels.into());
+    let found = of_first.saturating_add(lines(&config.l2));
+    if found <= MOST_LINES {
+        return Ok(());
+    }
+    Err(ConfigError::Range {
+        key: "lines of all L1 and L2 caches",
+        expected: "at most 2097152 for locality, whose curves go to sixteen times the size",
+        found: found.to_string(),
+    })
+}
 
 /// Times of the first axis.
 const FIRST_AXIS: u32 = 1 << 16;

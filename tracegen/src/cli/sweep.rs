@@ -166,6 +166,7 @@ fn plan_text(planned: &[Planned], json: bool) -> anyhow::Result<String> {
 /// its trace is that of the same command line by hand.
 fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
     let place = || args.output.display().to_string();
+    shell::check_folder("--output", &args.output)?;
     std::fs::create_dir_all(&args.output).with_context(place)?;
     let outputs: Vec<Output> = planned
         .iter()

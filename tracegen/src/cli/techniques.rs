@@ -4,7 +4,7 @@ use super::cache_args::CacheArgs;
 use super::lens_args::LensArgs;
 use super::path_args::PathArgs;
 use super::prepared::{Prepared, prepare};
-use super::raster;
+use super::raster::{self, TileEncoding};
 use super::scene_args::SceneArgs;
 use crate::study::auto::{AutoRecord, Budget, choose};
 use crate::study::folder::{self, Folder, RowRecord, Subject};
@@ -52,6 +52,9 @@ pub struct TechniquesArgs {
     /// Measured frames that go into each technique's trace.
     #[arg(long, value_name = "N", default_value_t = 1)]
     trace_frames: u32,
+    /// How the tiles of the traces are packed.
+    #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
+    encoding: TileEncoding,
     /// Times that each frame is timed, the baseline's beside it.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
@@ -142,6 +145,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         baseline: Row::baseline().name,
         repeats: args.repeats,
         trace_frames: extent.trace_frames.clone(),
+        trace_encoding: args.encoding.encoding(),
         shadow_cascades: cascades,
         input_checksum: checksum(&inputs)?,
     };
@@ -179,6 +183,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         backend: &mut backend,
         captures,
         extent: &extent,
+        encoding: subject.trace_encoding,
         truth: HashMap::new(),
         folder: &folder,
         progress: &progress,

@@ -5,6 +5,7 @@
 use super::auto::AutoRecord;
 use anyhow::{Context, ensure};
 use formats::container::AtomicFile;
+use formats::textrace::Encoding;
 use formats::view::{Hmd, Lens};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -57,6 +58,8 @@ pub struct Subject {
     pub repeats: u32,
     /// Frames of each row's trace.
     pub trace_frames: Vec<u32>,
+    /// How the tiles of the traces are packed.
+    pub trace_encoding: Encoding,
     /// Shadow cascades.
     pub shadow_cascades: u32,
     /// Checksum of the files that scene and path are read from.
@@ -387,6 +390,7 @@ mod tests {
             baseline: "per-eye".into(),
             repeats: 1,
             trace_frames: Vec::new(),
+            trace_encoding: Encoding::Delta,
             shadow_cascades: 0,
             input_checksum: String::new(),
         }

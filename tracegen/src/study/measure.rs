@@ -5,7 +5,7 @@ use super::memory;
 use super::processor;
 use super::rows::Row;
 use super::world::{Shot, Tracer, World};
-use formats::textrace::TextraceWriter;
+use formats::textrace::{Encoding, TextraceWriter};
 use raster::backend::Marks;
 use raster::lavapipe::Lavapipe;
 use raster::truth::Wrong;
@@ -65,6 +65,8 @@ pub struct Bench<'a> {
     pub captures: bool,
     /// What is measured.
     pub extent: &'a Extent,
+    /// How the tiles of the traces are packed.
+    pub encoding: Encoding,
     /// What the eyes see in truth, by frame, as far as it was asked for.
     pub truth: HashMap<u32, Vec<Vec<Marks>>>,
     /// Where it goes.
@@ -145,7 +147,7 @@ impl Bench<'_> {
             true => None,
             false => Some(Tracer::new(
                 &tables[0],
-                TextraceWriter::create(&trace_path, &tables[0])?,
+                TextraceWriter::create(&trace_path, &tables[0])?.with_encoding(self.encoding),
             )),
         };
         // Frames that are not kept are captured, too: for what they sample.

@@ -135,17 +135,17 @@ impl<R: BufRead> ZstdReader<R> {
 }
 
 fn wrong_frame(error: FrameDecoderError) -> io::Error {
-    // The end of the input lies deep inside; its cause alone says what happened.
-    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(&error);
-    while let Some(inner) = cause {
-        if let Some(io) = inner.downcast_ref::<io::Error>()
-            && io.kind() == io::ErrorKind::UnexpectedEof
-        {
-            return io::ErrorKind::UnexpectedEof.into();
-        }
-        cause = inner.source();
+    // What happened lies deep inside; what is around it repeats it in the words of a debugger.
+    let mut cause: &(dyn std::error::Error + 'static) = &error;
+    while let Some(inner) = cause.source() {
+        cause = inner;
     }
-    invalid(&error.to_string())
+    match cause.downcast_ref::<io::Error>() {
+        Some(io) if io.kind() == io::ErrorKind::UnexpectedEof => {
+            io::ErrorKind::UnexpectedEof.into()
+        }
+        _ => invalid(&cause.to_string()),
+    }
 }
 
 fn invalid(why: &str) -> io::Error {

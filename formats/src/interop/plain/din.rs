@@ -49,9 +49,11 @@ impl Decoder for Din {
                 return Err(Fault {
                     place: Place::Line(self.lines + 1),
                     at: taken,
-                    expected: "a label (0 read, 1 write, 2 fetch) and a hexadecimal address, or r, w or i, \
-                               an address and a size"
-                        .to_owned(),
+                    expected: format!(
+                        "a label (0 read, 1 write, 2 fetch) and a hexadecimal address, or r, w or i, an \
+                         address and a size of at most {:#x} bytes, all below 2^64",
+                        PlainAccess::MOST_BYTES
+                    ),
                     found: shown(rest.get(..end.unwrap_or(rest.len())).unwrap_or(rest)),
                 });
             };

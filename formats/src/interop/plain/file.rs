@@ -109,13 +109,14 @@ impl<'a> AddressFile<'a> {
         form: Option<AddressForm>,
         stream: impl Read + 'a,
     ) -> Result<Self, FormatError> {
-        let (magic, stream) = head_of(stream, 4).map_err(|e| FormatError::io(&name, "read", e))?;
+        let plain = |(source, at)| unreadable(&name, None, at, source);
+        let (magic, stream) = head_of(stream, 4).map_err(plain)?;
         let compression = Compression::of_content(&magic);
         let stream: Box<dyn Read + 'a> = match compression {
             None => Box::new(stream),
             Some(compression) => compression.reader(BufReader::with_capacity(1 << 16, stream)),
         };
-        let read = |source| unreadable(&name, compression, source);
+        let read = |(source, at)| unreadable(&name, compression, at, source);
         let (head, stream) = head_of(stream, HEAD_BYTES).map_err(read)?;
         let form = told(&name, form, &head, head.len() < HEAD_BYTES)?;
         Ok(Self {
@@ -236,7 +237,9 @@ impl<'a> AddressFile<'a> {
         loop {
             let room = (BUFFER_BYTES - buffer.len()) as u64;
             let read = stream.by_ref().take(room).read_to_end(&mut buffer);
-            let read = read.map_err(|source| unreadable(&name, compression, source))?;
+            let read = read.map_err(|source| {
+                unreadable(&name, compression, at + buffer.len() as u64, source)
+            })?;
             let ended = (read as u64) < room;
             let taken = take(&buffer, at, ended)?;
             if ended {
@@ -248,10 +251,11 @@ impl<'a> AddressFile<'a> {
     }
 }
 
-/// Up to `count` first bytes of a stream, and the stream with them.
-fn head_of<R: Read>(mut stream: R, count: usize) -> io::Result<(Vec<u8>, impl Read)> {
+/// Up to `count` first bytes of a stream, and the stream with them; or what went wrong behind how many bytes.
+fn head_of<R: Read>(mut stream: R, count: usize) -> Result<(Vec<u8>, impl Read), (io::Error, u64)> {
     let mut head = Vec::new();
-    stream.by_ref().take(count as u64).read_to_end(&mut head)?;
+    let read = stream.by_ref().take(count as u64).read_to_end(&mut head);
+    read.map_err(|source| (source, head.len() as u64))?;
     Ok((head.clone(), Cursor::new(head).chain(stream)))
 }
 
@@ -293,19 +297,24 @@ fn wanted(name: &str, expected: &str, found: &str) -> FormatError {
     FormatError::io(name, "read", io::Error::other(message))
 }
 
-fn unreadable(name: &str, compression: Option<Compression>, source: io::Error) -> FormatError {
+/// `at` is how many bytes of content came before.
+fn unreadable(
+    name: &str,
+    compression: Option<Compression>,
+    at: u64,
+    source: io::Error,
+) -> FormatError {
     let action = match compression {
         None => "read",
         Some(Compression::Gzip) => "decompress (gzip)",
         Some(Compression::Zstd) => "decompress (zstd)",
     };
-    let source = match source.kind() {
-        io::ErrorKind::UnexpectedEof => {
-            io::Error::new(source.kind(), "expected more, found the end")
-        }
-        _ => source,
+    let why = match source.kind() {
+        io::ErrorKind::UnexpectedEof => "expected more, found the end".to_owned(),
+        _ => source.to_string(),
     };
-    FormatError::io(name, action, source)
+    let why = format!("after {at} bytes of content: {why}");
+    FormatError::io(name, action, io::Error::new(source.kind(), why))
 }
 
 #[cfg(unix)]

@@ -325,15 +325,24 @@ fn cut_or_damaged_compression_is_refused() {
         let packed = compressed(compression, &bytes);
         for end in [5, 12, packed.len() / 2, packed.len() - 1] {
             let error = refused(&packed[..end], Some(AddressForm::U64));
-            let expected = format!("x: cannot decompress ({}): ", compression.name());
+            let expected = format!("x: cannot decompress ({}): after ", compression.name());
             assert!(error.starts_with(&expected), "{end}: {error}");
+            assert!(
+                error.ends_with(" bytes of content: expected more, found the end"),
+                "{end}: {error}"
+            );
         }
+        let head = refused(&packed[..5], Some(AddressForm::U64));
+        assert!(head.contains("after 0 bytes"), "{head}");
         let mut wrong = packed.clone();
         let last = wrong.len() - 1;
         wrong[last] ^= 1;
         assert!(refused(&wrong, Some(AddressForm::U64)).contains("cannot decompress"));
         let noise = [packed.as_slice(), b"noise"].concat();
-        assert!(refused(&noise, Some(AddressForm::U64)).contains("cannot decompress"));
+        let error = refused(&noise, Some(AddressForm::U64));
+        let expected = format!(": after {} bytes of content: ", bytes.len());
+        assert!(error.contains(&expected), "{error}");
+        assert!(!error.contains("BadMagicNumber"), "{error}");
     }
 }
 
