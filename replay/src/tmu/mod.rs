@@ -3,6 +3,8 @@
 
 mod closed_form;
 mod pipeline;
+mod waiting;
 
 pub use closed_form::closed_form;
-pub use pipeline::{Pending, Pipeline, PipelineStats, Turn, Waiting};
+pub use pipeline::{Pipeline, PipelineStats, Turn};
+pub use waiting::{Pending, Waiting};

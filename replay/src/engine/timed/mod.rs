@@ -1,6 +1,7 @@
 //! Timed replay: each core's texture unit runs on its own cycle clock, and the clocks decide in
 //! which order the cores' misses reach the shared L2.
 
+mod asking;
 mod memory;
 
 use super::Machine;
