@@ -70,10 +70,10 @@ impl CacheCounts {
         self.cells[cell].l1.secondary += u64::from(lines);
     }
 
-    /// Counts a line that a footprint fetches. `missed`: whether this footprint has fetched a line into
+    /// Counts lines that a footprint fetches, one or all of them. `missed`: whether this footprint has fetched a line into
     /// the L1 and into the L2; true from now on for what it has.
     #[inline(always)]
-    pub fn line(
+    pub fn fetched(
         &mut self,
         cell: usize,
         tile: usize,
@@ -100,22 +100,11 @@ impl CacheCounts {
     /// Counts a footprint that did not find all its lines.
     #[inline]
     pub fn footprint(&mut self, cell: usize, tile: usize, misses: &FootprintMisses) {
-        let (missed_l1, missed_l2) = (misses.l1_lines > 0, misses.l2_lines > 0);
-        let CellMisses { l1, l2 } = &mut self.cells[cell];
-        if !missed_l1 {
+        if misses.l1_lines == 0 {
             // The L2 was not asked.
-            l1.secondary += u64::from(misses.l1_secondary);
-            return;
-        }
-        l1.footprints += u64::from(missed_l1);
-        l1.lines += u64::from(misses.l1_lines);
-        l1.secondary += u64::from(misses.l1_secondary);
-        l2.footprints += u64::from(missed_l2);
-        l2.lines += u64::from(misses.l2_lines);
-        l2.secondary += u64::from(misses.l2_secondary);
-        if let Some(tile) = self.tiles.get_mut(tile) {
-            tile.l1_footprints += u32::from(missed_l1);
-            tile.l2_lines += misses.l2_lines;
+            self.secondary(cell, misses.l1_secondary);
+        } else {
+            self.fetched(cell, tile, misses, &mut [false; 2]);
         }
     }
 }

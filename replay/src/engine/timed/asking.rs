@@ -74,7 +74,7 @@ impl<D: DelayedFill> Asking<'_, D> {
                         ..FootprintMisses::default()
                     };
                     let ready = self.fetch(line, &mut misses);
-                    self.counts.line(cell, quad.tile(), &misses, &mut missed);
+                    self.counts.fetched(cell, quad.tile(), &misses, &mut missed);
                     ready
                 } else {
                     self.counts.secondary(cell, users.count_ones());

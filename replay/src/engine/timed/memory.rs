@@ -141,33 +141,33 @@ impl<D: DelayedFill> Memory<D> {
     /// thread's footprints wait for.
     #[inline(never)]
     pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Waiting {
-        let First {
-            cache,
-            waiting,
-            absent,
-            segments,
-        } = &mut self.l1[core];
+        let first = &mut self.l1[core];
         let mut asking = Asking {
-            l1: cache,
+            l1: &mut first.cache,
             l2: &mut self.l2,
             tmu: &self.tmu,
             counts: &mut self.counts,
-            waiting,
+            waiting: &mut first.waiting,
             now,
             trips: Trips::default(),
         };
-        if absent.is_empty() {
+        if first.absent.is_empty() {
             asking.one_by_one(quad);
         } else if quad.is_one_segment() {
-            asking.segment(quad, absent, 0, &mut self.by_first_use);
+            asking.segment(quad, &first.absent, 0, &mut self.by_first_use);
         } else {
             let mut start = 0;
-            for (segment, &end) in (0..).zip(&*segments) {
-                asking.segment(quad, &absent[start..end], segment, &mut self.by_first_use);
+            for (segment, &end) in (0..).zip(&first.segments) {
+                asking.segment(
+                    quad,
+                    &first.absent[start..end],
+                    segment,
+                    &mut self.by_first_use,
+                );
                 start = end;
             }
-            waiting.sort_by_segment();
+            first.waiting.sort_by_segment();
         }
-        waiting
+        &mut first.waiting
     }
 }
