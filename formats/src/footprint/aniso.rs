@@ -1,8 +1,11 @@
 //! Anisotropic filtering: what a quad reads where its pixels are long and narrow in the texture.
 //!
-//! Two models. *Probes* (`EXT_texture_filter_anisotropic`): the filter is applied up to N times along the longer
-//! axis of the pixel, at a level that is finer by N. *Ellipse* (softpipe's, after Greene and Heckbert, 1986): all
-//! texels of one level inside the pixel's ellipse, which a texture unit fetches as 2x2 blocks.
+//! Three models. *Probes* (Vulkan 1.3, section "Texel Anisotropic Filtering"): the filter is applied N times along the
+//! longer axis of the pixel. With the axes' lengths a and b, a >= b, and the ratio r = min(a / b, maximum), N is r
+//! rounded up and the level of detail is log2(a / r). *Rounded probes* (the example in
+//! `EXT_texture_filter_anisotropic`): the same N, and log2(a / N). It drops a level as soon as a exceeds b.
+//! *Ellipse* (softpipe's, after Greene and Heckbert, 1986): all texels of one level inside the pixel's ellipse, which a
+//! texture unit fetches as 2x2 blocks.
 
 use super::{LodFormula, SamplingOptions, fast_log2};
 use crate::textrace::{QuadRecord, SUBTEXELS};
@@ -16,9 +19,11 @@ pub const MOST_ANISOTROPY: u32 = 16;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AnisotropyModel {
-    /// The filter, several times along the longer axis, as `EXT_texture_filter_anisotropic` says.
+    /// The filter, several times along the longer axis; the level follows from the ratio of the axes, as in Vulkan.
     #[default]
     Probes,
+    /// As probes; the level follows from the ratio rounded up, as in the example of `EXT_texture_filter_anisotropic`.
+    RoundedProbes,
     /// Every texel of the pixel's ellipse on one level, as softpipe.
     Ellipse,
 }
@@ -68,7 +73,7 @@ impl Reach {
         }
         let most = options.max_anisotropy.min(MOST_ANISOTROPY);
         match options.anisotropy {
-            AnisotropyModel::Probes => {
+            model @ (AnisotropyModel::Probes | AnisotropyModel::RoundedProbes) => {
                 // The least N of which N times the shorter axis is no less than the longer one.
                 let square = |n: u32| (n * n) as f32;
                 let count = (1..most).find(|&n| square(n) * shorter >= longer);
@@ -81,12 +86,18 @@ impl Reach {
                 } else {
                     (record.dy, dy)
                 };
+                // The square of what the level is the logarithm of: a / N, or a / min(a / b, most).
+                let narrowed = match model {
+                    AnisotropyModel::RoundedProbes => longer / square(count),
+                    _ => shorter.max(longer / square(most)),
+                };
                 let lod = match options.lod {
-                    LodFormula::Llvmpipe => 0.5 * fast_log2(longer / square(count)),
-                    LodFormula::Exact | LodFormula::PerLane => {
-                        0.5 * (longer / square(count)).log2()
+                    LodFormula::Llvmpipe => 0.5 * fast_log2(narrowed),
+                    LodFormula::Exact | LodFormula::PerLane => 0.5 * narrowed.log2(),
+                    LodFormula::Softpipe => {
+                        let ratio = (longer / narrowed).sqrt();
+                        (d[0].abs().max(d[1].abs()) / ratio).log2()
                     }
-                    LodFormula::Softpipe => (d[0].abs().max(d[1].abs()) / count as f32).log2(),
                 };
                 Self::Probes(Probes {
                     count,

@@ -106,31 +106,139 @@ fn pixels_as_wide_as_long_or_no_longer_than_a_texel_are_filtered_as_ever() {
     }
 }
 
-/// The count of probes and their places as the extension's text has them, in floating point.
-fn by_the_extension(dx: [f64; 2], dy: [f64; 2], most: u32) -> (u32, f64, Vec<[f64; 2]>) {
+#[test]
+fn a_pixel_a_hundredth_longer_than_wide_drops_a_level_by_the_rounded_ratio_alone() {
+    let quad = record([512.0, 512.0], [8.08, 0.0], [0.0, 8.0]);
+    for (model, lod) in [
+        (AnisotropyModel::Probes, 3.0),
+        (AnisotropyModel::RoundedProbes, 4.04_f32.log2()),
+    ] {
+        let sampler = Sampler::TRILINEAR_REPEAT;
+        match Reach::of(
+            &quad,
+            [SIZE; 2],
+            [SIZE; 2],
+            11,
+            &sampler,
+            &options(16, model),
+        ) {
+            Reach::Probes(probes) => {
+                assert_eq!(probes.count, 2);
+                assert!((probes.lod - lod).abs() < 1e-3, "{model:?} {}", probes.lod);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn levels_that_a_ratio_changes_by_little_change_by_little() {
+    // Widths of 4 texels, lengths from 4.01 on; the rounded ratio jumps at each whole number.
+    let lod = |model, length: f64| {
+        let quad = record([512.0, 512.0], [0.0, length], [4.0, 0.0]);
+        let sampler = Sampler::TRILINEAR_REPEAT;
+        match Reach::of(
+            &quad,
+            [SIZE; 2],
+            [SIZE; 2],
+            11,
+            &sampler,
+            &options(4, model),
+        ) {
+            Reach::Probes(probes) => probes.lod,
+            other => panic!("{length}: {other:?}"),
+        }
+    };
+    let largest_step = |model| {
+        let lods: Vec<f32> = (1..800)
+            .map(|i| lod(model, 4.0 + f64::from(i) / 50.0))
+            .collect();
+        let steps = lods.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        steps.fold(0.0, f32::max)
+    };
+    assert!(largest_step(AnisotropyModel::Probes) < 0.01);
+    assert!(largest_step(AnisotropyModel::RoundedProbes) > 0.5);
+}
+
+#[test]
+fn with_a_level_a_lane_each_lane_reads_what_it_would_read_alone() {
+    // From 2:1 in the first lane to 10:1 in the last one.
+    let quad = QuadRecord {
+        mask: 15,
+        cross: [24.0, -1.0].map(fixed),
+        ..record([512.0, 300.0], [16.0, 1.0], [2.0, 8.0])
+    };
+    for model in [
+        AnisotropyModel::Probes,
+        AnisotropyModel::RoundedProbes,
+        AnisotropyModel::Ellipse,
+    ] {
+        let exact = options(16, model);
+        let per_lane = SamplingOptions {
+            lod: LodFormula::PerLane,
+            ..exact
+        };
+        let mut found = all(&quad, &per_lane);
+        assert!(found.windows(2).all(|pair| pair[0].level <= pair[1].level));
+        let levels: BTreeSet<u8> = found.iter().map(|f| f.level).collect();
+        assert!(levels.len() > 1, "{model:?} {levels:?}");
+        let alone = (0..4).flat_map(|lane| {
+            let add =
+                |d: [i32; 2], add: bool| [0, 1].map(|a| d[a] + i32::from(add) * quad.cross[a]);
+            let own = QuadRecord {
+                mask: 1,
+                uv: quad.lane_uv(lane),
+                dx: add(quad.dx, lane > 1),
+                dy: add(quad.dy, lane % 2 == 1),
+                cross: [0; 2],
+                ..quad
+            };
+            let lane = lane as u8;
+            all(&own, &exact)
+                .into_iter()
+                .map(move |f| Footprint { lane, ..f })
+        });
+        let mut alone: Vec<Footprint> = alone.collect();
+        let key = |f: &Footprint| (f.lane, f.level, f.i, f.j);
+        alone.sort_by_key(key);
+        found.sort_by_key(key);
+        assert_eq!(found, alone, "{model:?}");
+    }
+}
+
+/// The count of probes, their level and their places in floating point, as Vulkan's text has them; with `rounded`, the
+/// level as in the example of `EXT_texture_filter_anisotropic`.
+fn by_the_text(dx: [f64; 2], dy: [f64; 2], most: u32, rounded: bool) -> (u32, f64, Vec<[f64; 2]>) {
     let (px, py) = (dx[0].hypot(dx[1]), dy[0].hypot(dy[1]));
     let (p_max, p_min) = (px.max(py), px.min(py));
-    let n = (p_max / p_min).ceil().min(f64::from(most));
+    let ratio = (p_max / p_min).min(f64::from(most));
+    let n = ratio.ceil();
     let axis = if px >= py { dx } else { dy };
     let places = (1..=n as u32).map(|i| axis.map(|d| d * (f64::from(i) / (n + 1.0) - 0.5)));
-    (n as u32, (p_max / n).log2(), places.collect())
+    let narrowed = p_max / if rounded { n } else { ratio };
+    (n as u32, narrowed.log2(), places.collect())
 }
 
 proptest! {
     #[test]
-    fn probes_lie_where_the_extension_says(
+    fn probes_lie_where_the_text_says(
         d in prop::array::uniform4(-300.0_f64..300.0),
         most in 2_u32..=16,
+        rounded in any::<bool>(),
     ) {
         let (dx, dy) = ([d[0], d[1]], [d[2], d[3]]);
-        let (count, lod, places) = by_the_extension(dx, dy, most);
+        let (count, lod, places) = by_the_text(dx, dy, most, rounded);
         let (px, py) = (dx[0].hypot(dx[1]), dy[0].hypot(dy[1]));
         let ratio = px.max(py) / px.min(py);
         // Next to a whole number rounding decides.
         prop_assume!(px.max(py) > 1.1 && (ratio - ratio.round()).abs() > 1e-2);
         let quad = record([100.0, 900.0], dx, dy);
         let sampler = Sampler::TRILINEAR_REPEAT;
-        let options = options(most, AnisotropyModel::Probes);
+        let model = match rounded {
+            true => AnisotropyModel::RoundedProbes,
+            false => AnisotropyModel::Probes,
+        };
+        let options = options(most, model);
         match Reach::of(&quad, [SIZE; 2], [SIZE; 2], 11, &sampler, &options) {
             Reach::Isotropic => prop_assert_eq!(count, 1),
             Reach::Probes(probes) => {

@@ -37,17 +37,27 @@ pub fn quad_lod(record: &QuadRecord, extent: [u32; 2], size: [u32; 2], formula: 
     }
 }
 
-/// Level of detail of one lane by [`LodFormula::PerLane`]: from the differences along its own row and
-/// its own column of the quad.
+/// The record with one lane's own derivatives, for [`LodFormula::PerLane`]: the differences along its own row and its
+/// own column of the quad. Coordinates still have to be taken from the record itself.
 #[must_use]
-pub fn lane_lod(record: &QuadRecord, lane: u32, extent: [u32; 2], size: [u32; 2]) -> f32 {
+pub fn lane_record(record: &QuadRecord, lane: u32) -> QuadRecord {
     let own = |derivative: [i32; 2], other: bool| {
         [0, 1].map(|a| derivative[a].wrapping_add(if other { record.cross[a] } else { 0 }))
     };
-    let of_lane = QuadRecord {
+    QuadRecord {
         dx: own(record.dx, lane >> 1 & 1 == 1),
         dy: own(record.dy, lane & 1 == 1),
         ..*record
-    };
-    quad_lod(&of_lane, extent, size, LodFormula::PerLane)
+    }
+}
+
+/// Level of detail of one lane by [`LodFormula::PerLane`], without bias.
+#[must_use]
+pub fn lane_lod(record: &QuadRecord, lane: u32, extent: [u32; 2], size: [u32; 2]) -> f32 {
+    quad_lod(
+        &lane_record(record, lane),
+        extent,
+        size,
+        LodFormula::PerLane,
+    )
 }

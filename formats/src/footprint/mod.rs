@@ -8,11 +8,13 @@
 //! accesses follows it.
 
 mod aniso;
+mod lanes;
 mod lod;
 mod options;
 
 pub use aniso::{AnisotropyModel, Ellipse, MOST_ANISOTROPY, Probes, Reach};
-pub use lod::{fast_log2, lane_lod, quad_lod};
+pub use lanes::LaneReach;
+pub use lod::{fast_log2, lane_lod, lane_record, quad_lod};
 pub use options::{FilterOverride, LodFormula, SamplingOptions};
 
 use crate::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Sample, Tables, UvGroup};
@@ -150,6 +152,40 @@ pub fn footprints(
             j: wrapped(1),
         }
     };
+    if options.lod == LodFormula::PerLane {
+        let (size, levels) = (texture.size, texture.levels);
+        let reach = lanes.map(|lane| {
+            let of = LaneReach::of(record, lane, extent, size, levels, &sampler, options);
+            (lane, of)
+        });
+        let reach: Vec<(u32, LaneReach)> = reach.collect();
+        let probes = reach.iter().map(|(_, of)| of.probe_count()).max();
+        for level in 0..levels {
+            let size = texture.level_size(level);
+            for probe in 0..probes.unwrap_or(0) {
+                for (lane, of) in &reach {
+                    let Some((from_lane, filter)) = of.probe(level, probe) else {
+                        continue;
+                    };
+                    let uv = record.lane_uv(*lane);
+                    let axis = |a: usize| {
+                        let at = uv[a].wrapping_add(from_lane[a]);
+                        fetch(at, size[a], extent[a], filter)
+                    };
+                    visit(footprint(*lane, level, [axis(0), axis(1)]));
+                }
+            }
+            for (lane, of) in &reach {
+                let blocks = of
+                    .ellipse(level)
+                    .map(|ellipse| ellipse.blocks(record.lane_uv(*lane), size, extent));
+                for [x, y] in blocks.into_iter().flatten() {
+                    visit(footprint(*lane, level, [[x, x + 1], [y, y + 1]]));
+                }
+            }
+        }
+        return;
+    }
     let reach = Reach::of(
         record,
         extent,
@@ -159,23 +195,6 @@ pub fn footprints(
         options,
     );
     let (lod, probes) = match reach {
-        Reach::Isotropic if options.lod == LodFormula::PerLane => {
-            let chosen = lanes.map(|lane| {
-                let lod = lane_lod(record, lane, extent, texture.size) + options.lod_bias;
-                (lane, select_levels(lod, &sampler, texture.levels))
-            });
-            let chosen: Vec<(u32, LevelSelection)> = chosen.collect();
-            for level in 0..texture.levels {
-                let size = texture.level_size(level);
-                let reads = |of: &LevelSelection| (of.first..of.first + of.count).contains(&level);
-                for (lane, of) in chosen.iter().filter(|(_, of)| reads(of)) {
-                    let uv = record.lane_uv(*lane);
-                    let texels = [0, 1].map(|a| fetch(uv[a], size[a], extent[a], of.filter));
-                    visit(footprint(*lane, level, texels));
-                }
-            }
-            return;
-        }
         Reach::Isotropic => {
             let lod = quad_lod(record, extent, texture.size, options.lod);
             (lod + options.lod_bias, None)

@@ -14,7 +14,7 @@ pub use bundle::Bundle;
 use super::StreamError;
 use crate::config::{RunConfig, SamplingConfig};
 use axis::Axis;
-use formats::footprint::{LodFormula, Reach, fast_log2, lane_lod, quad_lod, select_levels};
+use formats::footprint::{LaneReach, LodFormula, Reach, fast_log2, quad_lod, select_levels};
 use formats::textrace::{QuadRecord, Tables};
 use formats::texture::{Filter, Sampler};
 use std::sync::Arc;
@@ -70,6 +70,14 @@ struct Kind {
     /// Bytes by which the texture starts after the start of a line.
     skew_bytes: u32,
     levels: Vec<Level>,
+}
+
+impl Kind {
+    /// Texels of a level.
+    fn level_size(&self, level: u32) -> [u32; 2] {
+        let Level { u, v, .. } = &self.levels[level as usize];
+        [u.texels(), v.texels()]
+    }
 }
 
 #[derive(Debug)]
@@ -189,6 +197,10 @@ impl Footprints {
         };
         let uv = [0, 1, 2, 3].map(|lane| record.lane_uv(lane));
         let levels = kind.levels.len() as u32;
+        if self.sampling.lod == LodFormula::PerLane {
+            self.by_lane(kind, record, lanes, &uv, out);
+            return;
+        }
         match Reach::of(
             record,
             kind.extent,
@@ -197,9 +209,6 @@ impl Footprints {
             &kind.sampler,
             &self.sampling,
         ) {
-            Reach::Isotropic if self.sampling.lod == LodFormula::PerLane => {
-                self.by_lane(kind, record, lanes, &uv, out);
-            }
             Reach::Isotropic => {
                 let mut bundles = [Bundle::default(); 2];
                 let both = self.bundles(kind, record, &mut bundles);
@@ -218,35 +227,46 @@ impl Footprints {
                 }
             }
             Reach::Ellipse(ellipse) => {
-                let Level { base_bytes, u, v } = &kind.levels[ellipse.level as usize];
-                let base = base_bytes + kind.skew_bytes;
-                let line = |offset: u32| (base + offset) >> self.line_shift;
-                let size = [u.texels(), v.texels()];
+                let size = kind.level_size(ellipse.level);
                 let blocks =
                     lanes_of(lanes).flat_map(|lane| ellipse.blocks(uv[lane], size, kind.extent));
-                let mut last = [0; 4];
-                for (number, [x, y]) in blocks.enumerate() {
-                    if number % 4 == 0 {
-                        out.push(Bundle::default());
-                    }
-                    let Some(bundle) = out.last_mut() else {
-                        continue;
-                    };
-                    if number % 4 == 0 {
-                        bundle.begin(ellipse.level as u8);
-                    }
-                    let ([x0, x1], [y0, y1]) = (u.pair_at(x), v.pair_at(y));
-                    bundle.push(
-                        [line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)],
-                        &mut last,
-                    );
-                }
+                self.push_blocks(kind, ellipse.level, blocks, out);
             }
         }
     }
 
+    /// Bundles of 2x2 texels, each given by its upper left texel before wrapping.
+    fn push_blocks(
+        &self,
+        kind: &Kind,
+        level: u32,
+        blocks: impl Iterator<Item = [i64; 2]>,
+        out: &mut Vec<Bundle>,
+    ) {
+        let Level { base_bytes, u, v } = &kind.levels[level as usize];
+        let base = base_bytes + kind.skew_bytes;
+        let line = |offset: u32| (base + offset) >> self.line_shift;
+        let mut last = [0; 4];
+        for (number, [x, y]) in blocks.enumerate() {
+            if number % 4 == 0 {
+                out.push(Bundle::default());
+            }
+            let Some(bundle) = out.last_mut() else {
+                continue;
+            };
+            if number % 4 == 0 {
+                bundle.begin(level as u8);
+            }
+            let ([x0, x1], [y0, y1]) = (u.pair_at(x), v.pair_at(y));
+            bundle.push(
+                [line(x0 + y0), line(x1 + y0), line(x0 + y1), line(x1 + y1)],
+                &mut last,
+            );
+        }
+    }
+
     /// Footprints of a record in one kind of texture where each lane has levels of its own: level by
-    /// level, the lanes that read it.
+    /// level and probe by probe, the lanes that have it; then the ellipses on this level.
     fn by_lane(
         &self,
         kind: &Kind,
@@ -256,27 +276,44 @@ impl Footprints {
         out: &mut Vec<Bundle>,
     ) {
         let levels = kind.levels.len() as u32;
-        let chosen = [0, 1, 2, 3].map(|lane| {
-            let lod = lane_lod(record, lane, kind.extent, kind.size) + self.sampling.lod_bias;
-            select_levels(lod, &kind.sampler, levels)
+        let reach = [0, 1, 2, 3].map(|lane| {
+            LaneReach::of(
+                record,
+                lane,
+                kind.extent,
+                kind.size,
+                levels,
+                &kind.sampler,
+                &self.sampling,
+            )
         });
+        let probes = lanes_of(lanes).map(|lane| reach[lane].probe_count()).max();
         for level in 0..levels {
-            // Lanes in a row that filter alike share a bundle.
-            let mut open: Option<(Filter, u8)> = None;
-            for lane in lanes_of(lanes) {
-                let of = chosen[lane];
-                if !(of.first..of.first + of.count).contains(&level) {
-                    continue;
+            for probe in 0..probes.unwrap_or(0) {
+                // Lanes in a row that filter alike share a bundle.
+                let mut open: Option<(Filter, u8)> = None;
+                let mut at = *uv;
+                for lane in lanes_of(lanes) {
+                    let Some(([u, v], own)) = reach[lane].probe(level, probe) else {
+                        continue;
+                    };
+                    at[lane] = [at[lane][0].wrapping_add(u), at[lane][1].wrapping_add(v)];
+                    open = match open {
+                        Some((filter, mask)) if filter == own => Some((filter, mask | 1 << lane)),
+                        before => {
+                            self.push(kind, level, before, &at, out);
+                            Some((own, 1 << lane))
+                        }
+                    };
                 }
-                open = match open {
-                    Some((filter, mask)) if filter == of.filter => Some((filter, mask | 1 << lane)),
-                    before => {
-                        self.push(kind, level, before, uv, out);
-                        Some((of.filter, 1 << lane))
-                    }
-                };
+                self.push(kind, level, open, &at, out);
             }
-            self.push(kind, level, open, uv, out);
+            let size = kind.level_size(level);
+            let blocks = lanes_of(lanes).filter_map(|lane| {
+                let ellipse = reach[lane].ellipse(level);
+                ellipse.map(|ellipse| ellipse.blocks(uv[lane], size, kind.extent))
+            });
+            self.push_blocks(kind, level, blocks.flatten(), out);
         }
     }
 

@@ -1,0 +1,71 @@
+//! What each lane reads where every lane has levels of its own ([`LodFormula::PerLane`](super::LodFormula)).
+
+use super::{
+    Ellipse, LevelSelection, Probes, Reach, SamplingOptions, lane_lod, lane_record, select_levels,
+};
+use crate::textrace::QuadRecord;
+use crate::texture::{Filter, Sampler};
+
+/// What one lane reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LaneReach {
+    /// The filter on one level or two, at its own place or at several probes.
+    Levels(LevelSelection, Option<Probes>),
+    /// All of an ellipse.
+    Ellipse(Ellipse),
+}
+
+impl LaneReach {
+    /// What a lane reads of a texture whose level 0 has `size` texels and that has `levels`.
+    #[must_use]
+    pub fn of(
+        record: &QuadRecord,
+        lane: u32,
+        extent: [u32; 2],
+        size: [u32; 2],
+        levels: u32,
+        sampler: &Sampler,
+        options: &SamplingOptions,
+    ) -> Self {
+        let own = lane_record(record, lane);
+        let selected = |lod| select_levels(lod, sampler, levels);
+        match Reach::of(&own, extent, size, levels, sampler, options) {
+            Reach::Isotropic => {
+                let lod = lane_lod(record, lane, extent, size) + options.lod_bias;
+                Self::Levels(selected(lod), None)
+            }
+            Reach::Probes(probes) => Self::Levels(selected(probes.lod), Some(probes)),
+            Reach::Ellipse(ellipse) => Self::Ellipse(ellipse),
+        }
+    }
+
+    /// How many times the filter is applied to each level.
+    #[must_use]
+    pub fn probe_count(&self) -> u32 {
+        match self {
+            Self::Levels(_, probes) => probes.map_or(1, |probes| probes.count),
+            Self::Ellipse(_) => 0,
+        }
+    }
+
+    /// How far from the lane's coordinates a probe lies on a level, and its filter; none where the lane has no such
+    /// probe.
+    #[must_use]
+    pub fn probe(&self, level: u32, probe: u32) -> Option<([i32; 2], Filter)> {
+        let Self::Levels(levels, probes) = self else {
+            return None;
+        };
+        let reads = (levels.first..levels.first + levels.count).contains(&level);
+        let from_lane = probes.map_or([0; 2], |probes| probes.offset(probe));
+        (reads && probe < self.probe_count()).then_some((from_lane, levels.filter))
+    }
+
+    /// The ellipse that the lane reads on a level.
+    #[must_use]
+    pub fn ellipse(&self, level: u32) -> Option<&Ellipse> {
+        match self {
+            Self::Ellipse(ellipse) if ellipse.level == level => Some(ellipse),
+            _ => None,
+        }
+    }
+}
