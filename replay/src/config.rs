@@ -167,6 +167,19 @@ impl CacheConfig {
     }
 }
 
+/// When a line that misses gets its way in the cache, and its victim is lost.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Allocation {
+    /// When it arrives, as in the Z2 paper: lines in flight take no way.
+    #[default]
+    OnFill,
+    /// When it is asked for: lines in flight take a way.
+    OnMiss,
+}
+
 /// The texture unit's pipeline ("looping for the next chance"); see `docs/tmu-model.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -184,6 +197,16 @@ pub struct TmuConfig {
     pub retry_footprints: u32,
     /// Lines that a thread asks the L2 for in one trip; further ones wait for the next trip.
     pub fetches_per_trip: u32,
+    /// When a line that misses gets its way in a cache; without effect where time does not pass (functional mode).
+    pub allocation: Allocation,
+}
+
+impl TmuConfig {
+    /// True where a miss changes a cache at once, so that a thread's later look-ups see it.
+    #[must_use]
+    pub fn misses_change_caches_at_once(&self) -> bool {
+        self.l1_penalty_cycles == 0 || self.allocation == Allocation::OnMiss
+    }
 }
 
 impl Default for TmuConfig {
@@ -195,6 +218,7 @@ impl Default for TmuConfig {
             threads: 64,
             retry_footprints: 4,
             fetches_per_trip: 2,
+            allocation: Allocation::OnFill,
         }
     }
 }

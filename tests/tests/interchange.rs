@@ -483,7 +483,7 @@ fn input_that_is_no_addresses_is_refused() {
             expected,
         );
     }
-    let of_traces: [&[&str]; 23] = [
+    let of_traces: [&[&str]; 24] = [
         &["x.textrace"],
         &["--order", "morton"],
         &["--mode", "timed"],
@@ -496,7 +496,7 @@ fn input_that_is_no_addresses_is_refused() {
         &["--helper-lanes"],
         &["--texel-format", "bc7"],
         &["--block-order", "morton"],
-        &["--uncompressed-order", "morton"],
+        &["--shadow-map-order", "morton"],
         &["--base-align", "64"],
         &["--texture-order", "table"],
         &["--l1-penalty", "1"],
@@ -505,6 +505,7 @@ fn input_that_is_no_addresses_is_refused() {
         &["--tmu-threads", "1"],
         &["--retry-footprints", "1"],
         &["--fetches-per-trip", "1"],
+        &["--allocation", "on-miss"],
         &["--compare-modes"],
         &["--tiles", "--json"],
     ];

@@ -2,7 +2,7 @@
 //!
 //! A texture's layers follow one another, each with its levels from fine to coarse, tightly
 //! packed. A level is an array of blocks (4x4 texels for BC1, one texel for uncompressed formats)
-//! in the configured order.
+//! in the configured order. Shadow maps have an order of their own.
 
 mod placement;
 
@@ -46,10 +46,11 @@ pub struct LayoutConfig {
     /// Format of the colour textures; `None` keeps the captured one. Shadow maps (R32F) always
     /// keep theirs.
     pub texel_format: Option<TexelFormat>,
-    /// Block order within a level.
+    /// Block order within a level of a colour texture.
     pub block_order: BlockOrder,
-    /// Block order of uncompressed textures; `None` takes `block_order`.
-    pub uncompressed_order: Option<BlockOrder>,
+    /// Block order of shadow maps (R32F). In a linear map whose rows are a multiple of the cache's way size, a
+    /// column of texels falls into one cache set.
+    pub shadow_map_order: BlockOrder,
     /// Alignment of a texture's first byte, a power of two.
     pub base_align_bytes: u64,
     /// Order of the textures in memory.
@@ -61,7 +62,8 @@ impl Default for LayoutConfig {
         Self {
             texel_format: None,
             block_order: BlockOrder::Linear,
-            uncompressed_order: None,
+            // GPUs tile depth textures, too.
+            shadow_map_order: BlockOrder::Morton,
             base_align_bytes: 64,
             texture_order: TextureOrder::Table,
         }
@@ -241,10 +243,9 @@ fn memory_format(texture: &Texture, config: &LayoutConfig) -> TexelFormat {
 fn place(texture: &Texture, config: &LayoutConfig) -> Option<TextureLayout> {
     let format = memory_format(texture, config);
     let block = format.block();
-    let order = if block.texels == [1, 1] {
-        config.uncompressed_order.unwrap_or(config.block_order)
-    } else {
-        config.block_order
+    let order = match format {
+        TexelFormat::R32f => config.shadow_map_order,
+        _ => config.block_order,
     };
     let mut offset_bytes = 0u64;
     let levels = (0..texture.levels)

@@ -17,6 +17,7 @@ fn texture(size: [u32; 2], levels: u32, layers: u32, format: TexelFormat) -> Tex
 fn config(block_order: BlockOrder) -> LayoutConfig {
     LayoutConfig {
         block_order,
+        shadow_map_order: block_order,
         ..LayoutConfig::default()
     }
 }
@@ -49,6 +50,47 @@ fn tiles_of_uncompressed_texels_are_four_lines_of_sixteen_bytes() {
     let layout = Layout::new(&textures, &config(BlockOrder::Tiled)).unwrap();
     let at = |x, y| layout.address(0, 0, 0, [x, y]).unwrap();
     assert_eq!([at(1, 0), at(0, 1), at(4, 0), at(0, 4)], [4, 16, 64, 128]);
+}
+
+/// L1 sets of the Z2 paper's machine: 8 KiB, four ways, 16-byte lines.
+const L1_SETS: u64 = 128;
+
+#[test]
+fn a_column_of_a_shadow_map_falls_into_many_sets_unless_the_map_is_linear() {
+    let textures = [texture([2048, 2048], 1, 4, TexelFormat::R32f)];
+    let sets = |config: &LayoutConfig| {
+        let layout = Layout::new(&textures, config).unwrap();
+        let set = |y| layout.address(0, 1, 0, [77, y]).unwrap() / 16 % L1_SETS;
+        (0..64).map(set).collect::<HashSet<u64>>().len()
+    };
+    // Two rows share a line of 2x2 texels, and the bits of y below the seventh of the address choose the set.
+    assert_eq!(sets(&LayoutConfig::default()), 8);
+    let linear = LayoutConfig {
+        shadow_map_order: BlockOrder::Linear,
+        ..LayoutConfig::default()
+    };
+    assert_eq!(sets(&linear), 1);
+    assert_eq!(sets(&config(BlockOrder::Tiled)), 4);
+}
+
+#[test]
+fn each_kind_of_texture_has_its_own_order() {
+    let textures = [
+        texture([16, 16], 1, 1, TexelFormat::Rgba8),
+        texture([16, 16], 1, 1, TexelFormat::R32f),
+    ];
+    let below = |config: &LayoutConfig| {
+        let layout = Layout::new(&textures, config).unwrap();
+        let at = |texture, y| layout.address(texture, 0, 0, [0, y]).unwrap();
+        [0, 1].map(|texture| at(texture, 1) - at(texture, 0))
+    };
+    assert_eq!(below(&LayoutConfig::default()), [64, 8]);
+    let other = LayoutConfig {
+        block_order: BlockOrder::Tiled,
+        shadow_map_order: BlockOrder::Linear,
+        ..LayoutConfig::default()
+    };
+    assert_eq!(below(&other), [16, 64]);
 }
 
 #[test]

@@ -34,7 +34,7 @@ pub trait DelayedFill: Send {
 }
 
 /// A cache that can fill later.
-pub trait Delay: Cache {
+pub trait Delay {
     /// It and what is on its way.
     type Delayed: DelayedFill;
 

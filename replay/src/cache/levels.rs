@@ -1,6 +1,6 @@
 //! The caches of one machine, and the choice of the type that its replay is compiled for.
 
-use super::{AnyCache, Cache, Delay, FourWayLru};
+use super::{AllocateOnMiss, AnyCache, Cache, Delay, FourWayLru};
 use crate::config::{CacheConfig, ConfigError, RunConfig};
 
 /// First-level caches, one a core, and the shared second level.
@@ -39,6 +39,16 @@ impl Levels<AnyCache> {
                 .collect::<Result<_, _>>()?,
             l2: build(&config.l2, "L2", 0)?,
         })
+    }
+
+    /// The caches as ones that allocate on a miss.
+    #[must_use]
+    pub fn allocate_on_miss(self) -> Levels<AllocateOnMiss> {
+        let allocate = |cache: AnyCache| AllocateOnMiss(cache.into_box());
+        Levels {
+            l1: self.l1.into_iter().map(allocate).collect(),
+            l2: allocate(self.l2),
+        }
     }
 
     /// The caches as what they are, if all are [`FourWayLru`].

@@ -12,6 +12,7 @@ mod levels;
 mod lru;
 mod on_the_way;
 mod random;
+mod reserved;
 mod set_order;
 mod tree_plru;
 
@@ -21,6 +22,7 @@ pub use levels::Levels;
 #[cfg(test)]
 pub(crate) use lru::WaysOf;
 pub use lru::{AnyWays, FourWayLru, Lru};
+pub use reserved::AllocateOnMiss;
 
 use crate::config::{CacheConfig, ConfigError};
 use crate::registry::{Named, registry};

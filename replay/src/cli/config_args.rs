@@ -1,8 +1,8 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
 use crate::config::{
-    AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr, LodFormula, Mode,
-    Order, Replacement, RunConfig, TextureOrder,
+    Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr,
+    LodFormula, Mode, Order, Replacement, RunConfig, TextureOrder,
 };
 use crate::preset::Preset;
 use crate::size::{format_bytes, parse_bytes};
@@ -122,8 +122,9 @@ pub struct ConfigArgs {
     /// Footprints of a long and narrow pixel at most, 1 to 16
     #[arg(long, value_name = "N", help_heading = "Sampling")]
     max_anisotropy: Option<u32>,
-    /// How long and narrow pixels are filtered: probes (several footprints along the longer axis),
-    /// ellipse (all texels of the pixel's ellipse)
+    /// How long and narrow pixels are filtered: probes (several footprints along the longer axis, at Vulkan's level),
+    /// rounded-probes (at the level of EXT_texture_filter_anisotropic's example), ellipse (all texels of the pixel's
+    /// ellipse)
     #[arg(long, value_name = "MODEL", value_parser = named::<AnisotropyModel>, help_heading = "Sampling")]
     anisotropy: Option<AnisotropyModel>,
     /// Count the helper lanes of partly covered quads, too
@@ -133,12 +134,12 @@ pub struct ConfigArgs {
     /// Format of the colour textures in memory: bc1, bc7, astc-6x6, rgba8, ...
     #[arg(long, value_name = "FORMAT", value_parser = named::<TexelFormat>, help_heading = "Layout")]
     texel_format: Option<TexelFormat>,
-    /// Order of the blocks of a level: linear, morton, tiled
+    /// Order of the blocks of a level of colour textures: linear, morton, tiled
     #[arg(long, value_parser = named::<BlockOrder>, help_heading = "Layout")]
     block_order: Option<BlockOrder>,
-    /// Block order of uncompressed textures (shadow maps)
+    /// Order of the texels of shadow maps: morton (the default), tiled, linear
     #[arg(long, value_parser = named::<BlockOrder>, help_heading = "Layout")]
-    uncompressed_order: Option<BlockOrder>,
+    shadow_map_order: Option<BlockOrder>,
     /// Alignment of each texture's first byte
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes, help_heading = "Layout")]
     base_align: Option<u64>,
@@ -164,6 +165,9 @@ pub struct ConfigArgs {
     /// Lines that a thread fetches in one trip
     #[arg(long, value_name = "N", help_heading = "Texture unit")]
     fetches_per_trip: Option<u32>,
+    /// When a line that misses gets its way in a cache
+    #[arg(long, help_heading = "Texture unit")]
+    allocation: Option<Allocation>,
 }
 
 /// Sets what a flag gives.
@@ -236,7 +240,7 @@ impl ConfigArgs {
             ("--helper-lanes", self.helper_lanes),
             ("--texel-format", self.texel_format.is_some()),
             ("--block-order", self.block_order.is_some()),
-            ("--uncompressed-order", self.uncompressed_order.is_some()),
+            ("--shadow-map-order", self.shadow_map_order.is_some()),
             ("--base-align", self.base_align.is_some()),
             ("--texture-order", self.texture_order.is_some()),
             ("--l1-penalty", self.l1_penalty.is_some()),
@@ -245,6 +249,7 @@ impl ConfigArgs {
             ("--tmu-threads", self.tmu_threads.is_some()),
             ("--retry-footprints", self.retry_footprints.is_some()),
             ("--fetches-per-trip", self.fetches_per_trip.is_some()),
+            ("--allocation", self.allocation.is_some()),
         ];
         flags
             .into_iter()
@@ -287,10 +292,7 @@ impl ConfigArgs {
         config.sampling.helper_lanes |= self.helper_lanes;
         set(&mut config.layout.texel_format, self.texel_format.map(Some));
         set(&mut config.layout.block_order, self.block_order);
-        set(
-            &mut config.layout.uncompressed_order,
-            self.uncompressed_order.map(Some),
-        );
+        set(&mut config.layout.shadow_map_order, self.shadow_map_order);
         set(&mut config.layout.base_align_bytes, self.base_align);
         set(&mut config.layout.texture_order, self.texture_order);
         set(&mut config.tmu.l1_penalty_cycles, self.l1_penalty);
@@ -299,6 +301,7 @@ impl ConfigArgs {
         set(&mut config.tmu.threads, self.tmu_threads);
         set(&mut config.tmu.retry_footprints, self.retry_footprints);
         set(&mut config.tmu.fetches_per_trip, self.fetches_per_trip);
+        set(&mut config.tmu.allocation, self.allocation);
         Ok(())
     }
 }

@@ -26,6 +26,9 @@ pub mod validate;
 
 pub use config_args::ConfigArgs;
 
+use crate::config::{Mode, RunConfig};
+use crate::experiment::Plan;
+use crate::preset::Preset;
 use crate::result::TraceId;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -128,6 +131,20 @@ pub fn open_textrace(path: &Path) -> Result<(Textrace, TraceId)> {
         checksum: format!("{:08x}", trace.file_checksum()),
     };
     Ok((trace, id))
+}
+
+/// Warns where bytes of the first-miss model will be printed that do not belong to the Z2 paper's machine.
+fn warn_of_first_miss_bytes(plan: &Plan) {
+    let bare = |config: &RunConfig| {
+        config.mode == Mode::FirstMiss && Preset::Z2_PAPER.over(*config) != *config
+    };
+    if plan.points.iter().any(|point| bare(&point.config)) {
+        shell::warn(
+            "mode first-miss without --preset z2-paper: external bytes count every fetch from memory, also of lines that \
+             were replaced before their waiting thread came back for them, up to several times the memory traffic of \
+             --mode timed; use --mode timed for memory traffic",
+        );
+    }
 }
 
 #[cfg(test)]

@@ -67,6 +67,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let subjects = traces.subjects();
 
     let start = Instant::now();
+    super::warn_of_first_miss_bytes(&plan);
     let outcome = experiment::run(&plan, &subjects, None, &|_| ())?;
     let seconds = start.elapsed().as_secs_f64();
     let rows = outcome.rows();

@@ -115,6 +115,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             let done = |done| progress.advance(done);
             experiment::run(&sweep.plan, &subjects, Some(&sweep.store), &done)?
         };
+        super::warn_of_first_miss_bytes(&sweep.plan);
         shell::note(&outcome.shared());
         sweep.write(&outcome)?;
     }

@@ -12,8 +12,8 @@ use super::one_pass::{LevelGeometry, OnePass, geometry};
 use super::timed::Timed;
 use super::wave::Wave;
 use super::{Machine, ReplayError};
-use crate::cache::Levels;
-use crate::config::{CacheConfig, Mode, RunConfig, TmuConfig};
+use crate::cache::{Delay, Levels};
+use crate::config::{Allocation, CacheConfig, Mode, RunConfig, TmuConfig};
 use crate::result::{RunResult, TmuResult};
 use crate::stream::{Expander, LineMemory, TileSource};
 use crate::tmu::PipelineStats;
@@ -348,15 +348,33 @@ impl Pass<'_> {
             )));
         }
         let levels = Levels::build(config)?;
-        Ok(match (config.mode, levels.all_four_way()) {
-            (Mode::Timed, Ok(levels)) => Box::new(Timed::new(levels, config.tmu, counts())),
-            (Mode::Timed, Err(levels)) => Box::new(Timed::new(levels, config.tmu, counts())),
-            (Mode::FirstMiss, Ok(levels)) => Box::new(FirstMiss::new(levels, config.tmu, counts())),
-            (Mode::FirstMiss, Err(levels)) => {
-                Box::new(FirstMiss::new(levels, config.tmu, counts()))
-            }
-            (Mode::Functional, Ok(levels)) => Box::new(Functional::new(levels, counts())),
-            (Mode::Functional, Err(levels)) => Box::new(Functional::new(levels, counts())),
+        if config.mode == Mode::Functional {
+            return Ok(match levels.all_four_way() {
+                Ok(levels) => Box::new(Functional::new(levels, counts())),
+                Err(levels) => Box::new(Functional::new(levels, counts())),
+            });
+        }
+        if config.tmu.allocation == Allocation::OnMiss {
+            return Ok(with_latencies(config, levels.allocate_on_miss(), counts()));
+        }
+        Ok(match levels.all_four_way() {
+            Ok(levels) => with_latencies(config, levels, counts()),
+            Err(levels) => with_latencies(config, levels, counts()),
         })
+    }
+}
+
+/// The machine of a configuration where time passes.
+fn with_latencies<C: Delay>(
+    config: &RunConfig,
+    levels: Levels<C>,
+    counts: CacheCounts,
+) -> Box<dyn Machine>
+where
+    C::Delayed: 'static,
+{
+    match config.mode {
+        Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts)),
+        _ => Box::new(Timed::new(levels, config.tmu, counts)),
     }
 }

@@ -121,15 +121,15 @@ impl Wave<'_> {
 
 /// Lists what the passes read.
 fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a> {
-    let instant = |pass: &Pass<'_>| pass.config().tmu.l1_penalty_cycles == 0;
+    let at_once = |pass: &Pass<'_>| pass.config().tmu.misses_change_caches_at_once();
     match passes[0].config().mode {
         Mode::Functional => match passes.iter().map(Pass::least_sets).min() {
             Some(Some(sets)) => expander.without_idle_accesses(sets),
             _ => expander,
         },
         Mode::FirstMiss => expander,
-        // Where a miss fills at once, the timed machine looks footprints up one by one.
-        Mode::Timed if passes.iter().any(instant) => expander.with_distinct_lines(true),
+        // Where a miss changes a cache at once, the timed machine looks footprints up one by one.
+        Mode::Timed if passes.iter().any(at_once) => expander.with_distinct_lines(true),
         Mode::Timed => expander.only_distinct_lines(),
     }
 }

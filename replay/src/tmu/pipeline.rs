@@ -219,6 +219,7 @@ impl Pipeline {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::Allocation;
 
     const CONFIG: TmuConfig = TmuConfig {
         l1_penalty_cycles: 20,
@@ -227,6 +228,7 @@ mod tests {
         threads: 4,
         retry_footprints: 4,
         fetches_per_trip: 2,
+        allocation: Allocation::OnFill,
     };
 
     /// Runs threads of (hits, latencies of the misses) one after another.

@@ -2,7 +2,7 @@
 //! footprints, over sets that are lists. The fast machine has to agree with it to the last count.
 
 use super::*;
-use crate::config::{Assign, TmuConfig};
+use crate::config::{Allocation, Assign, TmuConfig};
 use crate::order::Phase;
 use crate::result::{FirstLookups, TmuResult};
 use crate::stream::for_quads;
@@ -14,14 +14,16 @@ struct PlainLevel {
     ways: usize,
     /// Cycle and line, in the order of requests.
     in_flight: Vec<(u64, u64)>,
+    allocation: Allocation,
 }
 
 impl PlainLevel {
-    fn new(config: &CacheConfig) -> Self {
+    fn new(config: &CacheConfig, allocation: Allocation) -> Self {
         Self {
             sets: vec![Vec::new(); config.sets("", 16).unwrap() as usize],
             ways: config.ways as usize,
             in_flight: Vec::new(),
+            allocation,
         }
     }
 
@@ -30,15 +32,16 @@ impl PlainLevel {
         &mut self.sets[index]
     }
 
-    /// True if the line is there; it is then the most recent.
+    /// True if the line's data are there; the line is then the most recent.
     fn use_line(&mut self, line: u64) -> bool {
         let set = self.set(line);
         let found = set.iter().position(|&l| l == line);
-        found.is_some_and(|at| {
+        let allocated = found.is_some_and(|at| {
             set.remove(at);
             set.push(line);
             true
-        })
+        });
+        allocated && self.arrival(line).is_none()
     }
 
     fn fill(&mut self, line: u64) {
@@ -56,8 +59,8 @@ impl PlainLevel {
             .map(|(_, line)| *line)
             .collect();
         self.in_flight.retain(|(cycle, _)| *cycle > now);
-        for line in due {
-            self.fill(line);
+        if self.allocation == Allocation::OnFill {
+            due.into_iter().for_each(|line| self.fill(line));
         }
     }
 
@@ -67,9 +70,10 @@ impl PlainLevel {
     }
 
     fn enter(&mut self, line: u64, now: u64, arrival: u64) {
-        if arrival == now {
+        if arrival == now || self.allocation == Allocation::OnMiss {
             self.fill(line);
-        } else {
+        }
+        if arrival > now {
             self.in_flight.push((arrival, line));
         }
     }
@@ -124,8 +128,10 @@ impl<'a> PlainFirstMiss<'a> {
             trace,
             config,
             layout: Layout::new(&trace.tables.textures, &config.layout).unwrap(),
-            l1: (0..cores).map(|_| PlainLevel::new(&config.l1)).collect(),
-            l2: PlainLevel::new(&config.l2),
+            l1: (0..cores)
+                .map(|_| PlainLevel::new(&config.l1, config.tmu.allocation))
+                .collect(),
+            l2: PlainLevel::new(&config.l2, config.tmu.allocation),
             cores: (0..cores).map(|_| PlainCore::default()).collect(),
             now: 0,
             useful: 0,
@@ -380,6 +386,7 @@ fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
                 l2_penalty_cycles: random.of(&[0, 7, 200, 200]),
                 loop_cycles: random.of(&[1, 8, 24, 24, 300]),
                 threads: random.of(&[1, 4, 64, 64]),
+                allocation: random.of(&[Allocation::OnFill, Allocation::OnMiss]),
                 ..TmuConfig::default()
             },
             tile_maps: true,

@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::cache::Cache;
-use crate::config::{Replacement, TmuConfig};
+use crate::config::{Allocation, Replacement, TmuConfig};
 use crate::engine::counts::FootprintMisses;
 use crate::engine::timed::Timed;
 use crate::result::TmuResult;
@@ -22,12 +22,14 @@ struct PlainInFlight {
 struct PlainLevel {
     cache: Box<dyn Cache>,
     in_flight: PlainInFlight,
+    allocation: Allocation,
 }
 
 impl PlainLevel {
-    fn new(cache: Box<dyn Cache>) -> Self {
+    fn new(cache: Box<dyn Cache>, allocation: Allocation) -> Self {
         Self {
             cache,
+            allocation,
             in_flight: PlainInFlight::default(),
         }
     }
@@ -42,14 +44,22 @@ impl PlainLevel {
             }
             arrivals.pop();
             lines.remove(&line);
-            self.cache.fill(line);
+            if self.allocation == Allocation::OnFill {
+                self.cache.fill(line);
+            }
         }
     }
 
+    /// True if the line's data are there; marks its way used.
+    fn has(&mut self, line: u32) -> bool {
+        self.cache.lookup(line) && !self.in_flight.lines.contains_key(&line)
+    }
+
     fn enter(&mut self, line: u32, now: u64, arrival: u64) {
-        if arrival <= now {
+        if arrival <= now || self.allocation == Allocation::OnMiss {
             self.cache.fill(line);
-        } else {
+        }
+        if arrival > now {
             let flight = &mut self.in_flight;
             flight.lines.insert(line, arrival);
             flight
@@ -108,10 +118,10 @@ impl PlainTimed {
         let Levels { l1, l2 } = Levels::build(config).unwrap();
         let l1 = l1
             .into_iter()
-            .map(|cache| PlainLevel::new(cache.into_box()));
+            .map(|cache| PlainLevel::new(cache.into_box(), config.tmu.allocation));
         Self {
             l1: l1.collect(),
-            l2: PlainLevel::new(l2.into_box()),
+            l2: PlainLevel::new(l2.into_box(), config.tmu.allocation),
             tmu: config.tmu,
             counts: CacheCounts::new(bins, config.tile_maps),
             units: (0..config.cores).map(|_| PlainUnit::default()).collect(),
@@ -129,7 +139,7 @@ impl PlainTimed {
                 let mut misses = FootprintMisses::default();
                 let mut ready = 0;
                 for &line in footprint.lines {
-                    if !self.l1[core].cache.lookup(line) {
+                    if !self.l1[core].has(line) {
                         let arrival = self.request(core, now, line, &mut fetches, &mut misses);
                         ready = ready.max(arrival);
                     }
@@ -169,7 +179,7 @@ impl PlainTimed {
         } else {
             trip * u64::from(tmu.loop_cycles)
         };
-        let in_l2 = if self.l2.cache.lookup(line) {
+        let in_l2 = if self.l2.has(line) {
             now
         } else if let Some(&arrival) = self.l2.in_flight.lines.get(&line) {
             misses.l2_secondary += 1;
@@ -324,6 +334,11 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
                 threads: random.of(&[1, 4, 64, 64, 300]),
                 retry_footprints: random.of(&[1, 4, 4, 5]),
                 fetches_per_trip: random.of(&[1, 2, 2, 64]),
+                allocation: random.of(&[
+                    Allocation::OnFill,
+                    Allocation::OnFill,
+                    Allocation::OnMiss,
+                ]),
             },
             tile_maps: true,
             ..RunConfig::default()

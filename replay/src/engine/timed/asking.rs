@@ -85,7 +85,7 @@ impl<D: DelayedFill> Asking<'_, D> {
         }
     }
 
-    /// Looks up footprint after footprint: where a miss may fill at once, and where distinct lines
+    /// Looks up footprint after footprint: where a miss may change a cache at once, and where distinct lines
     /// are not listed.
     #[inline(never)]
     pub fn one_by_one(&mut self, quad: &QuadLines<'_>) {

@@ -95,7 +95,7 @@ impl<D: DelayedFill> Memory<D> {
         } = &mut self.l1[core];
         waiting.clear();
         absent.clear();
-        if self.tmu.l1_penalty_cycles == 0 || quad.distinct.is_empty() {
+        if self.tmu.misses_change_caches_at_once() || quad.distinct.is_empty() {
             // Nothing absent either: one by one.
             return Found::NotAll;
         }

@@ -92,7 +92,14 @@ fn sampler() -> impl Strategy<Value = Sampler> {
 
 fn config() -> impl Strategy<Value = RunConfig> {
     use FilterOverride::{AsRecorded, Bilinear, Nearest, Trilinear};
-    use TexelFormat::{Astc5x5, Astc6x6, Bc1, Bc7, Rgba8};
+    use TexelFormat::{Astc5x5, Astc6x6, Bc1, Bc7, R32f, Rgba8};
+    let block_order = || {
+        prop::sample::select(vec![
+            BlockOrder::Linear,
+            BlockOrder::Morton,
+            BlockOrder::Tiled,
+        ])
+    };
     let layout = (
         prop::sample::select(vec![
             None,
@@ -101,18 +108,17 @@ fn config() -> impl Strategy<Value = RunConfig> {
             Some(Astc5x5),
             Some(Astc6x6),
             Some(Rgba8),
+            Some(R32f),
         ]),
-        prop::sample::select(vec![
-            BlockOrder::Linear,
-            BlockOrder::Morton,
-            BlockOrder::Tiled,
-        ]),
+        block_order(),
+        block_order(),
         prop::sample::select(vec![16_u64, 64, 65536]),
     )
         .prop_map(
-            |(texel_format, block_order, base_align_bytes)| LayoutConfig {
+            |(texel_format, block_order, shadow_map_order, base_align_bytes)| LayoutConfig {
                 texel_format,
                 block_order,
+                shadow_map_order,
                 base_align_bytes,
                 ..LayoutConfig::default()
             },
@@ -128,7 +134,11 @@ fn config() -> impl Strategy<Value = RunConfig> {
         ]),
         any::<bool>(),
         prop::sample::select(vec![1, 1, 2, 5, 16]),
-        prop::sample::select(vec![AnisotropyModel::Probes, AnisotropyModel::Ellipse]),
+        prop::sample::select(vec![
+            AnisotropyModel::Probes,
+            AnisotropyModel::RoundedProbes,
+            AnisotropyModel::Ellipse,
+        ]),
     )
         .prop_map(
             |(filter, lod_bias, lod, helper_lanes, max_anisotropy, anisotropy)| SamplingConfig {
