@@ -39,6 +39,15 @@ impl Trace {
         })
     }
 
+    /// CRC-32 of the content, which names the trace in results.
+    #[must_use]
+    pub fn content_checksum(&self) -> u32 {
+        match self {
+            Self::Texture(trace) => trace.content_checksum(),
+            Self::Ray(trace) => trace.content_checksum(),
+        }
+    }
+
     /// The container of either kind.
     #[must_use]
     pub fn container(&self) -> &Container {

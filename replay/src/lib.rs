@@ -11,6 +11,7 @@ pub mod engine;
 pub mod experiment;
 pub mod files;
 pub mod locality;
+pub mod model_version;
 pub mod order;
 mod palette;
 pub mod paper;

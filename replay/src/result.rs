@@ -1,6 +1,8 @@
 //! What a replay yields: plain data that the models fill and the printers read.
 
+use formats::textrace::TraceMeta;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Program and version, recorded with every result.
 pub const TOOL: &str = concat!("replay ", env!("CARGO_PKG_VERSION"));
@@ -158,10 +160,35 @@ pub struct RunResult {
 /// Which trace a result belongs to.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TraceId {
+    /// Name of the file without folder and extension.
+    pub name: String,
     /// Scene name from the trace.
     pub scene: String,
-    /// CRC-32 of the whole file, 8 hex digits.
+    /// Checksum of the content, 8 hex digits: two captures of the same picture have the same,
+    /// whatever program, driver and path made them (FORMAT.md).
     pub checksum: String,
+    /// Camera name from the trace.
+    pub camera: String,
+    /// Name of the display.
+    pub display: String,
+    /// Width and height of an eye's picture in pixels.
+    pub eye_size_px: [u32; 2],
+}
+
+impl TraceId {
+    /// Of the trace in a file.
+    #[must_use]
+    pub fn new(file: &Path, meta: &TraceMeta, content_checksum: u32) -> Self {
+        let name = file.file_stem().unwrap_or_default();
+        Self {
+            name: name.to_string_lossy().into_owned(),
+            scene: meta.scene.clone(),
+            checksum: format!("{content_checksum:08x}"),
+            camera: meta.camera.clone(),
+            display: meta.hmd.name.clone(),
+            eye_size_px: meta.hmd.eye_size_px,
+        }
+    }
 }
 
 /// The short name of a scene that a trace records by name or by path.

@@ -1,7 +1,13 @@
 //! Golden traces: what `replay` prints for each is compared byte for byte with the committed JSON.
 //! `UPDATE_GOLDEN=1` rewrites the JSON instead; review the diff.
+//!
+//! `traces/golden.digests` holds the model version and a digest of every golden result's counts. Where counts of an
+//! unchanged trace change, the model version must change too: `UPDATE_GOLDEN` does not rewrite a digest otherwise.
 
 use parallax_tests::{program, root, run_ok};
+use replay::model_version::MODEL_VERSION;
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -77,23 +83,128 @@ fn compare(golden: &Path, actual: &[u8]) {
     );
 }
 
-/// Replays every golden trace of a kind with each set of options.
-fn replay_all(extension: &str, at_least: usize, subcommand: &str, runs: &[(&str, &[&str])]) {
+/// Replays every golden trace of a kind with each set of options; digests the counts.
+fn replay_all(
+    extension: &str,
+    at_least: usize,
+    subcommand: &str,
+    runs: &[(&str, &[&str])],
+    digests: &mut Digests,
+) {
     let traces = golden_traces(extension);
     assert!(
         traces.len() >= at_least,
         "golden traces are missing: {traces:?}"
     );
     for trace in traces {
+        let stem = trace.file_stem().expect("a name").to_string_lossy();
         for (name, options) in runs {
             let mut command = program("replay");
             command.arg(subcommand).arg(&trace).args(*options);
             let output = run_ok(command.arg("--json"));
+            let result = without_errors(&output.stdout);
+            digests.add(format!("{stem}/{name}"), &result);
             compare(
                 &trace.with_extension("golden").join(format!("{name}.json")),
-                &without_errors(&output.stdout),
+                &result,
             );
         }
+    }
+}
+
+/// What a golden result was counted from, and its counts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Digest {
+    /// Checksum of the trace's content.
+    trace: String,
+    /// Hash of the counts.
+    counts: String,
+}
+
+/// The digests of all golden results under one model version.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Digests {
+    model_version: u32,
+    /// By `TRACE/OPTIONS`.
+    results: BTreeMap<String, Digest>,
+}
+
+/// Keys of a result that hold no counts.
+const NO_COUNTS: [&str; 6] = [
+    "schema",
+    "tool",
+    "model_version",
+    "trace",
+    "config",
+    "errors",
+];
+
+/// 64-bit FNV-1a.
+fn hash(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+impl Digests {
+    fn new(model_version: u32) -> Self {
+        Self {
+            model_version,
+            results: BTreeMap::new(),
+        }
+    }
+
+    fn add(&mut self, name: String, result: &[u8]) {
+        let mut result: Value = serde_json::from_slice(result).expect("JSON");
+        let trace = result["trace"]["checksum"].as_str();
+        let trace = trace.expect("the trace's checksum").to_owned();
+        let object = result.as_object_mut().expect("an object");
+        object.retain(|key, _| !NO_COUNTS.contains(&key.as_str()));
+        result.sort_all_objects();
+        let counts = format!("{:016x}", hash(result.to_string().as_bytes()));
+        self.results.insert(name, Digest { trace, counts });
+    }
+
+    /// The file's text.
+    fn text(&self) -> String {
+        let mut text = format!(
+            "# Model version (replay/src/model_version.rs), then for each golden result: name, trace, counts.\n{}\n",
+            self.model_version
+        );
+        for (name, Digest { trace, counts }) in &self.results {
+            text += &format!("{name} {trace} {counts}\n");
+        }
+        text
+    }
+
+    fn parse(text: &str) -> Self {
+        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+        let version = lines.next().and_then(|line| line.parse().ok());
+        let mut digests = Self::new(version.expect("a model version"));
+        for line in lines {
+            let words: Vec<&str> = line.split(' ').collect();
+            let [name, trace, counts] = words[..] else {
+                panic!("expected a name, a trace and counts, found `{line}`");
+            };
+            let [trace, counts] = [trace, counts].map(str::to_owned);
+            digests
+                .results
+                .insert(name.to_owned(), Digest { trace, counts });
+        }
+        digests
+    }
+
+    /// Results of the same trace whose counts differ from those that the model version gave before.
+    fn changed_since<'a>(&'a self, before: &Self) -> Vec<&'a str> {
+        if self.model_version > before.model_version {
+            return Vec::new();
+        }
+        let changed = |(name, digest): &(&String, &Digest)| {
+            let of_before = before.results.get(*name);
+            of_before.is_some_and(|old| old.trace == digest.trace && old.counts != digest.counts)
+        };
+        let names = self.results.iter().filter(changed);
+        names.map(|(name, _)| name.as_str()).collect()
     }
 }
 
@@ -107,13 +218,48 @@ fn without_errors(json: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn every_golden_texture_trace_replays_to_its_golden_result() {
-    replay_all("textrace", 3, "run", TEXTRACE_RUNS);
+fn every_golden_trace_replays_to_its_golden_result() {
+    let mut digests = Digests::new(MODEL_VERSION);
+    replay_all("textrace", 3, "run", TEXTRACE_RUNS, &mut digests);
+    replay_all("raytrace", 2, "reproject", RAYTRACE_RUNS, &mut digests);
+    let path = root().join("traces/golden.digests");
+    if let Ok(text) = fs::read_to_string(&path) {
+        let before = Digests::parse(&text);
+        assert!(
+            before.model_version <= MODEL_VERSION,
+            "{}: expected a model version up to {MODEL_VERSION}, found {}",
+            path.display(),
+            before.model_version
+        );
+        let changed = digests.changed_since(&before);
+        assert!(
+            changed.is_empty(),
+            "counts changed under model version {MODEL_VERSION}: {}; add a line to HISTORY in \
+             replay/src/model_version.rs, then UPDATE_GOLDEN=1",
+            changed.join(", ")
+        );
+    }
+    compare(&path, digests.text().as_bytes());
 }
 
 #[test]
-fn every_golden_ray_trace_reprojects_to_its_golden_result() {
-    replay_all("raytrace", 2, "reproject", RAYTRACE_RUNS);
+fn changed_counts_need_another_model_version() {
+    let of = |model_version, checksum: &str, misses: u32| {
+        let mut digests = Digests::new(model_version);
+        let result = format!(
+            r#"{{"tool":"a","model_version":{model_version},"trace":{{"checksum":"{checksum}"}},"result":{{"misses":{misses}}}}}"#
+        );
+        digests.add("atrium/morton".to_owned(), result.as_bytes());
+        digests
+    };
+    let before = of(3, "0badcafe", 7);
+    assert_eq!(Digests::parse(&before.text()), before);
+    let changed = |now: Digests| now.changed_since(&before).len();
+    assert_eq!(changed(of(3, "0badcafe", 8)), 1);
+    assert_eq!(changed(of(2, "0badcafe", 8)), 1, "not an older one");
+    assert_eq!(changed(of(4, "0badcafe", 8)), 0, "a new version");
+    assert_eq!(changed(of(3, "0badcafe", 7)), 0, "the same counts");
+    assert_eq!(changed(of(3, "00000000", 8)), 0, "another trace");
 }
 
 #[test]

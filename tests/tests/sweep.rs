@@ -180,14 +180,21 @@ fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
     let text = fs::read_to_string(&points[1]).expect("a point");
     fs::remove_file(&points[0]).expect("removed");
     fs::write(&points[1], &text[..text.len() / 2]).expect("cut");
-    fs::write(&points[2], text.replacen("\"replay 0", "\"replay 9", 1)).expect("another version");
+    fs::write(
+        &points[2],
+        text.replacen("\"model_version\":", "\"model_version\":9", 1),
+    )
+    .expect("another version");
     refuse(
         &mut sweep.command("out", &["--merge-only"]),
         &[
             &format!("3 of {POINTS} points are not there"),
             &format!("{}: missing", name(&points[0])),
             &format!("{}: damaged: EOF", name(&points[1])),
-            &format!("{}: expected replay.point/1 of replay 0", name(&points[2])),
+            &format!(
+                "{}: expected replay.point/1 of model version",
+                name(&points[2])
+            ),
         ],
     );
     // The same shards mend it.

@@ -6,6 +6,7 @@ use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind};
 use crate::error::{FormatError, Place, Result};
 use crate::parse::{Parsed, parse_all};
 use memmap2::Mmap;
+use serde_json::Value;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -318,7 +319,34 @@ impl Container {
         parse_all(&self.file, Place::Chunk(tag), offset, bytes, parser)
     }
 
-    /// CRC-32 of the whole file, which names it in results.
+    /// CRC-32 of what a trace holds, which names it in results: every chunk but the description, and the
+    /// description without what says how and by what it was captured (FORMAT.md, Content checksum).
+    pub(crate) fn content_checksum(&self, description: ChunkTag) -> u32 {
+        /// Keys of the description, or of its `trace`, that say nothing of what was captured.
+        const ANNOTATIONS: [&str; 5] = ["tool", "command_line", "scene", "backend", "driver"];
+        let mut crc32 = crc32fast::Hasher::new();
+        for entry in self
+            .directory
+            .iter()
+            .filter(|entry| entry.tag != description)
+        {
+            crc32.update(&entry.tag.0);
+            crc32.update(&entry.length_bytes.to_le_bytes());
+            crc32.update(&entry.crc32.to_le_bytes());
+        }
+        let bytes = self.chunk_unchecked(description).unwrap_or_default();
+        // A trace is only opened with a description that is JSON.
+        let mut value: Value = serde_json::from_slice(bytes).unwrap_or_default();
+        if let Some(trace) = value.get_mut("trace") {
+            without(trace, &ANNOTATIONS);
+        }
+        without(&mut value, &ANNOTATIONS);
+        value.sort_all_objects();
+        crc32.update(value.to_string().as_bytes());
+        crc32.finalize()
+    }
+
+    /// CRC-32 of the whole file.
     ///
     /// The chunks' own are combined with those of the bytes around them, which are few.
     #[must_use]
@@ -335,6 +363,13 @@ impl Container {
         }
         crc32.update(all.get(end..).unwrap_or_default());
         crc32.finalize()
+    }
+}
+
+/// Removes keys of an object.
+fn without(object: &mut Value, keys: &[&str]) {
+    if let Some(object) = object.as_object_mut() {
+        object.retain(|key, _| !keys.contains(&key.as_str()));
     }
 }
 

@@ -230,10 +230,11 @@ impl Raytrace {
         &self.container
     }
 
-    /// CRC-32 of the whole file, which names the trace in results.
+    /// CRC-32 of the content, which names the trace in results: the same for captures by another
+    /// program, driver or path (FORMAT.md).
     #[must_use]
-    pub fn file_checksum(&self) -> u32 {
-        self.container.file_checksum()
+    pub fn content_checksum(&self) -> u32 {
+        self.container.content_checksum(tables::META)
     }
 
     /// Rays of a tile as the index says; 0 for a tile that is not there.

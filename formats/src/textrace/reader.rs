@@ -107,10 +107,11 @@ impl Textrace {
         &self.container
     }
 
-    /// CRC-32 of the whole file, which names the trace in results.
+    /// CRC-32 of the content, which names the trace in results: the same for captures by another
+    /// program, driver or path (FORMAT.md).
     #[must_use]
-    pub fn file_checksum(&self) -> u32 {
-        self.container.file_checksum()
+    pub fn content_checksum(&self) -> u32 {
+        self.container.content_checksum(tables::META)
     }
 
     /// What the index says about a tile; zero for one that nothing touched or that is not there.

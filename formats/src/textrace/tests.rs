@@ -254,3 +254,32 @@ fn draws_that_are_not_opaque_are_ranges_of_the_table() {
         assert!(error.to_string().contains("surfaces.not_opaque"), "{error}");
     }
 }
+
+#[test]
+fn the_content_checksum_depends_on_what_was_captured_and_not_on_how() {
+    let checksum = |edit: fn(&mut Tables)| {
+        let mut tables = tables();
+        edit(&mut tables);
+        let writer = TextraceWriter::in_memory(&tables).unwrap();
+        let trace = Textrace::from_bytes(writer.into_bytes().unwrap()).unwrap();
+        trace.content_checksum()
+    };
+    let original = checksum(|_| ());
+    let annotated = checksum(|tables| {
+        let meta = &mut tables.meta;
+        meta.tool = "test 2".to_owned();
+        meta.command_line.push("--threads=2".to_owned());
+        meta.scene = "../made up".to_owned();
+        meta.backend = "other".to_owned();
+        meta.driver = "llvmpipe (LLVM 15.0.6, 256 bits)".to_owned();
+    });
+    assert_eq!(original, annotated);
+    for edit in [
+        |tables: &mut Tables| tables.meta.camera.push('2'),
+        |tables: &mut Tables| tables.meta.frames[0].eyes[0].position[0] += 0.001,
+        |tables: &mut Tables| tables.draws[0].primitives -= 1,
+        |tables: &mut Tables| tables.samplers[0] = Sampler::SHADOW,
+    ] {
+        assert_ne!(original, checksum(edit));
+    }
+}

@@ -55,7 +55,8 @@ fn to_json(trace: &Trace) -> Result<Value> {
         "schema": SCHEMA,
         "kind": container.kind().to_string(),
         "version": version(container),
-        "checksum": format!("{:08x}", container.file_checksum()),
+        "checksum": format!("{:08x}", trace.content_checksum()),
+        "file_checksum": format!("{:08x}", container.file_checksum()),
         "file_bytes": container.file_bytes(),
         "chunks": chunks(container),
     });
@@ -163,9 +164,9 @@ fn passes(trace: &Textrace) -> Result<Value> {
 }
 
 /// What the text says first, whatever the trace holds.
-fn heading(container: &Container, meta: &TraceMeta) -> String {
+fn heading(container: &Container, meta: &TraceMeta, checksum: u32) -> String {
     format!(
-        "{}: {} {} ({:08x}), {} bytes\nscene {}, {} triangles, camera {}, {} frame(s)\n\
+        "{}: {} {} (content {checksum:08x}, file {:08x}), {} bytes\nscene {}, {} triangles, camera {}, {} frame(s)\n\
          written by {} through {} ({})\ncommand {}\ndisplay {} ({}), {}x{} px an eye, IPD {} mm\n\n",
         container.file(),
         container.kind(),
@@ -190,7 +191,11 @@ fn heading(container: &Container, meta: &TraceMeta) -> String {
 
 fn texture_text(trace: &Textrace, value: &Value) -> String {
     let totals = &value["totals"];
-    let mut text = heading(trace.container(), &trace.tables().meta);
+    let mut text = heading(
+        trace.container(),
+        &trace.tables().meta,
+        trace.content_checksum(),
+    );
     text += &pass_table(trace);
     text += "\n";
     text += &texture_table(&trace.tables().textures);
@@ -359,7 +364,7 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
         lights,
         triangles,
     } = trace.tables();
-    let mut text = heading(trace.container(), &meta.trace);
+    let mut text = heading(trace.container(), &meta.trace, trace.content_checksum());
     text += &format!(
         "hierarchy by {}, walked as {}: {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}, \
          {} bytes a node, {} a triangle\n{} sample(s) a pixel, reflections {} deep, visits {}\n\n",

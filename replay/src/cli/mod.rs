@@ -126,10 +126,7 @@ pub fn main() -> ExitCode {
 /// The file cannot be read or is damaged.
 pub fn open_textrace(path: &Path) -> Result<(Textrace, TraceId)> {
     let trace = Textrace::open(path)?;
-    let id = TraceId {
-        scene: trace.tables().meta.scene.clone(),
-        checksum: format!("{:08x}", trace.file_checksum()),
-    };
+    let id = TraceId::new(path, &trace.tables().meta, trace.content_checksum());
     Ok((trace, id))
 }
 

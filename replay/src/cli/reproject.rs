@@ -3,6 +3,7 @@
 
 use super::parquet_arg::ParquetArg;
 use crate::files::{self, write_atomically};
+use crate::model_version::MODEL_VERSION;
 use crate::paper::sgrt as paper;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
 use crate::result::{TOOL, TraceId, scene_name};
@@ -164,10 +165,8 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
     let report = Report {
         schema: SCHEMA.to_owned(),
         tool: TOOL.to_owned(),
-        trace: TraceId {
-            scene: scene.to_owned(),
-            checksum: format!("{:08x}", file.file_checksum()),
-        },
+        model_version: MODEL_VERSION,
+        trace: TraceId::new(path, &meta.trace, file.content_checksum()),
         scene_triangles: meta.trace.scene_triangles,
         eye_size_px: loaded.frame().size_px,
         rows: loaded.rows().summary,

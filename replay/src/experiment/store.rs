@@ -2,6 +2,7 @@
 
 use crate::config::RunConfig;
 use crate::files::write_atomically;
+use crate::model_version::MODEL_VERSION;
 use crate::result::{RunResult, TOOL, TraceId};
 use formats::container::kind_of;
 use serde::{Deserialize, Serialize};
@@ -17,8 +18,10 @@ pub const POINT_SCHEMA: &str = "replay.point/1";
 pub struct StoredPoint {
     /// `replay.point/1`.
     pub schema: String,
-    /// Program and version; another version's results are not taken over.
+    /// Program and version.
     pub tool: String,
+    /// Version of the models; another version's results are not taken over.
+    pub model_version: u32,
     /// Trace.
     pub trace: TraceId,
     /// The whole configuration.
@@ -43,10 +46,12 @@ pub enum Absent {
     #[error("damaged: {0}")]
     Damaged(String),
     /// Another version made it.
-    #[error("expected {POINT_SCHEMA} of {TOOL}, found {schema} of {tool}")]
+    #[error(
+        "expected {POINT_SCHEMA} of model version {MODEL_VERSION}, found {schema} of {model_version}"
+    )]
     Foreign {
-        /// Program and version.
-        tool: String,
+        /// Version of the models.
+        model_version: u32,
         /// Schema.
         schema: String,
     },
@@ -58,7 +63,8 @@ pub struct Store {
     folder: PathBuf,
 }
 
-/// Name of a point: a 128-bit FNV-1a hash of the trace's checksum and the whole configuration.
+/// Name of a point: a 128-bit FNV-1a hash of the model version, the trace's checksum and the whole
+/// configuration.
 ///
 /// The file repeats both, so that a collision costs a run and never gives a wrong result.
 #[must_use]
@@ -66,7 +72,8 @@ pub fn point_key(trace: &TraceId, config: &RunConfig) -> String {
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013B;
     const BASIS: u128 = 0x6C62_272E_07BB_0142_62B8_2175_6295_C58D;
     let config = serde_json::to_string(config).unwrap_or_default();
-    let hash = [trace.checksum.as_str(), "\n", &config]
+    let version = MODEL_VERSION.to_string();
+    let hash = [&version, "\n", trace.checksum.as_str(), "\n", &config]
         .iter()
         .flat_map(|part| part.bytes())
         .fold(BASIS, |hash, byte| {
@@ -124,7 +131,8 @@ impl Store {
         #[derive(Deserialize)]
         struct Header {
             schema: String,
-            tool: String,
+            #[serde(default)]
+            model_version: u32,
         }
         let bytes = read_whole(&self.path(trace, config)).map_err(|error| match error.kind() {
             ErrorKind::NotFound => Absent::Missing,
@@ -132,9 +140,15 @@ impl Store {
         })?;
         let damaged = |error: serde_json::Error| Absent::Damaged(error.to_string());
         let header: Header = serde_json::from_slice(&bytes).map_err(damaged)?;
-        if header.tool != TOOL || header.schema != POINT_SCHEMA {
-            let Header { schema, tool } = header;
-            return Err(Absent::Foreign { tool, schema });
+        if header.model_version != MODEL_VERSION || header.schema != POINT_SCHEMA {
+            let Header {
+                schema,
+                model_version,
+            } = header;
+            return Err(Absent::Foreign {
+                schema,
+                model_version,
+            });
         }
         let point: StoredPoint = serde_json::from_slice(&bytes).map_err(damaged)?;
         if point.trace.checksum != trace.checksum || point.config != *config {
@@ -163,6 +177,7 @@ impl Store {
         let point = StoredPoint {
             schema: POINT_SCHEMA.to_owned(),
             tool: TOOL.to_owned(),
+            model_version: MODEL_VERSION,
             trace: trace.clone(),
             config: *config,
             result: result.clone(),
@@ -182,6 +197,7 @@ mod tests {
         TraceId {
             scene: "atrium".into(),
             checksum: "0badcafe".into(),
+            ..TraceId::default()
         }
     }
 
@@ -222,12 +238,14 @@ mod tests {
         assert_eq!(found, "damaged: holds another point");
         std::fs::write(
             &path,
-            r#"{"schema":"replay.point/0","tool":"replay 0.0.1"}"#,
+            r#"{"schema":"replay.point/0","tool":"replay 0.0.1","model_version":0}"#,
         )
         .unwrap();
         assert_eq!(
             store.find(&trace(), &config).unwrap_err().to_string(),
-            format!("expected replay.point/1 of {TOOL}, found replay.point/0 of replay 0.0.1")
+            format!(
+                "expected replay.point/1 of model version {MODEL_VERSION}, found replay.point/0 of 0"
+            )
         );
     }
 

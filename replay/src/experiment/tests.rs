@@ -20,6 +20,7 @@ fn id(checksum: &str) -> TraceId {
     TraceId {
         scene: "empty".into(),
         checksum: checksum.into(),
+        ..TraceId::default()
     }
 }
 

@@ -11,6 +11,7 @@ use super::table::Table;
 use super::theme;
 use crate::accuracy::{Choice, Contribution, Study, headline_figures};
 use crate::config::RunConfig;
+use crate::model_version::MODEL_VERSION;
 use crate::result::TOOL;
 use crate::techniques::dominated;
 use maud::{Markup, html};
@@ -156,6 +157,7 @@ struct Advice<'a> {
 struct Document<'a> {
     schema: &'a str,
     tool: &'a str,
+    model_version: u32,
     config: &'a RunConfig,
     studies: Vec<StudyDocument<'a>>,
 }
@@ -286,6 +288,7 @@ impl AccuracyReport {
         serde_json::to_string_pretty(&Document {
             schema: ACCURACY_SCHEMA,
             tool: TOOL,
+            model_version: MODEL_VERSION,
             config: &self.config,
             studies: (self.studies.iter())
                 .map(study)

@@ -3,6 +3,7 @@
 use super::columns::{Column, Records, Show};
 use super::table::Table;
 use crate::addresses::{LevelCounts, Outcome, Point, Totals};
+use crate::model_version::MODEL_VERSION;
 use crate::result::TOOL;
 use serde::Serialize;
 
@@ -159,6 +160,7 @@ impl Accesses {
 struct Document<'a, P> {
     schema: &'static str,
     tool: &'static str,
+    model_version: u32,
     input: &'a str,
     accesses: Accesses,
     points: P,
@@ -173,6 +175,7 @@ pub fn json(input: &str, outcome: &Outcome) -> serde_json::Result<String> {
     serde_json::to_string_pretty(&Document {
         schema: SCHEMA,
         tool: TOOL,
+        model_version: MODEL_VERSION,
         input,
         accesses: Accesses::new(&outcome.totals, outcome.unique_lines),
         points: Records {

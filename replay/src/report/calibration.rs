@@ -5,6 +5,7 @@ use super::columns::{Column, Row};
 use super::table::Table;
 use crate::config::RunConfig;
 use crate::experiment::{Objective, SceneFit, Setting, Trial, plain};
+use crate::model_version::MODEL_VERSION;
 use crate::result::TOOL;
 use serde::Serialize;
 
@@ -16,6 +17,7 @@ pub const CALIBRATION_SCHEMA: &str = "replay.calibration/1";
 pub struct CalibrationReport {
     schema: &'static str,
     tool: &'static str,
+    model_version: u32,
     base: RunConfig,
     objective: Objective,
     /// Index of the trial that does best on the scenes that choose.
@@ -69,6 +71,7 @@ impl CalibrationReport {
         Self {
             schema: CALIBRATION_SCHEMA,
             tool: TOOL,
+            model_version: MODEL_VERSION,
             base,
             objective,
             chosen,

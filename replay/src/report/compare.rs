@@ -4,6 +4,7 @@ use super::columns::{Column, Records, Row, Show, Value};
 use super::table::Table;
 use crate::compare::{Class, Comparison, Tally};
 use crate::config::{Order, RunConfig};
+use crate::model_version::MODEL_VERSION;
 use crate::result::{RunResult, TOOL, TraceId};
 use formats::textrace::TraceMeta;
 use serde::Serialize;
@@ -103,6 +104,7 @@ impl Row for Class {
 struct Document<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
+    model_version: u32,
     a: &'a Side<'r>,
     b: &'a Side<'r>,
     config: &'a RunConfig,
@@ -122,6 +124,7 @@ impl CompareReport<'_> {
         serde_json::to_string_pretty(&Document {
             schema: COMPARE_SCHEMA,
             tool: TOOL,
+            model_version: MODEL_VERSION,
             a,
             b,
             config: &self.config,

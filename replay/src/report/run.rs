@@ -6,6 +6,7 @@ use super::figures::figures;
 use super::table::Table;
 use crate::config::{Mode, RunConfig};
 use crate::experiment::ResultRow;
+use crate::model_version::MODEL_VERSION;
 use crate::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TOOL, TraceId};
 use crate::size::format_bytes;
 use serde::Serialize;
@@ -18,6 +19,7 @@ const COMPARE_SCHEMA: &str = "replay.compare-modes/1";
 struct Document<'a> {
     schema: &'a str,
     tool: &'a str,
+    model_version: u32,
     trace: &'a TraceId,
     config: &'a RunConfig,
     result: &'a RunResult,
@@ -30,6 +32,7 @@ impl<'a> Document<'a> {
         Self {
             schema: RUN_SCHEMA,
             tool: TOOL,
+            model_version: MODEL_VERSION,
             trace: &row.subject.id,
             config: &row.point.config,
             result: row.result,

@@ -12,6 +12,7 @@ use crate::config::{Order, RunConfig};
 use crate::experiment::{
     Axis, ExperimentFile, Outcome, Point, ResultRow, Setting, plain, point_key,
 };
+use crate::model_version::MODEL_VERSION;
 use crate::palette;
 use crate::result::{TOOL, TraceId};
 use maud::html;
@@ -37,6 +38,7 @@ pub struct SweepReport<'a> {
 struct Document<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
+    model_version: u32,
     /// Labels and traces.
     traces: Vec<(&'a str, &'a TraceId)>,
     base: RunConfig,
@@ -139,6 +141,7 @@ impl<'a> SweepReport<'a> {
         serde_json::to_string(&Document {
             schema: SWEEP_SCHEMA,
             tool: TOOL,
+            model_version: MODEL_VERSION,
             traces: subjects.map(|s| (s.label.as_str(), &s.id)).collect(),
             base: self.file.base,
             axes: &self.file.axes,

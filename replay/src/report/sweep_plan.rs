@@ -2,6 +2,7 @@
 //! done.
 
 use crate::experiment::{Plan, Store, Subject, Task, point_key};
+use crate::model_version::MODEL_VERSION;
 use crate::result::{TOOL, TraceId};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,6 +14,7 @@ pub const PLAN_SCHEMA: &str = "replay.plan/1";
 struct Document<'a> {
     schema: &'a str,
     tool: &'a str,
+    model_version: u32,
     /// Labels and traces.
     traces: Vec<(&'a str, &'a TraceId)>,
     points: Vec<PlannedPoint<'a>>,
@@ -57,6 +59,7 @@ pub fn json(
     serde_json::to_string(&Document {
         schema: PLAN_SCHEMA,
         tool: TOOL,
+        model_version: MODEL_VERSION,
         traces: subjects.iter().map(|s| (s.label.as_str(), &s.id)).collect(),
         points: tasks.par_iter().map(point).collect(),
     })

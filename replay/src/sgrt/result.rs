@@ -23,6 +23,8 @@ pub struct Report {
     pub schema: String,
     /// Program and version.
     pub tool: String,
+    /// Version of the models.
+    pub model_version: u32,
     /// The trace.
     pub trace: TraceId,
     /// Triangles of the scene.

@@ -8,6 +8,7 @@ use super::columns::Records;
 use super::table::Table;
 use crate::config::{CacheConfig, RunConfig};
 use crate::locality::{Figures, OrderFigures, Stream};
+use crate::model_version::MODEL_VERSION;
 use crate::result::{TOOL, TraceId};
 use columns::{CurvePoint, Reuses, Subject, Summary, Window};
 use serde::Serialize;
@@ -47,6 +48,7 @@ pub struct LocalityReport {
 struct Document<'r, 'a> {
     schema: &'a str,
     tool: &'a str,
+    model_version: u32,
     config: RunConfig,
     traces: Vec<TraceFacts<'a>>,
     rows: Records<'r, 'a, Summary<'a>>,
@@ -227,6 +229,7 @@ impl LocalityReport {
         serde_json::to_string_pretty(&Document {
             schema: SCHEMA,
             tool: TOOL,
+            model_version: MODEL_VERSION,
             config: self.config,
             traces: self.traces.iter().map(TraceFacts::of).collect(),
             rows: Records {

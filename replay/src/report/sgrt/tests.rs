@@ -1,4 +1,5 @@
 use super::*;
+use crate::model_version::MODEL_VERSION;
 use crate::paper::sgrt::PaperValues;
 use crate::result::TraceId;
 use crate::sgrt::compose::Reuse;
@@ -27,9 +28,11 @@ fn entry_of(view: View) -> Entry {
         report: Report {
             schema: SCHEMA.to_owned(),
             tool: "replay test".to_owned(),
+            model_version: MODEL_VERSION,
             trace: TraceId {
                 scene: "scenes/teapot.obj".to_owned(),
                 checksum: "0badcafe".to_owned(),
+                ..TraceId::default()
             },
             scene_triangles: 1,
             eye_size_px: [72, 40],

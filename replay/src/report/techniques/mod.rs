@@ -10,6 +10,7 @@ pub use page::Scene;
 use super::columns::Records;
 use super::table::Table;
 use crate::config::{Order, RunConfig};
+use crate::model_version::MODEL_VERSION;
 use crate::result::TOOL;
 use crate::techniques::manifest::{Auto, Manifest};
 use crate::techniques::{Measured, Measures, OrderGain};
@@ -38,6 +39,7 @@ pub struct TechniquesReport<'a> {
 struct Document<'r, 'a> {
     schema: &'a str,
     tool: &'a str,
+    model_version: u32,
     config: RunConfig,
     scenes: Vec<SceneFacts<'a>>,
     rows: Records<'r, 'a, &'a Measured<'a>>,
@@ -185,6 +187,7 @@ impl<'a> TechniquesReport<'a> {
         serde_json::to_string_pretty(&Document {
             schema: SCHEMA,
             tool: TOOL,
+            model_version: MODEL_VERSION,
             config: self.config,
             scenes: self.scenes.iter().zip(&self.manifests).map(facts).collect(),
             rows: Records {

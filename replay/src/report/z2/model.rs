@@ -2,6 +2,7 @@
 
 use crate::config::{Order, RunConfig};
 use crate::experiment::{Outcome, ResultRow, Subject, frame_count};
+use crate::model_version::MODEL_VERSION;
 use crate::paper::z2::{self, PublishedRow};
 use crate::report::columns::{Column, Records, Row, Value};
 use crate::report::errors::{self, KnownError, Of};
@@ -256,6 +257,7 @@ impl<'a> PaperReport<'a> {
         serde_json::to_string(&Document {
             schema: PAPER_SCHEMA,
             tool: TOOL,
+            model_version: MODEL_VERSION,
             config: &self.config,
             traces: &self.traces,
             rows: Records {
@@ -279,6 +281,7 @@ impl<'a> PaperReport<'a> {
 struct Document<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
+    model_version: u32,
     config: &'a RunConfig,
     traces: &'a [TraceInfo],
     rows: Records<'a, 'static, ResultRow<'r>>,

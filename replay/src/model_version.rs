@@ -1,0 +1,13 @@
+//! The version of the models: which counts a replay of a given trace and configuration yields.
+
+/// What changed with each version, version 1 first. A change that alters any count adds a line.
+///
+/// Results of different model versions cannot be compared, so a sweep never takes a stored point of
+/// another version. `tests/tests/golden.rs` refuses changed golden counts under an unchanged version.
+pub const HISTORY: &[&str] = &[
+    // 1
+    "The first numbered version.",
+];
+
+/// The version of the models, recorded with every result and part of every point's key.
+pub const MODEL_VERSION: u32 = HISTORY.len() as u32;
