@@ -3,11 +3,11 @@
 use super::ConfigArgs;
 use super::subjects::Traces;
 use crate::config::Mode;
-use crate::experiment::{self, Axis, Objective, Plan, Store, trials};
+use crate::experiment::{self, Axis, Objective, Plan, SceneCaptures, Store, trials};
 use crate::paper::z2;
 use crate::preset::Preset;
 use crate::report::calibration::CalibrationReport;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use shell::Progress;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -18,7 +18,11 @@ use toml::Value;
 #[command(after_help = "Examples:
   replay calibrate *.textrace --try tmu.loop_cycles=16,20,24,28,32
   replay calibrate *.textrace --held-out atrium,jungle --objective table \\
-    --try sampling.max_anisotropy=1,2 --try layout.base_align_bytes=64,4096,65536")]
+    --try sampling.max_anisotropy=1,2 --try layout.base_align_bytes=64,4096,65536
+  replay calibrate *.textrace --by-ipd --held-out jungle --objective table \\
+    --try sampling.lod_bias=0,-1 --mode functional
+
+Rates are those of first look-ups where the mode is first-miss (the default), as the paper's very probably are; in other modes those of primary misses.")]
 pub struct Args {
     /// Texture traces
     #[arg(required = true, value_name = "TRACE")]
@@ -26,6 +30,10 @@ pub struct Args {
     /// Values to try of a key of the configuration; several keys: every combination
     #[arg(long = "try", value_name = "KEY=V1,V2,...", required = true)]
     tries: Vec<String>,
+    /// Take traces of one scene for captures of it at several distances between the eyes (tracegen raster --ipd), and try
+    /// every distance; each scene needs the same ones
+    #[arg(long)]
+    by_ipd: bool,
     /// Labels of the scenes that settings are not chosen by, comma-separated; every second one if
     /// not given
     #[arg(long, value_name = "LABELS")]
@@ -54,8 +62,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let usual = crate::config::RunConfig::default();
     let base = args.machine.resolve_over(preset.over(usual))?;
     ensure!(
-        base.mode == Mode::FirstMiss,
-        "--mode: expected first-miss, whose rates are counted as the paper's are"
+        base.mode != Mode::Functional || args.objective != Objective::Surface,
+        "--objective surface: expected a mode with a texture unit, found functional; try --objective table"
     );
     let tries: Vec<Axis> = args
         .tries
@@ -84,15 +92,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.threads.start()?;
     let traces = Traces::open(&args.traces)?;
     let subjects = traces.subjects();
-    let labels: Vec<&str> = subjects.iter().map(|s| s.label.as_str()).collect();
+    let mut scenes = match args.by_ipd {
+        true => {
+            SceneCaptures::by_ipd(&subjects).map_err(|message| anyhow!("--by-ipd: {message}"))?
+        }
+        false => SceneCaptures::one_each(&subjects),
+    };
+    let labels: Vec<&str> = scenes.iter().map(|s| s.label.as_str()).collect();
     let held_out = held_out(args.held_out.as_deref(), &labels)?;
+    for (scene, held_out) in scenes.iter_mut().zip(held_out) {
+        scene.held_out = held_out;
+    }
     let store = args.out.as_deref().map(Store::new);
     let replays = (subjects.len() * plan.points.len()) as u64;
     let progress = Progress::new("replaying", replays, "replays");
     let done = |done| progress.advance(done);
     let outcome = experiment::run(&plan, &subjects, store.as_ref(), &done)?;
     drop(progress);
-    let trials = trials(&plan, &outcome, &held_out, args.objective);
+    let trials = trials(&plan, &outcome, &scenes, args.objective);
     let report = CalibrationReport::new(base, args.objective, trials);
     super::print(&if args.json {
         report.json()?

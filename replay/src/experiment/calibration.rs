@@ -1,10 +1,12 @@
-//! Settings tried on some scenes and judged on others.
+//! Settings tried on some scenes and judged on others. A scene may be captured at several distances between the eyes;
+//! the distance is then tried as the settings are.
 
-use super::{Outcome, Plan, ResultRow, Setting};
+use super::{Outcome, Plan, ResultRow, Setting, Subject, scene_label};
 use crate::paper::score::{Measured, Score, score};
 use crate::paper::z2;
 use crate::tmu::closed_form;
 use serde::Serialize;
+use toml::Value;
 
 /// What a setting is chosen by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
@@ -25,8 +27,8 @@ pub struct SceneFit {
     pub scene: String,
     /// Whether settings are not chosen by it.
     pub held_out: bool,
-    /// Root mean square distance from the surface, points of utilisation.
-    pub surface_points: f64,
+    /// Root mean square distance from the surface, points of utilisation; none without a texture unit.
+    pub surface_points: Option<f64>,
     /// Distance from the paper's rows.
     pub table: Option<Score>,
 }
@@ -47,16 +49,95 @@ pub struct Trial {
 /// Rows of a trial on a scene: the paper's caches in its orders.
 pub const ROWS: usize = z2::CACHES_KIB.len() * z2::ORDERS.len();
 
-fn measured(row: &ResultRow) -> Option<Measured> {
-    let first = row.result.first_lookups?;
+/// Key of the distance between the eyes among a trial's settings.
+pub const IPD_KEY: &str = "capture.ipd_m";
+
+/// A scene, and the captures of it that a trial may take.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneCaptures {
+    /// Its label.
+    pub label: String,
+    /// Whether settings are not chosen by it.
+    pub held_out: bool,
+    /// Distance between the eyes in metres and index of the trace, by distance; as many in every scene.
+    pub captures: Vec<(f64, usize)>,
+}
+
+impl SceneCaptures {
+    /// Every trace as a scene of its own.
+    #[must_use]
+    pub fn one_each(subjects: &[Subject<'_>]) -> Vec<Self> {
+        let scene = |(index, subject): (usize, &Subject<'_>)| Self {
+            label: subject.label.clone(),
+            held_out: false,
+            captures: vec![(ipd_m(subject), index)],
+        };
+        subjects.iter().enumerate().map(scene).collect()
+    }
+
+    /// The scenes of the traces, in the order of their first ones, each with its captures by distance between the
+    /// eyes.
+    ///
+    /// # Errors
+    /// A scene that was captured twice at one distance, or not at a distance at which another one was.
+    pub fn by_ipd(subjects: &[Subject<'_>]) -> Result<Vec<Self>, String> {
+        let mut scenes: Vec<Self> = Vec::new();
+        for (index, subject) in subjects.iter().enumerate() {
+            let label = scene_label(subject.source.tables());
+            let capture = (ipd_m(subject), index);
+            match scenes.iter_mut().find(|scene| scene.label == label) {
+                Some(scene) => scene.captures.push(capture),
+                None => scenes.push(Self {
+                    label,
+                    held_out: false,
+                    captures: vec![capture],
+                }),
+            }
+        }
+        let mut distances: Vec<f64> = subjects.iter().map(ipd_m).collect();
+        distances.sort_by(f64::total_cmp);
+        distances.dedup();
+        for scene in &mut scenes {
+            scene.captures.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for distance in &distances {
+                let found = scene.captures.iter().filter(|(of, _)| of == distance);
+                match found.count() {
+                    1 => {}
+                    found => {
+                        return Err(format!(
+                            "{}: expected one trace with the eyes {distance} m apart, found {found}",
+                            scene.label
+                        ));
+                    }
+                }
+            }
+        }
+        Ok(scenes)
+    }
+}
+
+/// Distance between the eyes of a trace, metres.
+fn ipd_m(subject: &Subject<'_>) -> f64 {
+    // Through text: 0.064 as a single-precision number is no 0.064 in double precision.
+    let text = subject.source.tables().meta.hmd.ipd_m.to_string();
+    text.parse().unwrap_or_default()
+}
+
+/// A row's rates: of first look-ups where the machine counts them, as the paper does, else of primary misses.
+fn measured(row: &ResultRow) -> Measured {
+    let result = row.result;
     let (l1, l2) = row.caches_kib();
-    Some(Measured {
+    let rates = match &result.first_lookups {
+        Some(first) => (first.l1_miss_rate, first.l2_miss_rate),
+        None => (result.l1.miss_rate, result.l2.miss_rate),
+    };
+    Measured {
         caches_kib: (l1 as u32, l2 as u32),
         order: row.point.config.order,
-        l1_miss_pct: 100.0 * first.l1_miss_rate,
-        l2_miss_pct: 100.0 * first.l2_miss_rate,
-        tmu_util_pct: 100.0 * row.result.tmu.as_ref()?.utilization,
-    })
+        l1_miss_pct: 100.0 * rates.0,
+        l2_miss_pct: 100.0 * rates.1,
+        tmu_util_pct: result.tmu.as_ref().map(|tmu| 100.0 * tmu.utilization),
+    }
 }
 
 fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -64,58 +145,134 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
-/// The trials of a plan whose last axes are the paper's caches and orders, in the plan's order;
-/// `held_out` says which scenes do not choose.
+/// The trials of a plan whose last axes are the paper's caches and orders, distance by distance and then in the
+/// plan's order.
 #[must_use]
 pub fn trials(
     plan: &Plan,
     outcome: &Outcome,
-    held_out: &[bool],
+    scenes: &[SceneCaptures],
     objective: Objective,
 ) -> Vec<Trial> {
     let rows = outcome.rows();
-    let by_scene: Vec<&[ResultRow]> = rows.chunks(plan.points.len()).collect();
-    let trials = (0..plan.points.len() / ROWS).map(|trial| {
-        let range = trial * ROWS..(trial + 1) * ROWS;
-        let settings = plan.points[range.start].settings.iter();
-        let tried = settings.filter(|(key, _)| !is_of_the_table(key)).cloned();
-        let fits = by_scene.iter().zip(held_out).map(|(rows, &held_out)| {
-            let rows = &rows[range.clone()];
-            let measured: Vec<Measured> = rows.iter().filter_map(measured).collect();
-            let off = measured.iter().map(|row| {
-                let form = closed_form(row.l1_miss_pct / 100.0, row.l2_miss_pct / 100.0);
-                row.tmu_util_pct - 100.0 * form
+    let by_subject: Vec<&[ResultRow]> = rows.chunks(plan.points.len()).collect();
+    let distances = scenes.first().map_or(0, |scene| scene.captures.len());
+    let of_distance = |distance: usize| {
+        (0..plan.points.len() / ROWS).map(move |trial| (distance, trial * ROWS..(trial + 1) * ROWS))
+    };
+    let trials = (0..distances)
+        .flat_map(of_distance)
+        .map(|(distance, range)| {
+            let settings = plan.points[range.start].settings.iter();
+            let tried = settings.filter(|(key, _)| !is_of_the_table(key)).cloned();
+            let ipd = (scenes.iter().take(1))
+                .filter(|_| distances > 1)
+                .map(|scene| (IPD_KEY.to_owned(), Value::Float(scene.captures[distance].0)));
+            let fits = scenes.iter().map(|scene| {
+                let (_, subject) = scene.captures[distance];
+                fit(scene, &by_subject[subject][range.clone()])
             });
-            let subject = rows[0].subject;
-            SceneFit {
-                scene: subject.label.clone(),
-                held_out,
-                surface_points: root_mean_square(off).unwrap_or(f64::MAX),
-                table: subject
-                    .stand_in_for
-                    .and_then(|scene| score(scene, &measured)),
+            let scenes: Vec<SceneFit> = fits.collect();
+            let over = |held_out: bool| {
+                let of = scenes.iter().filter(|fit| fit.held_out == held_out);
+                root_mean_square(of.filter_map(|fit| match objective {
+                    Objective::Surface => fit.surface_points,
+                    Objective::Table => fit.table.map(|score| score.total),
+                }))
+            };
+            Trial {
+                settings: ipd.chain(tried).collect(),
+                chosen_by: over(false),
+                held_out: over(true),
+                scenes,
             }
         });
-        let scenes: Vec<SceneFit> = fits.collect();
-        let over = |held_out: bool| {
-            let of = scenes.iter().filter(|fit| fit.held_out == held_out);
-            root_mean_square(of.filter_map(|fit| match objective {
-                Objective::Surface => Some(fit.surface_points),
-                Objective::Table => fit.table.map(|score| score.total),
-            }))
-        };
-        Trial {
-            settings: tried.collect(),
-            chosen_by: over(false),
-            held_out: over(true),
-            scenes,
-        }
-    });
     trials.collect()
+}
+
+/// How the paper's caches and orders do on a scene.
+fn fit(scene: &SceneCaptures, rows: &[ResultRow]) -> SceneFit {
+    let measured: Vec<Measured> = rows.iter().map(measured).collect();
+    let off = measured.iter().filter_map(|row| {
+        let form = closed_form(row.l1_miss_pct / 100.0, row.l2_miss_pct / 100.0);
+        Some(row.tmu_util_pct? - 100.0 * form)
+    });
+    let paper = rows.first().and_then(|row| row.subject.stand_in_for);
+    SceneFit {
+        scene: scene.label.clone(),
+        held_out: scene.held_out,
+        surface_points: root_mean_square(off),
+        table: paper.and_then(|paper| score(paper, &measured)),
+    }
 }
 
 /// Keys that the paper's table varies.
 #[must_use]
 pub fn is_of_the_table(key: &str) -> bool {
     ["l1.size_bytes", "l2.size_bytes", "order"].contains(&key)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::TraceId;
+    use crate::stream::MemoryTrace;
+    use crate::stream::testing::tables;
+
+    fn trace(scene: &str, ipd_m: f32) -> MemoryTrace {
+        let mut tables = tables(&[[4, 4]]);
+        tables.meta.scene = scene.to_owned();
+        tables.meta.hmd.ipd_m = ipd_m;
+        MemoryTrace {
+            tables,
+            tiles: Vec::new(),
+        }
+    }
+
+    fn grouped(traces: &[(&str, f32)]) -> Result<Vec<SceneCaptures>, String> {
+        let traces: Vec<MemoryTrace> = traces.iter().map(|(s, ipd)| trace(s, *ipd)).collect();
+        let mut subjects = Vec::new();
+        for (index, trace) in traces.iter().enumerate() {
+            subjects.push(Subject::new(trace, TraceId::default(), index.to_string()));
+        }
+        SceneCaptures::by_ipd(&subjects)
+    }
+
+    #[test]
+    fn traces_of_a_scene_are_its_captures_by_distance_between_the_eyes() {
+        let scenes = grouped(&[
+            ("atrium", 0.5),
+            ("jungle", 0.064),
+            ("atrium", 0.064),
+            ("jungle", 0.5),
+        ]);
+        let scene = |label: &str, captures: [(f64, usize); 2]| SceneCaptures {
+            label: label.to_owned(),
+            held_out: false,
+            captures: captures.into(),
+        };
+        assert_eq!(
+            scenes.unwrap(),
+            [
+                scene("atrium", [(0.064, 2), (0.5, 0)]),
+                scene("jungle", [(0.064, 1), (0.5, 3)])
+            ]
+        );
+    }
+
+    #[test]
+    fn a_scene_without_a_distance_that_another_has_is_named() {
+        for (traces, message) in [
+            (
+                &[("atrium", 0.064), ("atrium", 0.5), ("jungle", 0.5)][..],
+                "jungle: expected one trace with the eyes 0.064 m apart, found 0",
+            ),
+            (
+                &[("atrium", 0.064), ("atrium", 0.064)],
+                "atrium: expected one trace with the eyes 0.064 m apart, found 2",
+            ),
+        ] {
+            assert_eq!(grouped(traces).unwrap_err(), message);
+        }
+    }
 }

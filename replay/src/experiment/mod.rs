@@ -15,14 +15,14 @@ mod split;
 mod store;
 mod subject;
 
-pub use calibration::{Objective, SceneFit, Trial, is_of_the_table, trials};
+pub use calibration::{Objective, SceneCaptures, SceneFit, Trial, is_of_the_table, trials};
 pub use file::ExperimentFile;
 pub use outcome::{Outcome, ResultRow};
 pub use plan::{Axis, MOST_POINTS, Plan, PlanError, Point, Setting, plain};
 pub use runner::{AbsentPoint, Incomplete, RunError, merge, run, run_part};
 pub use split::{Split, Task};
 pub use store::{Absent, POINT_SCHEMA, Store, StoredPoint, point_key};
-pub use subject::{Subject, frame_count, has_shadow_maps, labels};
+pub use subject::{Subject, frame_count, has_shadow_maps, labels, scene_label};
 
 #[cfg(test)]
 mod mutations;

@@ -55,7 +55,10 @@ pub fn has_shadow_maps(tables: &Tables) -> bool {
 /// checksum, too, where those are the same.
 #[must_use]
 pub fn labels(traces: &[(&Tables, &TraceId, String)]) -> Vec<String> {
-    let scenes: Vec<String> = traces.iter().map(|(tables, ..)| of_scene(tables)).collect();
+    let scenes: Vec<String> = traces
+        .iter()
+        .map(|(tables, ..)| scene_label(tables))
+        .collect();
     let count = |names: &mut dyn Iterator<Item = &String>, name: &String| {
         names.filter(|other| *other == name).count()
     };
@@ -75,7 +78,9 @@ pub fn labels(traces: &[(&Tables, &TraceId, String)]) -> Vec<String> {
     names.iter().zip(traces).map(unique).collect()
 }
 
-fn of_scene(tables: &Tables) -> String {
+/// A scene's short name, with `+shadows` where a scene that is usually without them has shadow maps.
+#[must_use]
+pub fn scene_label(tables: &Tables) -> String {
     let name = scene_name(&tables.meta.scene);
     let usual = name.contains("shadow") || name.contains("jungle");
     let suffix = if has_shadow_maps(tables) && !usual {

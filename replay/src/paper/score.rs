@@ -16,8 +16,8 @@ pub struct Measured {
     pub l1_miss_pct: f64,
     /// L2 miss rate, percent.
     pub l2_miss_pct: f64,
-    /// TMU utilisation, percent.
-    pub tmu_util_pct: f64,
+    /// TMU utilisation, percent; none without a texture unit.
+    pub tmu_util_pct: Option<f64>,
 }
 
 /// Root mean square distances from the paper's rows of a scene.
@@ -27,13 +27,13 @@ pub struct Score {
     pub l1_points: f64,
     /// Of the L2 miss rates, points.
     pub l2_points: f64,
-    /// Of the utilisations, points.
-    pub tmu_points: f64,
+    /// Of the utilisations, points; none without a texture unit.
+    pub tmu_points: Option<f64>,
     /// Of the savings against Morton that follow from both rates, points.
     pub saved_points: f64,
     /// Of the slopes of the L1 rate over the product of both rates, by L1 size.
     pub slope: f64,
-    /// All five, each over its standard deviation in the paper's table: 1 is as far off as its rows
+    /// All of these, each over its standard deviation in the paper's table: 1 is as far off as its rows
     /// are from each other.
     pub total: f64,
 }
@@ -41,7 +41,7 @@ pub struct Score {
 /// What the score compares, row by row and L1 size by L1 size.
 struct Parts {
     /// L1, L2, TMU of each row, then its saving against Morton; Morton has none.
-    rows: Vec<([f64; 3], Option<f64>)>,
+    rows: Vec<[Option<f64>; 4]>,
     slopes: Vec<f64>,
 }
 
@@ -72,8 +72,8 @@ impl Parts {
             rows: rows
                 .iter()
                 .map(|row| {
-                    let levels = [row.l1_miss_pct, row.l2_miss_pct, row.tmu_util_pct];
-                    (levels, saved(row))
+                    let rates = [row.l1_miss_pct, row.l2_miss_pct].map(Some);
+                    [rates[0], rates[1], row.tmu_util_pct, saved(row)]
                 })
                 .collect(),
             slopes: l1_sizes.iter().map(slope).collect(),
@@ -82,9 +82,8 @@ impl Parts {
 
     /// By part: L1, L2, TMU, saving, slope.
     fn lists(&self) -> [Vec<f64>; 5] {
-        let level = |i: usize| self.rows.iter().map(|row| row.0[i]).collect();
-        let saved = self.rows.iter().filter_map(|row| row.1).collect();
-        [level(0), level(1), level(2), saved, self.slopes.clone()]
+        let part = |i: usize| self.rows.iter().filter_map(|row| row[i]).collect();
+        [part(0), part(1), part(2), part(3), self.slopes.clone()]
     }
 }
 
@@ -107,7 +106,7 @@ fn published(row: &PublishedRow) -> Measured {
         order: row.order,
         l1_miss_pct: row.l1_miss_pct,
         l2_miss_pct: row.l2_miss_pct,
-        tmu_util_pct: row.tmu_util_pct,
+        tmu_util_pct: Some(row.tmu_util_pct),
     }
 }
 
@@ -150,21 +149,24 @@ pub fn score(scene: &str, rows: &[Measured]) -> Option<Score> {
         .collect();
     let ours = ours.filter(|ours| !ours.is_empty())?;
     let (ours, theirs) = (Parts::of(&ours).lists(), Parts::of(&expected).lists());
-    let mut parts = [0.0; 5];
-    for (part, (ours, theirs)) in parts.iter_mut().zip(ours.iter().zip(&theirs)) {
-        *part = root_mean_square(ours.iter().zip(theirs).map(|(a, b)| a - b));
-    }
+    // A part that our rows lack is left out.
+    let distance = |part: usize| {
+        let (ours, theirs) = (&ours[part], &theirs[part]);
+        let known = ours.len() == theirs.len();
+        known.then(|| root_mean_square(ours.iter().zip(theirs).map(|(a, b)| a - b)))
+    };
+    let parts = [0, 1, 2, 3, 4].map(distance);
     let shares = parts
         .iter()
         .zip(SPREADS.iter())
-        .map(|(part, spread)| part / spread);
+        .filter_map(|(part, spread)| Some((*part)? / spread));
     let [l1_points, l2_points, tmu_points, saved_points, slope] = parts;
     Some(Score {
-        l1_points,
-        l2_points,
+        l1_points: l1_points?,
+        l2_points: l2_points?,
         tmu_points,
-        saved_points,
-        slope,
+        saved_points: saved_points?,
+        slope: slope?,
         total: root_mean_square(shares),
     })
 }
@@ -176,7 +178,11 @@ mod tests {
     #[test]
     fn the_papers_own_rows_have_no_distance() {
         for scene in z2::SCENES {
-            assert_eq!(score(scene, &scene_rows(scene)), Some(Score::default()));
+            let none = Score {
+                tmu_points: Some(0.0),
+                ..Score::default()
+            };
+            assert_eq!(score(scene, &scene_rows(scene)), Some(none));
         }
     }
 
@@ -188,12 +194,17 @@ mod tests {
             rows.iter_mut().for_each(change);
             score(scene, &rows).unwrap()
         };
-        let tmu = changed(|row| row.tmu_util_pct += 2.0);
-        assert!((tmu.tmu_points - 2.0).abs() < 1e-9 && tmu.l1_points == 0.0);
+        let tmu = changed(|row| row.tmu_util_pct = row.tmu_util_pct.map(|pct| pct + 2.0));
+        assert!((tmu.tmu_points.unwrap() - 2.0).abs() < 1e-9 && tmu.l1_points == 0.0);
         assert!((tmu.total - (2.0 / SPREADS[2]) / 5_f64.sqrt()).abs() < 1e-9);
         // Twice the L1 rate: savings and slopes are ratios and stay.
         let twice = changed(|row| row.l1_miss_pct *= 2.0);
         assert!(twice.l1_points > 8.0 && twice.saved_points < 1e-9 && twice.slope < 1e-9);
+        // Without a texture unit its part is left out, of the total as well.
+        let none =
+            changed(|row| (row.tmu_util_pct, row.l1_miss_pct) = (None, row.l1_miss_pct + 1.0));
+        assert_eq!(none.tmu_points, None);
+        assert!((none.l1_points - 1.0).abs() < 1e-9 && none.total > 0.0);
         // A flat L1 rate has no slope.
         let flat = changed(|row| row.l1_miss_pct = 10.0);
         assert!(flat.slope > 0.4, "{flat:?}");

@@ -52,10 +52,10 @@ impl Row for SceneFit {
             Column::real("surface", "surface", "points", 2, |f: &Self| f.surface_points),
             Column::real("l1", "L1", "points", 2, |f: &Self| Some(f.table?.l1_points)),
             Column::real("l2", "L2", "points", 2, |f: &Self| Some(f.table?.l2_points)),
-            Column::real("tmu", "TMU", "points", 2, |f: &Self| Some(f.table?.tmu_points)),
+            Column::real("tmu", "TMU", "points", 2, |f: &Self| f.table?.tmu_points),
             Column::real("saved", "saved", "points", 2, |f: &Self| Some(f.table?.saved_points)),
             Column::real("slope", "slope", "", 3, |f: &Self| Some(f.table?.slope)),
-            Column::real("total", "all five", "of the table's spread", 3, |f: &Self| Some(f.table?.total)),
+            Column::real("total", "all parts", "of the table's spread", 3, |f: &Self| Some(f.table?.total)),
         ]
     }
 }
