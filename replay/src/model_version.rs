@@ -7,6 +7,8 @@
 pub const HISTORY: &[&str] = &[
     // 1
     "The first numbered version.",
+    // 2
+    "Shadow maps lie in Morton order; anisotropic filtering takes its level from the unrounded ratio.",
 ];
 
 /// The version of the models, recorded with every result and part of every point's key.

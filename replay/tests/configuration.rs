@@ -33,7 +33,7 @@ and all caches of a level together have at most 2^24 lines.
     layout.block_order = [\"morton\", \"tiled\"]
 
 At most 100000 points; a point that no machine can have is refused before any is replayed. A sweep that was
-stopped goes on where it stopped: each point's result is a file under `points/` in the output folder.
+stopped goes on where it stopped: each point's result is a row of a file under `points/` in the output folder.
 [many-machines.md](many-machines.md) tells how to split one over machines.
 
 ## Keys

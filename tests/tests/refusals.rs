@@ -3,7 +3,7 @@
 use formats::Trace;
 use formats::textrace::Encoding;
 use parallax_tests::repair::{Parts, repair_header, validate};
-use parallax_tests::{program, traces};
+use parallax_tests::{program, refuse, root, traces};
 use serde_json::json;
 use std::fs;
 
@@ -416,4 +416,32 @@ fn every_mip_level_of_the_largest_texture_is_counted() {
     let report: serde_json::Value = serde_json::from_str(&text).expect("one JSON object");
     let levels = report["result"]["by_level"].as_array().expect("levels");
     assert_eq!(levels.len(), 17);
+}
+
+#[test]
+fn validate_refuses_textures_that_run_cannot_address() {
+    let golden = root().join("traces/atrium.textrace");
+    let mut trace = Parts::of(&fs::read(golden).expect("a trace"));
+    let table = trace.chunk(b"TEXS");
+    let mut at = 4;
+    while at < table.len() {
+        // Array layers, then the length of the name behind the entry.
+        table[at + 12..at + 16].copy_from_slice(&65_536u32.to_le_bytes());
+        let name = u16::from_le_bytes([table[at + 20], table[at + 21]]);
+        at += 22 + usize::from(name);
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("layers.textrace");
+    fs::write(&path, trace.sealed()).expect("temporary file");
+    let why = "expected fewer than 2^32";
+    refuse(program("replay").arg("run").arg(&path), &[why]);
+    let output = program("replay").arg("validate").arg(&path).output();
+    let output = output.expect("replay starts");
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    let file = path.display().to_string();
+    assert!(
+        told.contains(&file) && told.contains("chunk TEXS") && told.contains(why),
+        "{told}"
+    );
 }

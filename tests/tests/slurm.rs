@@ -131,7 +131,7 @@ impl Cluster {
         let [controller, first, second] = self.ports;
         let node = |name, port| {
             format!(
-                "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs=1 RealMemory=100\n"
+                "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs=1 RealMemory=4000\n"
             )
         };
         let text = format!(
@@ -140,7 +140,7 @@ impl Cluster {
              AuthInfo=socket={folder}/munge/socket,cred_expire=5\nProctrackType=proctrack/linuxproc\n\
              TaskPlugin=task/none\nMpiDefault=none\nJobAcctGatherType=jobacct_gather/none\n\
              AccountingStorageType=accounting_storage/none\nSelectType=select/cons_tres\n\
-             SelectTypeParameters=CR_Core\nReturnToService=2\nSlurmdTimeout=10\n\
+             SelectTypeParameters=CR_Core\nMaxArraySize=4\nReturnToService=2\nSlurmdTimeout=10\n\
              StateSaveLocation={folder}/state\nSlurmdSpoolDir={folder}/spool/%n\n\
              SlurmctldPidFile={folder}/slurmctld.pid\nSlurmdPidFile={folder}/slurmd-%n.pid\n\
              SlurmctldLogFile={folder}/slurmctld.log\nSlurmdLogFile={folder}/slurmd-%n.log\n{}{}\
@@ -313,13 +313,13 @@ fn a_job_array_on_two_nodes_gives_one_machines_bytes_also_after_a_task_was_kille
     };
     let told = cluster.submit(&script("array"));
     assert!(
-        told.starts_with("shards: job ") && told.contains("after them: job "),
+        told.starts_with("job ") && told.contains("the merge after them"),
         "{told}"
     );
     cluster.wait_for_jobs();
     same("array");
 
-    // A task is killed as the kernel does it when memory ends; the merge after it is cancelled.
+    // A task is killed as the kernel does it when memory ends; the merge after it tells what is missing.
     let path = script("killed");
     let told = cluster.submit(&path);
     let array: String = told
@@ -373,6 +373,11 @@ fn a_job_array_on_two_nodes_gives_one_machines_bytes_also_after_a_task_was_kille
         read("killed", "results.json").is_err(),
         "merged without a shard"
     );
+    let after: Vec<&str> = told.lines().filter_map(|l| l.split(':').next()).collect();
+    let after = after.last().and_then(|job| job.strip_prefix("job "));
+    let log = cluster.path(&format!("slurm-{}_0.out", after.unwrap_or_default()));
+    let log = fs::read_to_string(log).expect("the merge's log");
+    assert!(log.contains("of 18 points are not there"), "{log}");
     let merge = sweep("killed")
         .arg("--merge-only")
         .output()

@@ -1,7 +1,10 @@
 //! Sweeps over many machines: shards, a merge, and what a killed worker leaves behind.
 
+use parallax_tests::repair::crc32;
 use parallax_tests::{program, refuse, root, run_ok};
-use std::fs::{self, File};
+use replay::model_version::MODEL_VERSION;
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -66,9 +69,22 @@ impl Sweep {
 
     fn points(&self, out: &str) -> Vec<PathBuf> {
         let folder = fs::read_dir(self.path(out).join("points"));
-        folder
+        let mut files: Vec<PathBuf> = folder
             .map(|entries| entries.flatten().map(|e| e.path()).collect())
-            .unwrap_or_default()
+            .unwrap_or_default();
+        files.sort();
+        files
+    }
+
+    /// Rows of all files of points.
+    fn rows(&self, out: &str) -> Vec<String> {
+        let text = |path| fs::read_to_string(path).expect("rows");
+        let files: Vec<String> = self.points(out).into_iter().map(text).collect();
+        files
+            .iter()
+            .flat_map(|t| t.lines())
+            .map(str::to_owned)
+            .collect()
     }
 }
 
@@ -91,7 +107,12 @@ fn shards_in_any_order_merge_to_one_machines_bytes() {
             let entries = fs::read_dir(sweep.path(out)).expect("the folder").count();
             assert_eq!(entries, 1, "a shard writes points alone");
         }
-        assert_eq!(sweep.points(out).len(), POINTS);
+        let files = sweep.points(out).len();
+        assert!(
+            (1..=count).contains(&files),
+            "{files} files of {count} shards"
+        );
+        assert_eq!(sweep.rows(out).len(), POINTS);
         assert_eq!(sweep.results(out, &["--merge-only"]), printed);
         assert_same_results(&sweep.path("whole"), &sweep.path(out));
     }
@@ -108,7 +129,7 @@ fn a_slurm_task_does_its_shard() {
         command.env("SLURM_ARRAY_TASK_STEP", "4");
         run_ok(command.env("SLURM_ARRAY_TASK_COUNT", "2"));
     }
-    assert_eq!(sweep.points("out").len(), POINTS);
+    assert_eq!(sweep.rows("out").len(), POINTS);
     for (id, expected) in [
         ("one", "SLURM_ARRAY_TASK_ID: expected a number, found `one`"),
         ("3", "K/N"),
@@ -136,23 +157,10 @@ fn after_a_killed_worker_the_results_are_the_same() {
     }
     worker.kill().expect("SIGKILL");
     worker.wait().expect("an end");
-    let [old, new] = [".old.part", ".new.part"].map(|name| sweep.path("out/points").join(name));
-    for path in [&old, &new] {
-        let file = File::create(path).expect("a stray file");
-        let written = file.metadata().and_then(|m| m.modified()).expect("a time");
-        if path == &old {
-            file.set_modified(written - Duration::from_secs(7200))
-                .expect("a time");
-        }
-    }
     run_ok(&mut sweep.command("out", &["--shard", "2/2"]));
     run_ok(&mut sweep.command("out", &["--shard", "1/2"]));
     assert_eq!(sweep.results("out", &["--merge-only"]), printed);
     assert_same_results(&sweep.path("whole"), &sweep.path("out"));
-    assert!(
-        !old.exists() && new.exists(),
-        "what may have a writer stays"
-    );
 }
 
 #[test]
@@ -169,34 +177,51 @@ fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
     assert!(!sweep.path("out/results.json").exists());
     sweep.results("out", &[]);
     let whole = fs::read(sweep.path("out/results.json")).expect("results");
-    let mut points = sweep.points("out");
-    points.sort();
-    let name = |path: &Path| {
-        path.file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
+    let path = &sweep.points("out")[0];
+    let rows = sweep.rows("out");
+    let name = path.display().to_string();
+    let put = |rows: &[String]| fs::write(path, rows.join("\n")).expect("rows");
+    // A changed digit in one row, a row less, the end of the last.
+    let mut damaged = rows[1..].to_vec();
+    let digit = damaged[1]
+        .rfind(|c: char| c.is_ascii_digit())
+        .expect("a digit");
+    let other = if damaged[1].as_bytes()[digit] == b'7' {
+        "8"
+    } else {
+        "7"
     };
-    let text = fs::read_to_string(&points[1]).expect("a point");
-    fs::remove_file(&points[0]).expect("removed");
-    fs::write(&points[1], &text[..text.len() / 2]).expect("cut");
-    fs::write(
-        &points[2],
-        text.replacen("\"model_version\":", "\"model_version\":9", 1),
-    )
-    .expect("another version");
+    damaged[1].replace_range(digit..=digit, other);
+    let last = damaged.last_mut().expect("a row");
+    last.truncate(last.len() / 2);
+    put(&damaged);
+    let listed = [
+        format!("3 of {POINTS} points are not there"),
+        ": missing".to_owned(),
+        format!("{name}: row 2: expected checksum "),
+        ", found \"".to_owned(),
+        format!("{name}: row {}: expected", POINTS - 1),
+    ];
+    let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
+    refuse(&mut sweep.command("out", &["--merge-only"]), &listed);
+    // Rows of another model version.
+    let older = |row: &String| {
+        let (_, content) = row.split_once(' ').expect("a checksum");
+        let (_, rest) = content.split_once(' ').expect("a version");
+        let content = format!("0 {rest}");
+        format!("{:08x} {content}", crc32(content.as_bytes()))
+    };
+    let mut versions: Vec<String> = rows.iter().map(older).collect();
+    versions.push(String::new());
+    put(&versions);
     refuse(
         &mut sweep.command("out", &["--merge-only"]),
         &[
-            &format!("3 of {POINTS} points are not there"),
-            &format!("{}: missing", name(&points[0])),
-            &format!("{}: damaged: EOF", name(&points[1])),
-            &format!(
-                "{}: expected replay.point/1 of model version",
-                name(&points[2])
-            ),
+            &format!("{POINTS} of {POINTS} points are not there"),
+            &format!("not taken: {POINTS} rows of model version 0, expected {MODEL_VERSION}"),
         ],
     );
+    put(&damaged);
     // The same shards mend it.
     for shard in ["1/3", "2/3", "3/3"] {
         run_ok(&mut sweep.command("out", &["--shard", shard]));
@@ -243,10 +268,11 @@ fn the_plan_tells_keys_costs_and_what_is_done() {
         .flat_map(|k| plan(&["--shard", k]))
         .collect();
     assert_eq!(of_shards, all);
+    let rows = sweep.rows("out");
     for point in &all {
         let key = point["key"].as_str().expect("a key");
-        let file = sweep.path("out/points").join(format!("{key}.json"));
-        assert_eq!(point["done"], file.exists(), "{point}");
+        let is_there = rows.iter().any(|row| row.split(' ').nth(2) == Some(key));
+        assert_eq!(point["done"], is_there, "{point}");
         assert!(point["cost"].as_u64() > Some(0), "{point}");
     }
     assert!(
@@ -377,4 +403,76 @@ fn a_slurm_script_does_the_work_whatever_its_paths_hold() {
     }
     sweep.results("whole", &[]);
     assert_same_results(&sweep.path("whole"), &sweep.path(out));
+}
+
+#[test]
+fn rows_of_different_sweeps_can_be_joined() {
+    let sweep = Sweep::new();
+    let trace = root().join("traces/atrium-shadows.textrace");
+    // The same trace under another name, beside another trace, in another experiment.
+    let renamed = sweep.path("another name.textrace");
+    fs::copy(&trace, &renamed).expect("a copy");
+    let experiment = "[base]\nmode = \"functional\"\norder = \"z2-sta\"\nl1.size_bytes = \"4KiB\"\n[one-at-a-time]\nl1.ways = [2, 4]\n";
+    fs::write(sweep.path("b.toml"), experiment).expect("temporary file");
+    run_ok(&mut sweep.command("a", &[]));
+    let mut other = sweep.command_of("b.toml", "b", &[]);
+    run_ok(
+        other
+            .arg(&renamed)
+            .arg(root().join("traces/atrium.textrace")),
+    );
+    let rows = |out: &str| -> Vec<BTreeMap<String, String>> {
+        let text = fs::read_to_string(sweep.path(out).join("results.csv")).expect("rows");
+        let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned));
+        let keys: Vec<String> = lines.next().expect("keys").collect();
+        lines
+            .map(|line| keys.iter().cloned().zip(line).collect())
+            .collect()
+    };
+    let (a, b) = (rows("a"), rows("b"));
+    assert_eq!(
+        a[0].keys().collect::<Vec<_>>(),
+        b[0].keys().collect::<Vec<_>>()
+    );
+    let names = [
+        "checksum",
+        "scene",
+        "camera",
+        "display",
+        "width_px",
+        "height_px",
+        "model_version",
+        "mode",
+        "order",
+        "seed",
+        "l1_size_bytes",
+        "l1_ways",
+        "l2_replacement",
+        "layout_block_order",
+    ];
+    let of_b = |row: &&BTreeMap<String, String>| {
+        row["trace"] == "another name" && row["change_value"] == "2"
+    };
+    let row = b.iter().find(of_b).expect("a row");
+    assert_eq!(
+        (row["change_key"].as_str(), row["l1_ways"].as_str()),
+        ("l1.ways", "2")
+    );
+    let same =
+        |other: &&BTreeMap<String, String>| names.iter().all(|name| row[*name] == other[*name]);
+    let joined: Vec<_> = a.iter().filter(same).collect();
+    assert!(!joined.is_empty());
+    assert!(
+        joined
+            .iter()
+            .all(|other| other["external_bytes"] == row["external_bytes"])
+    );
+    // JSON has the same columns.
+    let json = fs::read(sweep.path("b/results.json")).expect("results");
+    let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+    let first = &json["rows"][0];
+    assert_eq!(first["checksum"].as_str(), Some(b[0]["checksum"].as_str()));
+    assert_eq!(first["l1"]["ways"].to_string(), b[0]["l1_ways"]);
+    assert_eq!(first["change"], serde_json::Value::Null);
+    assert_eq!(json["rows"][1]["change"]["key"], "l1.ways");
 }

@@ -21,4 +21,4 @@ pub use outputs::{Output, check_folder, check_outputs};
 pub use program::{Common, VERSION, run};
 pub use progress::Progress;
 pub use shards::{MOST_SHARDS, Piece, Shard, ShardArgs, balanced};
-pub use slurm::{SlurmArray, absolute, quoted};
+pub use slurm::{Needs, SlurmArray, absolute, quoted};

@@ -1,4 +1,4 @@
-//! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere.
+//! Progress on stderr: a bar on a terminal, lines at growing intervals elsewhere.
 
 use super::message::is_quiet;
 use std::io::{self, IsTerminal, Write};
@@ -9,8 +9,10 @@ use std::time::{Duration, Instant};
 
 /// Between two drawings of a bar.
 const BAR_INTERVAL: Duration = Duration::from_millis(200);
-/// Between two lines where stderr is no terminal.
+/// Before the first line where stderr is no terminal; each pause is twice the one before.
 const LINE_INTERVAL: Duration = Duration::from_secs(3);
+/// Longest pause between two lines.
+const LONGEST_LINE_INTERVAL: Duration = Duration::from_secs(600);
 const BAR_CHARACTERS: u64 = 24;
 
 /// Shows how far a command is until it is dropped; `--quiet` shows nothing.
@@ -57,8 +59,9 @@ impl Progress {
         let shown = Arc::clone(&stage);
         let thread = out.and_then(|mut out| {
             let show = move || {
+                let mut pauses = Pauses::new(interval, as_bar);
                 // What cannot be shown is no reason to stop the work.
-                while stopped.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
+                while stopped.recv_timeout(pauses.next()) == Err(RecvTimeoutError::Timeout) {
                     let stage = lock(&shown).clone();
                     let _ = if as_bar {
                         write!(out, "\r{}\u{1b}[K", stage.bar())
@@ -88,6 +91,29 @@ impl Progress {
     /// Counts finished units.
     pub fn advance(&self, units: u64) {
         lock(&self.stage).done += units;
+    }
+}
+
+/// How long to wait before what is shown next: a log of a long run stays short.
+struct Pauses {
+    next: Duration,
+    as_bar: bool,
+}
+
+impl Pauses {
+    fn new(first: Duration, as_bar: bool) -> Self {
+        Self {
+            next: first,
+            as_bar,
+        }
+    }
+
+    fn next(&mut self) -> Duration {
+        let pause = self.next;
+        if !self.as_bar {
+            self.next = (2 * pause).min(LONGEST_LINE_INTERVAL);
+        }
+        pause
     }
 }
 
@@ -188,6 +214,18 @@ mod tests {
             "{text:?}"
         );
         assert!(!text.contains(['\r', '\u{1b}']), "{text:?}");
+    }
+
+    #[test]
+    fn four_hours_take_a_page_of_lines() {
+        let mut pauses = Pauses::new(LINE_INTERVAL, false);
+        let mut seconds = 0;
+        let mut lines = 0;
+        while seconds < 4 * 3600 {
+            seconds += pauses.next().as_secs();
+            lines += 1;
+        }
+        assert!((10..50).contains(&lines), "{lines} lines");
     }
 
     #[test]

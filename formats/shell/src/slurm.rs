@@ -14,14 +14,48 @@ pub struct SlurmArray<'a> {
     pub shards: u32,
     /// Processors of each part; what the cluster gives by itself if none.
     pub cpus: Option<u16>,
+    /// Memory and time of the costliest part, estimated; what the cluster gives by itself if none.
+    pub needs: Option<Needs>,
     /// Program and arguments, with paths that mean the same on every node.
     pub command: Vec<String>,
-    /// Arguments of the job that follows when every part is done; none where no job does.
+    /// Arguments of the job that follows when every part has ended; none where no job does.
     pub then: Vec<String>,
 }
 
+/// What a part needs of its node, with a margin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Memory in MiB.
+    pub memory_mib: u64,
+    /// Time in minutes.
+    pub minutes: u64,
+}
+
+/// Submits as many arrays as the cluster's MaxArraySize asks for: the numbers of tasks stay below it, and each
+/// array gets the number of shards before its first as its argument. A cluster that does not say has Slurm's
+/// own 1001. The job that follows waits until all have ended, however they ended: it lists what is missing.
+const SUBMIT: &str = r#"    [ -f "$0" ] || { echo "save the script, then run: sh FILE" >&2; exit 2; }
+    most=$(scontrol show config 2>/dev/null | sed -n 's/^MaxArraySize *= *\([0-9][0-9]*\).*/\1/p')
+    most=$((${most:-1001} - 1))
+    [ "$most" -ge 1 ] || { echo "MaxArraySize: expected at least 2, found $((most + 1))" >&2; exit 2; }
+    before=0 arrays=
+    while [ "$before" -lt "$shards" ]; do
+        count=$((shards - before))
+        [ "$count" -le "$most" ] || count=$most
+        array=$(sbatch --parsable "$@" --array="1-$count" "$0" "$before")
+        array=${array%%;*} arrays=$arrays:${array%%;*}
+        echo "job $array: shards $((before + 1)) to $((before + count)) of $shards"
+        before=$((before + count))
+    done
+"#;
+
+/// Submits the job that follows.
+const SUBMIT_AFTER: &str = r#"    after=$(sbatch --parsable "$@" --array=0 --dependency="afterany$arrays" "$0")
+    echo "job ${after%%;*}: the merge after them; its log lists what is missing"
+"#;
+
 impl SlurmArray<'_> {
-    /// The script. `sh FILE` submits it twice: as the array, and as the job after it, task 0.
+    /// The script. `sh FILE` submits it: as arrays, and as the job after them, task 0.
     #[must_use]
     pub fn script(&self) -> String {
         let name: String = self
@@ -41,40 +75,42 @@ impl SlurmArray<'_> {
             words.join(" ")
         };
         let shards = self.shards;
-        let cpus = self.cpus.map_or_else(String::new, |cpus| {
-            format!("#SBATCH --cpus-per-task={cpus}\n")
-        });
         let mut text = format!(
             "#!/bin/sh\n\
              # Work in {shards} shards. Save this as a file and run `sh FILE [OPTIONS OF sbatch]` to submit it. What is done is\n\
              # kept: after a failure run it again.\n\
              #SBATCH --job-name={name}\n\
-             #SBATCH --array=1-{shards}\n\
              #SBATCH --requeue\n\
-             #SBATCH --open-mode=append\n\
-             {cpus}set -eu\n\
-             work() {{\n    {} \"$@\" --threads \"${{SLURM_CPUS_ON_NODE:-1}}\"\n}}\n\
-             case \"${{SLURM_ARRAY_TASK_ID-submit}}\" in\n\
-             submit)\n\
-             \x20   [ -f \"$0\" ] || {{ echo \"save the script, then run: sh FILE\" >&2; exit 2; }}\n\
-             \x20   array=$(sbatch --parsable \"$@\" \"$0\")\n\
-             \x20   array=${{array%%;*}}\n\
-             \x20   echo \"shards: job $array\"\n",
+             #SBATCH --open-mode=append\n"
+        );
+        if let Some(cpus) = self.cpus {
+            let _ = writeln!(text, "#SBATCH --cpus-per-task={cpus}");
+        }
+        if let Some(Needs {
+            memory_mib,
+            minutes,
+        }) = self.needs
+        {
+            let _ = write!(
+                text,
+                "# Estimated from the plan, with a margin; options of sbatch win.\n\
+                 #SBATCH --mem={memory_mib}M\n#SBATCH --time={minutes}\n"
+            );
+        }
+        let _ = write!(
+            text,
+            "set -eu\nshards={shards}\nwork() {{\n    {} \"$@\" --threads \"${{SLURM_CPUS_ON_NODE:-1}}\"\n}}\n\
+             case \"${{SLURM_ARRAY_TASK_ID-submit}}\" in\nsubmit)\n{SUBMIT}",
             line(&self.command)
         );
         if !self.then.is_empty() {
-            text += "    after=$(sbatch --parsable \"$@\" --array=0 --dependency=\"afterok:$array\" \\\n\
-                     \x20       --kill-on-invalid-dep=yes \"$0\")\n\
-                     \x20   echo \"after them: job ${after%%;*}\"\n";
+            text += SUBMIT_AFTER;
         }
         text += "    ;;\n";
         if !self.then.is_empty() {
             let _ = writeln!(text, "0) work {} ;;", line(&self.then));
         }
-        let _ = writeln!(
-            text,
-            "*) work --shard \"$SLURM_ARRAY_TASK_ID/{shards}\" ;;\nesac"
-        );
+        text += "*) work --shard \"$((SLURM_ARRAY_TASK_ID + ${1:-0}))/$shards\" ;;\nesac\n";
         text
     }
 }
@@ -126,6 +162,10 @@ mod tests {
             name: "-a b\n#SBATCH --x",
             shards: 7,
             cpus: Some(3),
+            needs: Some(Needs {
+                memory_mib: 900,
+                minutes: 12,
+            }),
             command,
             then: vec!["--merge-only".to_owned()],
         };
@@ -143,9 +183,86 @@ mod tests {
             "{script}"
         );
         assert!(
-            script.contains("\n#SBATCH --array=1-7\n#SBATCH --requeue\n"),
+            script.contains("\n#SBATCH --mem=900M\n#SBATCH --time=12\n"),
             "{script}"
         );
+    }
+
+    #[cfg(unix)]
+    /// Submits a script where `sbatch` prints numbers and notes its arguments; returns what it tells and those.
+    fn submitted(array: &SlurmArray, most: &str) -> (String, Vec<String>) {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let write = |name: &str, text: &str| {
+            use std::os::unix::fs::PermissionsExt;
+            std::fs::write(at(name), text).unwrap();
+            std::fs::set_permissions(at(name), std::fs::Permissions::from_mode(0o755)).unwrap();
+        };
+        write(
+            "sbatch",
+            "#!/bin/sh\necho \"$*\" >> \"${0%/*}/calls\"\necho \"$(wc -l < \"${0%/*}/calls\");cluster\"\n",
+        );
+        write("scontrol", &format!("#!/bin/sh\n{most}\n"));
+        write("job.sh", &array.script());
+        let path = std::env::var("PATH").unwrap();
+        let output = Command::new("sh")
+            .arg(at("job.sh"))
+            .arg("--partition=long")
+            .env("PATH", format!("{}:{path}", folder.path().display()))
+            .env_remove("SLURM_ARRAY_TASK_ID")
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        let calls = std::fs::read_to_string(at("calls")).unwrap();
+        let job = at("job.sh").display().to_string();
+        let calls = calls.lines().map(|line| line.replace(&job, "JOB"));
+        (String::from_utf8(output.stdout).unwrap(), calls.collect())
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn more_shards_than_the_cluster_takes_in_an_array_are_several_arrays() {
+        let array = |shards| SlurmArray {
+            name: "a",
+            shards,
+            cpus: None,
+            needs: None,
+            command: vec!["printf".to_owned(), "[%s]".to_owned()],
+            then: vec!["--merge-only".to_owned()],
+        };
+        let (told, calls) = submitted(&array(2000), "exit 1");
+        assert_eq!(
+            calls,
+            [
+                "--parsable --partition=long --array=1-1000 JOB 0",
+                "--parsable --partition=long --array=1-1000 JOB 1000",
+                "--parsable --partition=long --array=0 --dependency=afterany:1:2 JOB",
+            ]
+        );
+        assert!(
+            told.contains("job 2: shards 1001 to 2000 of 2000\n"),
+            "{told}"
+        );
+        assert!(told.contains("job 3: the merge"), "{told}");
+        let most = "echo 'MaxArraySize            = 4'";
+        let (_, calls) = submitted(&array(7), most);
+        let numbers = |call: &String| call.split_once("--array=").map(|(_, rest)| rest.to_owned());
+        let numbers: Vec<String> = calls.iter().filter_map(numbers).collect();
+        assert_eq!(
+            numbers,
+            [
+                "1-3 JOB 0",
+                "1-3 JOB 3",
+                "1-1 JOB 6",
+                "0 --dependency=afterany:1:2:3 JOB"
+            ]
+        );
+        // The second task of the second array.
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &array(7).script(), "job", "3"]);
+        let output = shell.env("SLURM_ARRAY_TASK_ID", "2").output().unwrap();
+        let told = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(told, "[--shard][5/7][--threads][1]");
     }
 
     #[test]
@@ -154,6 +271,7 @@ mod tests {
             name: "a",
             shards: 1,
             cpus: None,
+            needs: None,
             command: vec!["true".to_owned()],
             then: Vec::new(),
         };
@@ -163,6 +281,6 @@ mod tests {
             .env_remove("SLURM_ARRAY_TASK_ID");
         let output = shell.output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{output:?}");
-        assert!(!array.script().contains("afterok"));
+        assert!(!array.script().contains("afterany"));
     }
 }

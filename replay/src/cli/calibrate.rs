@@ -103,7 +103,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for (scene, held_out) in scenes.iter_mut().zip(held_out) {
         scene.held_out = held_out;
     }
-    let store = args.out.as_deref().map(Store::new);
+    let store = args.out.as_deref().map(|out| Store::open(out, None));
+    let store = store.transpose()?;
     let replays = (subjects.len() * plan.points.len()) as u64;
     let progress = Progress::new("replaying", replays, "replays");
     let done = |done| progress.advance(done);

@@ -35,6 +35,15 @@ impl Traces {
         self.0.iter().map(|(trace, ..)| trace.records()).collect()
     }
 
+    /// Size of all files.
+    #[must_use]
+    pub fn file_bytes(&self) -> u64 {
+        let files = self.0.iter();
+        files
+            .map(|(trace, ..)| trace.container().file_bytes())
+            .sum()
+    }
+
     /// The traces under the names of their files.
     #[must_use]
     pub fn subjects_by_file(&self) -> Vec<Subject<'_>> {

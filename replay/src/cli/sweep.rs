@@ -8,7 +8,7 @@ use crate::files::{self, write_atomically};
 use crate::report::sweep::SweepReport;
 use crate::report::sweep_plan;
 use anyhow::{Context, Result, ensure};
-use shell::{Output, Progress, Shard, ShardArgs, SlurmArray};
+use shell::{Needs, Output, Progress, Shard, ShardArgs, SlurmArray};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -30,7 +30,7 @@ pub struct Args {
     /// Folder for results.json, results.csv, report.html and points/ [default: out/NAME]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print one JSON object (schema replay.sweep/1, with --plan replay.plan/1)
+    /// Print one JSON object (schema replay.sweep/2, with --plan replay.plan/1)
     #[arg(long, conflicts_with_all = ["emit_slurm"])]
     json: bool,
     #[command(flatten)]
@@ -94,6 +94,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let sweep = Sweep::open(args, file, plan)?;
+    if !args.merge_only {
+        sweep.tell_damages();
+    }
     let subjects = sweep.traces.subjects();
     if let Some(shards) = args.shards.emit_slurm {
         sweep.check_outputs()?;
@@ -122,6 +125,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Memory of a replay beside its traces: lines of expanded frames (384 MiB), tags of the largest caches (300 MiB),
+/// and as much again as a margin for the rest.
+const BASE_MEMORY_MIB: u64 = 1024;
+
 /// A sweep that is ready to run.
 struct Sweep<'a> {
     args: &'a Args,
@@ -144,8 +151,8 @@ impl<'a> Sweep<'a> {
         let usual = || Path::new("out").join(args.experiment.file_stem().unwrap_or_default());
         let out = args.out.clone().unwrap_or_else(usual);
         shell::check_folder("--out", &out)?;
-        let store = Store::new(&out);
-        shell::check_folder("--out", store.folder())?;
+        shell::check_folder("--out", &out.join("points"))?;
+        let store = Store::open(&out, args.shards.shard)?;
         Ok(Self {
             traces: Traces::open(&paths)?,
             store,
@@ -155,6 +162,13 @@ impl<'a> Sweep<'a> {
             paths,
             out,
         })
+    }
+
+    /// Says which stored rows are not taken; a merge lists them where they leave a point missing.
+    fn tell_damages(&self) {
+        for damage in self.store.damages() {
+            shell::note(&format!("not taken, replayed again: {damage}"));
+        }
     }
 
     fn split(&self) -> Split {
@@ -187,11 +201,10 @@ impl<'a> Sweep<'a> {
     fn run_shard(&self, shard: Shard, subjects: &[Subject]) -> Result<()> {
         let split = self.split();
         let tasks = split.tasks(&self.plan, Some(shard));
-        if let Some(task) = tasks.first() {
-            let config = &self.plan.points[task.point].config;
-            let point = self.store.path(&subjects[task.subject].id, config);
-            files::check_outputs(&[Output::text("--out", &point)], [])?;
-        }
+        files::check_outputs(
+            &[Output::text("--out", &self.store.folder().join("rows"))],
+            [],
+        )?;
         let wanted = split.shard(shard);
         let progress = Progress::new("replaying", tasks.len() as u64, "points");
         let done = |done| progress.advance(done);
@@ -217,7 +230,6 @@ impl<'a> Sweep<'a> {
             write_atomically(path, text.as_bytes())?;
         }
         self.args.parquet.write(|| report.rows())?;
-        self.store.tidy();
         if self.args.parquet.takes_stdout() {
             return Ok(());
         }
@@ -250,6 +262,10 @@ impl<'a> Sweep<'a> {
             name: &name.to_string_lossy(),
             shards,
             cpus: self.args.threads.count,
+            needs: Some(Needs {
+                memory_mib: BASE_MEMORY_MIB + self.traces.file_bytes().div_ceil(1 << 20),
+                minutes: self.split().minutes(shards),
+            }),
             command,
             then,
         };

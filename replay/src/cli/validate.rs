@@ -1,9 +1,12 @@
 //! `replay validate`: every checksum and invariant of a trace.
 
 use super::tiles::{ray_tiles, tiles};
+use crate::config::RunConfig;
+use crate::stream::Expander;
 use anyhow::Result;
 use formats::raytrace::RayTile;
 use formats::textrace::Tile;
+use formats::textrace::tables::TEXTURES;
 use formats::{FormatError, Trace};
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -51,6 +54,11 @@ fn validate(path: &std::path::Path) -> formats::Result<String> {
     // Tiles are decoded in parallel, but the first bad one is the first in the file.
     let (counts, what): (Vec<formats::Result<u64>>, _) = match &trace {
         Trace::Texture(trace) => {
+            // What `replay run` refuses before the first tile.
+            if let Err(error) = Expander::new(trace.as_ref(), &RunConfig::default()) {
+                let expected = "tables that can be replayed";
+                return Err(container.malformed(TEXTURES, 0, expected, error));
+            }
             let tiles: Vec<_> = tiles(&trace.tables().passes).collect();
             let records = tiles
                 .par_iter()

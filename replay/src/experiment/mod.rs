@@ -10,6 +10,7 @@ mod calibration;
 mod file;
 mod outcome;
 mod plan;
+mod rows;
 mod runner;
 mod split;
 mod store;

@@ -1,13 +1,14 @@
 //! Replays the points of a plan on every trace.
 
 use super::store::Absent;
-use super::{Outcome, Plan, Point, Store, Subject, point_key};
+use super::{Outcome, Plan, Point, Store, Subject};
 use crate::config::RunConfig;
 use crate::engine::{Job, ReplayError, Work, replay_jobs};
+use crate::model_version::MODEL_VERSION;
 use crate::result::RunResult;
 use crate::stream::LineMemory;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -100,7 +101,6 @@ pub fn merge<'a>(
                 Ok(result) => of_groups.push(result),
                 Err(why) => absent.push(AbsentPoint {
                     name: format!("{}, {}", subject.label, point.title()),
-                    key: point_key(&subject.id, &point.config),
                     why,
                 }),
             }
@@ -108,8 +108,12 @@ pub fn merge<'a>(
         results.push(of_groups);
     }
     if !absent.is_empty() {
-        let expected = groups.len() * subjects.len();
-        return Err(Incomplete { expected, absent });
+        return Err(Incomplete {
+            expected: groups.len() * subjects.len(),
+            absent,
+            damages: store.damages().to_vec(),
+            foreign: store.foreign().clone(),
+        });
     }
     Ok(outcome(plan, subjects, &groups, &results, Work::default()))
 }
@@ -142,6 +146,10 @@ pub struct Incomplete {
     pub expected: usize,
     /// Those that are not there.
     pub absent: Vec<AbsentPoint>,
+    /// Rows of the store that were not taken.
+    pub damages: Vec<String>,
+    /// Its rows of other model versions, by version.
+    pub foreign: BTreeMap<u32, usize>,
 }
 
 /// A point that the store lacks.
@@ -149,8 +157,6 @@ pub struct Incomplete {
 pub struct AbsentPoint {
     /// Trace and settings.
     pub name: String,
-    /// Name of its file.
-    pub key: String,
     /// Why.
     pub why: Absent,
 }
@@ -161,13 +167,22 @@ impl fmt::Display for Incomplete {
         const LISTED: usize = 50;
         let (expected, found) = (self.expected, self.absent.len());
         write!(f, "{found} of {expected} points are not there:")?;
-        for AbsentPoint { name, key, why } in self.absent.iter().take(LISTED) {
-            write!(f, "\n  {name}: points/{key}.json: {why}")?;
+        for AbsentPoint { name, why } in self.absent.iter().take(LISTED) {
+            write!(f, "\n  {name}: {why}")?;
         }
-        match found.checked_sub(LISTED) {
-            Some(more @ 1..) => write!(f, "\n  and {more} more (--plan --json lists all)"),
-            _ => Ok(()),
+        if let Some(more @ 1..) = found.checked_sub(LISTED) {
+            write!(f, "\n  and {more} more (--plan --json lists all)")?;
         }
+        for damage in self.damages.iter().take(LISTED) {
+            write!(f, "\n  not taken: {damage}")?;
+        }
+        for (version, rows) in &self.foreign {
+            write!(
+                f,
+                "\n  not taken: {rows} rows of model version {version}, expected {MODEL_VERSION}"
+            )?;
+        }
+        Ok(())
     }
 }
 

@@ -18,6 +18,8 @@ mod cost {
     pub const FUNCTIONAL_PART: (u64, u64) = (1, 8);
     pub const TIMED: u64 = 6;
     pub const FIRST_MISS: u64 = 9;
+    /// Four times the longest that a unit took of one processor in results/replay-costs.csv.
+    pub const NANOSECONDS: u64 = 1200;
 }
 
 /// Points of a trace that are replayed together.
@@ -99,10 +101,29 @@ impl Split {
         wanted
     }
 
+    /// Minutes that the costliest of so many shards takes, estimated with a margin; ten at least.
+    #[must_use]
+    pub fn minutes(&self, count: u32) -> u64 {
+        let cost = |passes: std::ops::Range<usize>| -> u64 {
+            let of_set = |passes: &[Pass]| {
+                let pieces: u64 = passes.iter().map(|pass| pass.piece.cost).sum();
+                pieces + self.expansions[passes[0].piece.set]
+            };
+            let sets = self.passes[passes].chunk_by(|a, b| a.piece.set == b.piece.set);
+            sets.map(of_set).sum()
+        };
+        let costliest = self.shards(count).into_iter().map(cost).max();
+        let nanoseconds = costliest.unwrap_or(0).saturating_mul(cost::NANOSECONDS);
+        nanoseconds.div_ceil(60_000_000_000).max(10)
+    }
+
     fn passes_of(&self, shard: Shard) -> std::ops::Range<usize> {
+        self.shards(shard.count)[shard.number as usize - 1].clone()
+    }
+
+    fn shards(&self, count: u32) -> Vec<std::ops::Range<usize>> {
         let pieces: Vec<Piece> = self.passes.iter().map(|pass| pass.piece).collect();
-        let shards = balanced(&pieces, &self.expansions, shard.count);
-        shards[shard.number as usize - 1].clone()
+        balanced(&pieces, &self.expansions, count)
     }
 
     /// Every distinct point on every trace, those of one pass together; only a shard's if one is
@@ -193,6 +214,16 @@ mod tests {
                 .chunk_by(|a, b| a.pass == b.pass)
                 .all(|pass| pass.len() == 16)
         );
+    }
+
+    #[test]
+    fn a_longer_trace_takes_longer_and_more_shards_take_less() {
+        let file = "[axes]\nseed = [1, 2, 3, 4, 5, 6, 7, 8]\n";
+        let minutes = |records, count| split(file, &[records]).1.minutes(count);
+        assert_eq!(minutes(1000, 1), 10);
+        // 8 timed passes and one expansion of 10^9 records in units of 1200 ns.
+        assert_eq!(minutes(1_000_000_000, 1), (8 * 6 + 4) * 20);
+        assert_eq!(minutes(1_000_000_000, 8), (6 + 4) * 20);
     }
 
     #[test]

@@ -1,72 +1,98 @@
-//! One file a point, so that a sweep that was cut off goes on where it stopped.
+//! Results of points in append-only files, so that a sweep that was cut off goes on where it stopped.
+//!
+//! Every process that has results writes one file of its own, so no two write to the same. Reading takes
+//! the rows of all files. A row that a killed process left unfinished is not taken, nor is a damaged one.
 
+use super::rows::Row;
 use crate::config::RunConfig;
-use crate::files::write_atomically;
 use crate::model_version::MODEL_VERSION;
 use crate::result::{RunResult, TOOL, TraceId};
+use anyhow::Context;
 use formats::container::kind_of;
 use serde::{Deserialize, Serialize};
-use std::io::{self, ErrorKind};
+use shell::Shard;
+use std::collections::{BTreeMap, HashMap};
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
 
 /// Schema of a stored point.
-pub const POINT_SCHEMA: &str = "replay.point/1";
+pub const POINT_SCHEMA: &str = "replay.point/2";
 
-/// A point's file.
+/// What the names of points files end with.
+const EXTENSION: &str = "rows";
+
+/// Larger than any point, counts by tile included.
+const LARGEST_ROW_BYTES: u64 = 1 << 29;
+
+/// What a row holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StoredPoint {
-    /// `replay.point/1`.
+    /// `replay.point/2`.
     pub schema: String,
     /// Program and version.
     pub tool: String,
-    /// Version of the models; another version's results are not taken over.
-    pub model_version: u32,
-    /// Trace.
-    pub trace: TraceId,
+    /// Checksum of the trace's content.
+    pub trace: String,
     /// The whole configuration.
     pub config: RunConfig,
     /// Result.
     pub result: RunResult,
 }
 
-/// Larger than any point, counts by tile included.
-const LARGEST_POINT_BYTES: u64 = 1 << 29;
-
-/// Writing a point takes milliseconds: an unfinished file as old as this has no writer.
-const ABANDONED_AFTER: Duration = Duration::from_secs(600);
-
-/// Why a point's result cannot be taken from its file.
+/// Why the store has no result of a point.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Absent {
-    /// There is no file.
+    /// There is no row.
     #[error("missing")]
     Missing,
-    /// It cannot be read, or holds something else.
+    /// Its row cannot be read, or holds something else.
     #[error("damaged: {0}")]
     Damaged(String),
-    /// Another version made it.
-    #[error(
-        "expected {POINT_SCHEMA} of model version {MODEL_VERSION}, found {schema} of {model_version}"
-    )]
-    Foreign {
-        /// Version of the models.
-        model_version: u32,
-        /// Schema.
-        schema: String,
-    },
 }
 
-/// The points under one folder.
-#[derive(Clone, Debug)]
+/// Where a row lies.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Index of the file.
+    file: usize,
+    /// From 1.
+    line: usize,
+    offset_bytes: u64,
+    length_bytes: u64,
+    crc32: u32,
+}
+
+/// The points of a sweep: what its files held when it was opened, and a file for what is added.
+#[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
+    /// First part of the name of a new file.
+    name: String,
+    files: Vec<PathBuf>,
+    rows: HashMap<String, Place>,
+    /// Keys that have two different results.
+    contradictions: HashMap<String, String>,
+    damages: Vec<String>,
+    /// Rows of other model versions.
+    foreign: BTreeMap<u32, usize>,
+    added: Mutex<Added>,
 }
 
-/// Name of a point: a 128-bit FNV-1a hash of the model version, the trace's checksum and the whole
+/// The file for new rows.
+#[derive(Debug)]
+enum Added {
+    Nothing,
+    To(File, PathBuf),
+    /// Writing failed: the last row may be cut, and nothing may follow it.
+    Failed(PathBuf),
+}
+
+/// Key of a point: a 128-bit FNV-1a hash of the model version, the trace's checksum and the whole
 /// configuration.
 ///
-/// The file repeats both, so that a collision costs a run and never gives a wrong result.
+/// The row repeats them, so that a collision costs a run and never gives a wrong result.
 #[must_use]
 pub fn point_key(trace: &TraceId, config: &RunConfig) -> String {
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013B;
@@ -82,30 +108,49 @@ pub fn point_key(trace: &TraceId, config: &RunConfig) -> String {
     format!("{hash:032x}")
 }
 
-/// Reads a point's file, which is looked at before: a pipe would be waited for, and what is larger than any
-/// point would fill the memory.
-fn read_whole(path: &Path) -> io::Result<Vec<u8>> {
-    let found = std::fs::metadata(path)?;
-    let refused = |what: String| Err(io::Error::other(what));
-    if !found.is_file() {
-        return refused(format!("expected a file, found {}", kind_of(&found)));
-    }
-    if found.len() > LARGEST_POINT_BYTES {
-        let length = found.len();
-        return refused(format!(
-            "expected at most {LARGEST_POINT_BYTES} bytes, found {length}"
-        ));
-    }
-    std::fs::read(path)
-}
-
 impl Store {
-    /// The points of the sweep whose outputs lie in `folder`.
-    #[must_use]
-    pub fn new(folder: &Path) -> Self {
-        Self {
-            folder: folder.join("points"),
+    /// The points of the sweep whose outputs lie in `folder`; new ones go to a file of their own, named by
+    /// the shard.
+    ///
+    /// # Errors
+    /// The folder cannot be read. Files in it that cannot are damages.
+    pub fn open(folder: &Path, shard: Option<Shard>) -> anyhow::Result<Self> {
+        let folder = folder.join("points");
+        let cannot = || format!("{}: cannot read", folder.display());
+        let mut files = Vec::new();
+        match std::fs::read_dir(&folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => (),
+            Err(error) => return Err(error).with_context(cannot),
+            Ok(entries) => {
+                for entry in entries {
+                    let path = entry.with_context(cannot)?.path();
+                    if path.extension().is_some_and(|e| e == EXTENSION) {
+                        files.push(path);
+                    }
+                }
+            }
         }
+        files.sort();
+        let mut store = Self {
+            folder,
+            name: shard.map_or_else(
+                || "all".to_owned(),
+                |shard| format!("{}-of-{}", shard.number, shard.count),
+            ),
+            files,
+            rows: HashMap::new(),
+            contradictions: HashMap::new(),
+            damages: Vec::new(),
+            foreign: BTreeMap::new(),
+            added: Mutex::new(Added::Nothing),
+        };
+        for file in 0..store.files.len() {
+            if let Err(error) = store.read_rows(file) {
+                let damage = format!("{}: {error}", store.files[file].display());
+                store.damages.push(damage);
+            }
+        }
+        Ok(store)
     }
 
     /// Where the points' files lie.
@@ -114,60 +159,116 @@ impl Store {
         &self.folder
     }
 
-    /// The file of a point.
+    /// Rows and files that were not taken: file, row, expected and found.
     #[must_use]
-    pub fn path(&self, trace: &TraceId, config: &RunConfig) -> PathBuf {
-        self.folder
-            .join(point_key(trace, config))
-            .with_extension("json")
+    pub fn damages(&self) -> &[String] {
+        &self.damages
+    }
+
+    /// Rows of other model versions, by version.
+    #[must_use]
+    pub fn foreign(&self) -> &BTreeMap<u32, usize> {
+        &self.foreign
+    }
+
+    /// Notes every row of a file. What is no file is not opened: a pipe would be waited for.
+    fn read_rows(&mut self, file: usize) -> io::Result<()> {
+        let path = self.files[file].clone();
+        let found = std::fs::metadata(&path)?;
+        if !found.is_file() {
+            let found = kind_of(&found);
+            return Err(io::Error::other(format!("expected a file, found {found}")));
+        }
+        let mut reader = BufReader::with_capacity(1 << 16, File::open(&path)?);
+        let mut line = Vec::new();
+        let mut offset_bytes = 0;
+        for number in 1.. {
+            line.clear();
+            let mut limited = reader.by_ref().take(LARGEST_ROW_BYTES + 1);
+            let length_bytes = limited.read_until(b'\n', &mut line)? as u64;
+            if length_bytes == 0 {
+                break;
+            }
+            if length_bytes > LARGEST_ROW_BYTES {
+                return Err(io::Error::other(format!(
+                    "row {number}: expected at most {LARGEST_ROW_BYTES} bytes, found more"
+                )));
+            }
+            let place = Place {
+                file,
+                line: number,
+                offset_bytes,
+                length_bytes,
+                crc32: crc32fast::hash(&line),
+            };
+            offset_bytes += length_bytes;
+            match Row::decode(&line) {
+                Err(why) => {
+                    let damage = format!("{}: row {number}: {why}", path.display());
+                    self.damages.push(damage);
+                }
+                Ok(row) if row.model_version != MODEL_VERSION => {
+                    *self.foreign.entry(row.model_version).or_default() += 1;
+                }
+                Ok(row) => self.note(row.key.to_owned(), place),
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes where a row is; the same row may be in several files.
+    fn note(&mut self, key: String, place: Place) {
+        let known = *self.rows.entry(key.clone()).or_insert(place);
+        if (known.crc32, known.length_bytes) != (place.crc32, place.length_bytes) {
+            let [known, other] = [known, place].map(|p| self.name_of(p));
+            let why = format!("expected one result, found two: {known} and {other}");
+            self.contradictions.insert(key, why);
+        }
+    }
+
+    fn name_of(&self, place: Place) -> String {
+        format!("{}: row {}", self.files[place.file].display(), place.line)
     }
 
     /// A point's result, if it was computed before.
     ///
     /// # Errors
-    /// Why its file cannot be taken: there is none, or it is damaged or foreign.
+    /// Why there is none: no row, or a damaged one.
     pub fn find(&self, trace: &TraceId, config: &RunConfig) -> Result<RunResult, Absent> {
-        /// What every version's files have.
-        #[derive(Deserialize)]
-        struct Header {
-            schema: String,
-            #[serde(default)]
-            model_version: u32,
+        let key = point_key(trace, config);
+        let place = *self.rows.get(&key).ok_or(Absent::Missing)?;
+        if let Some(why) = self.contradictions.get(&key) {
+            return Err(Absent::Damaged(why.clone()));
         }
-        let bytes = read_whole(&self.path(trace, config)).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => Absent::Missing,
-            _ => Absent::Damaged(error.to_string()),
-        })?;
-        let damaged = |error: serde_json::Error| Absent::Damaged(error.to_string());
-        let header: Header = serde_json::from_slice(&bytes).map_err(damaged)?;
-        if header.model_version != MODEL_VERSION || header.schema != POINT_SCHEMA {
-            let Header {
-                schema,
-                model_version,
-            } = header;
-            return Err(Absent::Foreign {
-                schema,
-                model_version,
-            });
+        let damaged = |why: &dyn std::fmt::Display| {
+            Absent::Damaged(format!("{}: {why}", self.name_of(place)))
+        };
+        let line = self.read_row(place).map_err(|error| damaged(&error))?;
+        let row = Row::decode(&line).map_err(|why| damaged(&why))?;
+        let point: StoredPoint = serde_json::from_str(row.json).map_err(|error| damaged(&error))?;
+        if point.schema != POINT_SCHEMA {
+            let found = point.schema;
+            return Err(damaged(&format!("expected {POINT_SCHEMA}, found {found}")));
         }
-        let point: StoredPoint = serde_json::from_slice(&bytes).map_err(damaged)?;
-        if point.trace.checksum != trace.checksum || point.config != *config {
-            return Err(Absent::Damaged("holds another point".to_owned()));
+        if point.trace != trace.checksum || point.config != *config {
+            return Err(damaged(&"holds another point"));
         }
         Ok(point.result)
     }
 
-    /// Removes what killed processes left behind; what others are writing now stays.
-    pub fn tidy(&self) {
-        // Nobody reads those files, so what cannot be removed does no harm.
-        let _left = formats::container::remove_abandoned(&self.folder, ABANDONED_AFTER);
+    fn read_row(&self, place: Place) -> io::Result<Vec<u8>> {
+        let mut file = File::open(&self.files[place.file])?;
+        file.seek(SeekFrom::Start(place.offset_bytes))?;
+        let mut line = Vec::new();
+        file.take(place.length_bytes).read_to_end(&mut line)?;
+        Ok(line)
     }
 
     /// Keeps a point's result and returns it as it will be read back, so that a first run and a
     /// resumed one print the same digits.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The row cannot be written.
     pub fn save(
         &self,
         trace: &TraceId,
@@ -177,15 +278,53 @@ impl Store {
         let point = StoredPoint {
             schema: POINT_SCHEMA.to_owned(),
             tool: TOOL.to_owned(),
-            model_version: MODEL_VERSION,
-            trace: trace.clone(),
+            trace: trace.checksum.clone(),
             config: *config,
             result: result.clone(),
         };
-        let mut json = serde_json::to_vec(&point)?;
-        json.push(b'\n');
-        write_atomically(&self.path(trace, config), &json)?;
-        Ok(serde_json::from_slice::<StoredPoint>(&json)?.result)
+        let json = serde_json::to_string(&point)?;
+        let row = Row {
+            model_version: MODEL_VERSION,
+            key: &point_key(trace, config),
+            json: &json,
+        };
+        self.append(&row.encode())?;
+        Ok(serde_json::from_str::<StoredPoint>(&json)?.result)
+    }
+
+    /// Appends a row in one write, so that a killed process leaves at most its last row unfinished.
+    fn append(&self, row: &[u8]) -> anyhow::Result<()> {
+        let mut added = self.added.lock().unwrap_or_else(PoisonError::into_inner);
+        if matches!(*added, Added::Nothing) {
+            let (file, path) = self.new_file()?;
+            *added = Added::To(file, path);
+        }
+        let (written, path) = match &mut *added {
+            Added::To(file, path) => (file.write_all(row), path.clone()),
+            Added::Failed(path) => (Err(io::Error::other("an earlier row failed")), path.clone()),
+            Added::Nothing => return Ok(()),
+        };
+        if written.is_err() {
+            *added = Added::Failed(path.clone());
+        }
+        written.with_context(|| format!("{}: cannot write", path.display()))
+    }
+
+    /// A file that no other process has.
+    fn new_file(&self) -> anyhow::Result<(File, PathBuf)> {
+        let cannot = |path: &Path| format!("{}: cannot write", path.display());
+        std::fs::create_dir_all(&self.folder).with_context(|| cannot(&self.folder))?;
+        for number in 1.. {
+            let path = self
+                .folder
+                .join(format!("{}.{number}.{EXTENSION}", self.name));
+            match OpenOptions::new().append(true).create_new(true).open(&path) {
+                Ok(file) => return Ok((file, path)),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => (),
+                Err(error) => return Err(error).with_context(|| cannot(&path)),
+            }
+        }
+        unreachable!("names do not end")
     }
 }
 
@@ -201,74 +340,148 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_kept_point_comes_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path());
-        let config = RunConfig::default();
-        let result = RunResult {
-            footprints: 7,
+    fn result(footprints: u64) -> RunResult {
+        RunResult {
+            footprints,
             access_hash: "ab".into(),
             ..RunResult::default()
-        };
-        assert_eq!(store.find(&trace(), &config), Err(Absent::Missing));
-        store.save(&trace(), &config, &result).unwrap();
-        assert_eq!(store.find(&trace(), &config), Ok(result));
+        }
+    }
+
+    fn open(folder: &tempfile::TempDir) -> Store {
+        Store::open(folder.path(), None).unwrap()
+    }
+
+    fn files(store: &Store) -> Vec<PathBuf> {
+        let mut files: Vec<PathBuf> = std::fs::read_dir(store.folder())
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect();
+        files.sort();
+        files
+    }
+
+    #[test]
+    fn kept_points_come_back_from_one_file_a_process() {
+        let folder = tempfile::tempdir().unwrap();
+        let configs: Vec<RunConfig> = (1..=20)
+            .map(|seed| RunConfig {
+                seed,
+                ..RunConfig::default()
+            })
+            .collect();
+        for half in configs.chunks(10) {
+            let store = open(&folder);
+            for config in half {
+                assert_eq!(store.find(&trace(), config), Err(Absent::Missing));
+                store.save(&trace(), config, &result(config.seed)).unwrap();
+            }
+        }
+        let store = open(&folder);
+        assert_eq!(files(&store).len(), 2);
+        assert!(store.damages().is_empty());
+        for config in &configs {
+            assert_eq!(store.find(&trace(), config), Ok(result(config.seed)));
+        }
+    }
+
+    #[test]
+    fn a_changed_byte_anywhere_is_refused_with_file_row_expected_and_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let config = RunConfig::default();
         let other = RunConfig { seed: 2, ..config };
+        let store = open(&folder);
+        store.save(&trace(), &config, &result(7)).unwrap();
+        store.save(&trace(), &other, &result(8)).unwrap();
+        let path = files(&store).remove(0);
+        let bytes = std::fs::read(&path).unwrap();
+        for at in 0..bytes.len() {
+            let mut changed = bytes.clone();
+            changed[at] = if changed[at] == b'7' { b'8' } else { b'7' };
+            std::fs::write(&path, &changed).unwrap();
+            let store = open(&folder);
+            assert!(!store.damages().is_empty(), "byte {at}");
+            let damage = &store.damages()[0];
+            let named = damage.starts_with(&format!("{}: row ", path.display()));
+            assert!(named && damage.contains("expected"), "{damage}");
+            let found = [&config, &other].map(|config| store.find(&trace(), config));
+            let taken = found.iter().flatten().count();
+            assert!(taken <= 1, "byte {at}");
+            for (found, expected) in found.into_iter().zip([7, 8]) {
+                assert!(found.is_err() || found == Ok(result(expected)), "byte {at}");
+            }
+        }
+        // What a killed process leaves: the rows before it are taken.
+        std::fs::write(&path, &bytes[..bytes.len() - 5]).unwrap();
+        let store = open(&folder);
+        assert_eq!(store.find(&trace(), &config), Ok(result(7)));
         assert_eq!(store.find(&trace(), &other), Err(Absent::Missing));
     }
 
     #[test]
-    fn what_is_no_point_is_not_taken_and_says_why() {
+    fn another_model_version_and_two_results_of_one_point_are_not_taken() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path());
         let config = RunConfig::default();
-        store
-            .save(&trace(), &config, &RunResult::default())
-            .unwrap();
-        let path = store.path(&trace(), &config);
-        let bytes = std::fs::read(&path).unwrap();
-        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-        let found = store.find(&trace(), &config).unwrap_err().to_string();
-        assert!(found.starts_with("damaged: EOF"), "{found}");
-        // A file under another point's name, and one of a version that may have other fields.
+        let store = open(&folder);
+        store.save(&trace(), &config, &result(7)).unwrap();
+        let path = files(&store).remove(0);
+        let line = std::fs::read(&path).unwrap();
+        let row = Row::decode(&line).unwrap();
+        let older = Row {
+            model_version: 0,
+            ..row
+        };
+        std::fs::write(&path, older.encode()).unwrap();
+        let store = open(&folder);
+        assert_eq!(store.find(&trace(), &config), Err(Absent::Missing));
+        assert_eq!(store.foreign(), &BTreeMap::from([(0, 1)]));
+        // A program that counts otherwise under the same version.
+        open(&folder).save(&trace(), &config, &result(7)).unwrap();
+        open(&folder).save(&trace(), &config, &result(8)).unwrap();
+        let found = open(&folder).find(&trace(), &config).unwrap_err();
+        assert!(found.to_string().contains("found two"), "{found}");
+    }
+
+    #[test]
+    fn a_row_under_another_points_key_is_not_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let config = RunConfig::default();
+        let store = open(&folder);
+        store.save(&trace(), &config, &result(7)).unwrap();
+        let path = files(&store).remove(0);
+        let line = std::fs::read(&path).unwrap();
         let other = RunConfig { seed: 2, ..config };
-        std::fs::write(store.path(&trace(), &other), &bytes).unwrap();
-        let found = store.find(&trace(), &other).unwrap_err().to_string();
-        assert_eq!(found, "damaged: holds another point");
-        std::fs::write(
-            &path,
-            r#"{"schema":"replay.point/0","tool":"replay 0.0.1","model_version":0}"#,
-        )
-        .unwrap();
-        assert_eq!(
-            store.find(&trace(), &config).unwrap_err().to_string(),
-            format!(
-                "expected replay.point/1 of model version {MODEL_VERSION}, found replay.point/0 of 0"
-            )
+        let row = Row {
+            key: &point_key(&trace(), &other),
+            ..Row::decode(&line).unwrap()
+        };
+        std::fs::write(&path, row.encode()).unwrap();
+        let found = open(&folder).find(&trace(), &other).unwrap_err();
+        assert!(
+            found.to_string().ends_with("holds another point"),
+            "{found}"
         );
     }
 
     #[cfg(unix)]
     #[test]
-    fn what_is_no_file_or_too_large_for_a_point_is_not_read() {
+    fn what_is_no_file_or_has_too_large_a_row_is_not_read() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::new(folder.path());
-        let config = RunConfig::default();
-        let path = store.path(&trace(), &config);
-        let found = || store.find(&trace(), &config).unwrap_err().to_string();
+        let path = folder.path().join("points/all.1.rows");
         std::fs::create_dir_all(&path).unwrap();
-        assert_eq!(found(), "damaged: expected a file, found a folder");
+        let found = || open(&folder).damages()[0].clone();
+        assert!(found().ends_with("expected a file, found a folder"));
         std::fs::remove_dir(&path).unwrap();
         let made = std::process::Command::new("mkfifo").arg(&path).status();
         assert!(made.unwrap().success());
-        assert_eq!(found(), "damaged: expected a file, found a pipe");
+        assert!(found().ends_with("expected a file, found a pipe"));
         std::fs::remove_file(&path).unwrap();
-        let large = std::fs::File::create(&path).unwrap();
-        large.set_len(LARGEST_POINT_BYTES + 1).unwrap();
-        assert_eq!(
-            found(),
-            "damaged: expected at most 536870912 bytes, found 536870913"
+        let large = File::create(&path).unwrap();
+        large.set_len(LARGEST_ROW_BYTES + 1).unwrap();
+        let found = found();
+        assert!(
+            found.contains("expected at most 536870912 bytes"),
+            "{found}"
         );
     }
 

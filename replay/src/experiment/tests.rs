@@ -130,12 +130,13 @@ fn the_example_experiments_can_be_planned() {
 #[test]
 fn a_second_run_computes_nothing_and_gives_the_same() {
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::new(folder.path());
+    let store = Store::open(folder.path(), None).unwrap();
     let trace = empty("empty");
     let subjects = [Subject::new(&trace, id("1"), "empty".into())];
     let plan = plan("[axes]\norder = [\"morton\", \"z2-sta\"]\nseed = [1, 2, 3]\n");
     let first = run(&plan, &subjects, Some(&store), &|_| ()).unwrap();
     assert_eq!(first.work.replays, 6);
+    let store = Store::open(folder.path(), None).unwrap();
     let second = run(&plan, &subjects, Some(&store), &|_| ()).unwrap();
     assert_eq!(second.work.replays, 0);
     let results = |outcome: &Outcome| -> Vec<_> {

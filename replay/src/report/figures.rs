@@ -1,6 +1,7 @@
 //! The figures of a replayed point, a line each: every table, file and chart takes them from here.
 
-use super::columns::{Column, Row, Show, Value, pick};
+use super::columns::{Column, Row, Show, pick};
+use super::config_columns;
 use crate::experiment::ResultRow;
 use crate::result::{Part, RunResult};
 use crate::tmu::closed_form;
@@ -8,20 +9,17 @@ use crate::tmu::closed_form;
 /// A column of point results.
 pub type Figure<'a> = Column<'static, ResultRow<'a>>;
 
-/// What names a point: the trace, and what the Z2 paper's experiment varies.
+/// What names a point: the trace, what the Z2 paper's experiment varies, and the whole configuration.
 fn identity<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::text("scene", "scene", |r| r.subject.label.clone()),
-        Figure::text("trace", "trace", |r| r.subject.id.checksum.clone()),
+    let mut columns = config_columns::trace();
+    columns.extend([
         Figure::text("twin", "stands for", |r| r.subject.stand_in_for),
         Figure::real("caches", "L1/L2", "KiB", 0, ResultRow::caches_title),
         Figure::real("l1_kib", "L1", "KiB", 0, |r| r.caches_kib().0),
         Figure::real("l2_kib", "L2", "KiB", 0, |r| r.caches_kib().1),
-        Figure::text("order", "order", |r| {
-            let order = r.point.config.order;
-            Value::Named(order.name(), order.title())
-        }),
-    ]
+    ]);
+    columns.extend(config_columns::config());
+    columns
 }
 
 /// What is counted, and what follows from it.
@@ -215,7 +213,19 @@ mod tests {
             .collect();
         let mut runs = prefixes.clone();
         runs.dedup();
-        assert_eq!(runs, ["paper", "functional", "z2_paper"]);
+        assert_eq!(
+            runs,
+            [
+                "l1",
+                "l2",
+                "sampling",
+                "layout",
+                "tmu",
+                "paper",
+                "functional",
+                "z2_paper"
+            ]
+        );
     }
 
     #[test]

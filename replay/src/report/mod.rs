@@ -5,6 +5,7 @@ pub mod addresses;
 pub mod calibration;
 pub mod columns;
 pub mod compare;
+mod config_columns;
 pub mod errors;
 pub mod figures;
 pub mod html;

@@ -1,6 +1,7 @@
 //! A sweep's results: rows, table, CSV and page.
 
-use super::columns::{Column, Kind, Record, Value as Cell};
+use super::columns::{Column, Records};
+use super::config_columns;
 use super::figures::{Figure, figure, figures, number};
 use super::html::{self, Section, folded};
 use super::plots::bars::{BarChart, BarGroup};
@@ -9,19 +10,16 @@ use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
 use super::theme;
 use crate::config::{Order, RunConfig};
-use crate::experiment::{
-    Axis, ExperimentFile, Outcome, Point, ResultRow, Setting, plain, point_key,
-};
+use crate::experiment::{Axis, ExperimentFile, Outcome, ResultRow, Setting, plain, point_key};
 use crate::model_version::MODEL_VERSION;
 use crate::palette;
 use crate::result::{TOOL, TraceId};
 use maud::html;
 use serde::Serialize;
-use std::collections::HashMap;
 use toml::Value;
 
 /// Schema of a sweep's JSON.
-pub const SWEEP_SCHEMA: &str = "replay.sweep/1";
+pub const SWEEP_SCHEMA: &str = "replay.sweep/2";
 
 const ORDER: &str = "order";
 const TRAFFIC: &str = "external_mb_per_frame";
@@ -44,21 +42,7 @@ struct Document<'a, 'r> {
     base: RunConfig,
     axes: &'a [Axis],
     one_at_a_time: &'a [Axis],
-    rows: Vec<PointRow<'a, 'r>>,
-}
-
-/// A point of a trace in JSON.
-#[derive(Serialize)]
-struct PointRow<'a, 'r> {
-    scene: &'a str,
-    /// Values of the axes, in their order.
-    settings: &'a [Setting],
-    /// The value tried alone.
-    change: Option<&'a Setting>,
-    /// Name of the point's file, which holds the whole configuration and result.
-    point: String,
-    #[serde(flatten)]
-    figures: Record<'a, 'static, ResultRow<'r>>,
+    rows: Records<'a, 'static, ResultRow<'r>>,
 }
 
 fn change_title(change: Option<&Setting>) -> String {
@@ -66,45 +50,6 @@ fn change_title(change: Option<&Setting>) -> String {
         || "base".to_owned(),
         |(key, value)| format!("{key} = {}", plain(value)),
     )
-}
-
-/// The cells of an axis by its values in the file, all of one kind.
-fn resolved_values(points: &[Point], i: usize, axis: &Axis) -> (HashMap<String, Cell>, Kind) {
-    let pointer = format!("/{}", axis.key.replace('.', "/"));
-    let mut cells: HashMap<String, Cell> = HashMap::new();
-    // Changes, which may overrule an axis, come after all points without one.
-    for point in points.iter().filter(|point| point.change.is_none()) {
-        let Some((_, value)) = point.settings.get(i) else {
-            continue;
-        };
-        let resolve = || {
-            let config = serde_json::to_string(&point.config).unwrap_or_default();
-            let config: serde_json::Value = serde_json::from_str(&config).unwrap_or_default();
-            match config.pointer(&pointer) {
-                Some(serde_json::Value::Bool(flag)) => Cell::Flag(*flag),
-                Some(serde_json::Value::Number(number)) => match number.as_u64() {
-                    Some(count) => Cell::Whole(count),
-                    None => number.as_f64().map_or(Cell::None, Cell::Real),
-                },
-                _ => Cell::Text(plain(value)),
-            }
-        };
-        cells.entry(value.to_string()).or_insert_with(resolve);
-    }
-    let all = |fits: fn(&Cell) -> bool| cells.values().all(fits);
-    let kind = if all(|cell| matches!(cell, Cell::Whole(_))) {
-        Kind::Whole
-    } else if all(|cell| cell.number().is_some()) {
-        Kind::Real
-    } else if all(|cell| matches!(cell, Cell::Flag(_))) {
-        Kind::Flag
-    } else {
-        Kind::Text
-    };
-    for cell in cells.values_mut().filter(|_| kind == Kind::Text) {
-        *cell = Cell::Text(cell.exact());
-    }
-    (cells, kind)
 }
 
 impl<'a> SweepReport<'a> {
@@ -123,20 +68,7 @@ impl<'a> SweepReport<'a> {
     /// # Errors
     /// A figure that is not finite.
     pub fn json(&self) -> serde_json::Result<String> {
-        let columns = figures();
-        let mut rows = Vec::with_capacity(self.rows.len());
-        for row in &self.rows {
-            rows.push(PointRow {
-                scene: &row.subject.label,
-                settings: &row.point.settings,
-                change: row.point.change.as_ref(),
-                point: point_key(&row.subject.id, &row.point.config),
-                figures: Record {
-                    columns: &columns,
-                    row,
-                },
-            });
-        }
+        let columns = Self::columns();
         let subjects = self.outcome.subjects.iter();
         serde_json::to_string(&Document {
             schema: SWEEP_SCHEMA,
@@ -146,18 +78,25 @@ impl<'a> SweepReport<'a> {
             base: self.file.base,
             axes: &self.file.axes,
             one_at_a_time: &self.file.one_at_a_time,
-            rows,
+            rows: Records {
+                columns: &columns,
+                rows: &self.rows,
+            },
         })
     }
 
-    /// The trace, the axes and the change; `axis` makes an axis' column.
-    fn identity(&self, axis: impl Fn(usize, &Axis) -> Figure<'a>) -> Vec<Figure<'a>> {
-        let mut columns = vec![Figure::text("scene", "scene", |r| r.subject.label.clone())];
-        let axes = self.file.axes.iter().enumerate();
-        columns.extend(axes.map(|(i, of)| axis(i, of)));
-        columns.push(Figure::text("change", "change", |r| {
-            change_title(r.point.change.as_ref())
-        }));
+    /// The columns of every file: what names a row, then its figures.
+    fn columns() -> Vec<Figure<'a>> {
+        let mut columns = config_columns::trace();
+        columns.extend(config_columns::config());
+        columns.extend(config_columns::change());
+        columns.push(
+            Figure::text("point", "point", |r| {
+                point_key(&r.subject.id, &r.point.config)
+            })
+            .about("key of the point's row in points/"),
+        );
+        columns.extend(figures());
         columns
     }
 
@@ -168,25 +107,10 @@ impl<'a> SweepReport<'a> {
         })
     }
 
-    /// Values of an axis as configurations have them: `8KiB` is 8192.
-    fn resolved(&self, i: usize, axis: &Axis) -> Figure<'a> {
-        let (values, kind) = resolved_values(&self.outcome.plan.points, i, axis);
-        let column = Column::text(axis.key.clone(), axis.key.clone(), move |r: &ResultRow| {
-            let (_, value) = r.point.settings.get(i)?;
-            values.get(&value.to_string()).cloned()
-        });
-        column.kind(kind)
-    }
-
     /// The rows in full precision.
     #[must_use]
     pub fn rows(&self) -> Table {
-        let mut columns = self.identity(|i, axis| self.resolved(i, axis));
-        columns.push(Figure::text("point", "point", |r| {
-            point_key(&r.subject.id, &r.point.config)
-        }));
-        columns.extend(figures());
-        Table::new(&columns, &self.rows)
+        Table::new(&Self::columns(), &self.rows)
     }
 
     /// The rows as CSV.
@@ -198,13 +122,14 @@ impl<'a> SweepReport<'a> {
     /// The rows as a table; sets rows of a trace and a change apart.
     #[must_use]
     pub fn table(&self) -> Table {
-        let mut columns = self.identity(Self::written);
-        if self.file.one_at_a_time.is_empty() {
-            columns.pop();
-        } else {
-            // Rows are set apart by trace and change, so these two come first.
-            columns[1..].rotate_right(1);
+        let mut columns = vec![Figure::text("label", "scene", |r| r.subject.label.clone())];
+        if !self.file.one_at_a_time.is_empty() {
+            columns.push(Figure::text("change", "change", |r| {
+                change_title(r.point.change.as_ref())
+            }));
         }
+        let axes = self.file.axes.iter().enumerate();
+        columns.extend(axes.map(|(i, axis)| Self::written(i, axis)));
         let groups = 1 + usize::from(!self.file.one_at_a_time.is_empty());
         let shown = [
             "l1_miss_pct",

@@ -22,7 +22,7 @@ struct Document<'a> {
 
 #[derive(Serialize)]
 struct PlannedPoint<'a> {
-    /// Name of its file in `points/`, without `.json`.
+    /// Key of its row in a file of `points/`.
     key: String,
     scene: &'a str,
     /// What is set at the point.

@@ -231,6 +231,7 @@ fn slurm_script(args: &SweepArgs, shards: u32) -> anyhow::Result<String> {
         name: &name.to_string_lossy(),
         shards,
         cpus: args.threads.count,
+        needs: None,
         command: vec![
             shell::absolute(&program)?,
             "sweep".to_owned(),

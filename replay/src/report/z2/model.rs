@@ -13,7 +13,7 @@ use formats::textrace::TraceMeta;
 use serde::Serialize;
 
 /// Schema of the object that `replay paper --json` prints.
-pub const PAPER_SCHEMA: &str = "replay.paper/1";
+pub const PAPER_SCHEMA: &str = "replay.paper/2";
 
 /// A trace of the experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -251,8 +251,7 @@ impl<'a> PaperReport<'a> {
     /// # Errors
     /// A figure that is not finite.
     pub fn json(&self) -> serde_json::Result<String> {
-        let mut columns = Self::figures();
-        columns.retain(|c| !matches!(c.heading.key.as_ref(), "trace" | "twin"));
+        let columns = Self::figures();
         let details = self.traces.iter().flat_map(|t| self.details(&t.label));
         serde_json::to_string(&Document {
             schema: PAPER_SCHEMA,
@@ -435,7 +434,7 @@ mod tests {
     fn the_json_names_its_schema_and_keeps_every_row_with_the_papers_beside_it() {
         with_report(|report| {
             let json: serde_json::Value = serde_json::from_str(&report.json().unwrap()).unwrap();
-            assert_eq!(json["schema"], "replay.paper/1");
+            assert_eq!(json["schema"], "replay.paper/2");
             assert_eq!(json["rows"].as_array().unwrap().len(), report.rows.len());
             let row = &json["rows"][2];
             assert_eq!(row["order"], "z2-sta");

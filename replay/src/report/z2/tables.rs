@@ -11,7 +11,7 @@ use crate::result::Part;
 #[must_use]
 pub fn table_2(report: &PaperReport) -> Table {
     let columns = pick::<ResultRow>(&[
-        "scene",
+        "label",
         "caches",
         "order",
         "l1_miss_pct",
@@ -35,7 +35,7 @@ pub fn table_2(report: &PaperReport) -> Table {
 #[must_use]
 pub fn as_the_paper_counts(report: &PaperReport) -> Option<Table> {
     let columns = pick::<ResultRow>(&[
-        "scene",
+        "label",
         "caches",
         "order",
         "z2_paper.l1_miss_pct",
@@ -68,7 +68,7 @@ pub fn averages(averages: &[Average]) -> Table {
 #[must_use]
 pub fn modes(report: &PaperReport) -> Option<Table> {
     let columns = pick::<ResultRow>(&[
-        "scene",
+        "label",
         "caches",
         "order",
         "l1_miss_pct",
@@ -88,7 +88,7 @@ pub fn modes(report: &PaperReport) -> Option<Table> {
 #[must_use]
 pub fn bounds(report: &PaperReport) -> Table {
     let columns = pick::<ResultRow>(&[
-        "scene",
+        "label",
         "caches",
         "order",
         "external_mb_per_frame",

@@ -1,0 +1,132 @@
+//! What names a row whatever other traces and points are in its file: trace, picture, and every key of the
+//! configuration. Rows of several files can be joined by them.
+
+use super::columns::Value;
+use super::figures::Figure;
+use crate::config::{CacheConfig, RunConfig};
+use crate::experiment::{ResultRow, plain, scene_label};
+use crate::model_version::MODEL_VERSION;
+use serde::Serialize;
+
+/// The name of an enumeration's value in configuration files.
+fn name(value: &impl Serialize) -> String {
+    let value = serde_json::to_value(value).unwrap_or_default();
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+/// The trace.
+pub fn trace<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::text("label", "scene", |r| r.subject.label.clone())
+            .about("short name in this file, which depends on the other traces in it"),
+        Figure::text("trace", "trace", |r| r.subject.id.name.clone())
+            .about("name of the trace's file without folder and extension"),
+        Figure::text("checksum", "checksum", |r| r.subject.id.checksum.clone())
+            .about("checksum of the trace's content"),
+        Figure::text("scene", "scene", |r| scene_label(r.subject.source.tables())),
+        Figure::text("camera", "camera", |r| r.subject.id.camera.clone()),
+        Figure::text("display", "display", |r| r.subject.id.display.clone()),
+        Figure::text("width_px", "width", |r| {
+            u64::from(r.subject.id.eye_size_px[0])
+        })
+        .about("width of an eye's picture in pixels"),
+        Figure::text("height_px", "height", |r| {
+            u64::from(r.subject.id.eye_size_px[1])
+        })
+        .about("height of an eye's picture in pixels"),
+        Figure::text("model_version", "model", |_| u64::from(MODEL_VERSION))
+            .about("version of the models; counts of different versions cannot be compared"),
+    ]
+}
+
+/// Every key of the configuration, as docs/configuration.md lists them.
+#[rustfmt::skip]
+pub fn config<'a>() -> Vec<Figure<'a>> {
+    fn key<'a, V: super::columns::Cell + 'static>(
+        key: &'static str,
+        value: fn(&RunConfig) -> V,
+    ) -> Figure<'a> {
+        Figure::text(key, key, move |r: &ResultRow| value(&r.point.config))
+    }
+    fn cache<'a>(keys: [&'static str; 3], level: fn(&RunConfig) -> &CacheConfig) -> [Figure<'a>; 3] {
+        let [size_bytes, ways, replacement] = keys;
+        let of = move |r: &ResultRow| *level(&r.point.config);
+        [
+            Figure::text(size_bytes, size_bytes, move |r: &ResultRow| of(r).size_bytes),
+            Figure::text(ways, ways, move |r: &ResultRow| u64::from(of(r).ways)),
+            Figure::text(replacement, replacement, move |r: &ResultRow| of(r).replacement.name()),
+        ]
+    }
+    let mut columns = vec![
+        key("mode", |c| name(&c.mode)),
+        Figure::text("order", "order", |r| {
+            let order = r.point.config.order;
+            Value::Named(order.name(), order.title())
+        }),
+        key("seed", |c| c.seed),
+        key("cores", |c| u64::from(c.cores)),
+        key("assign", |c| name(&c.assign)),
+        key("line_bytes", |c| u64::from(c.line_bytes)),
+    ];
+    columns.extend(cache(["l1.size_bytes", "l1.ways", "l1.replacement"], |c| &c.l1));
+    columns.extend(cache(["l2.size_bytes", "l2.ways", "l2.replacement"], |c| &c.l2));
+    columns.extend([
+        key("sampling.filter", |c| name(&c.sampling.filter)),
+        key("sampling.lod_bias", |c| f64::from(c.sampling.lod_bias)),
+        key("sampling.lod", |c| name(&c.sampling.lod)),
+        key("sampling.helper_lanes", |c| c.sampling.helper_lanes),
+        key("sampling.max_anisotropy", |c| u64::from(c.sampling.max_anisotropy)),
+        key("sampling.anisotropy", |c| name(&c.sampling.anisotropy)),
+        key("layout.texel_format", |c| c.layout.texel_format.as_ref().map(name)),
+        key("layout.block_order", |c| name(&c.layout.block_order)),
+        key("layout.shadow_map_order", |c| name(&c.layout.shadow_map_order)),
+        key("layout.base_align_bytes", |c| c.layout.base_align_bytes),
+        key("layout.texture_order", |c| name(&c.layout.texture_order)),
+        key("tmu.l1_penalty_cycles", |c| u64::from(c.tmu.l1_penalty_cycles)),
+        key("tmu.l2_penalty_cycles", |c| u64::from(c.tmu.l2_penalty_cycles)),
+        key("tmu.loop_cycles", |c| u64::from(c.tmu.loop_cycles)),
+        key("tmu.threads", |c| u64::from(c.tmu.threads)),
+        key("tmu.retry_footprints", |c| u64::from(c.tmu.retry_footprints)),
+        key("tmu.fetches_per_trip", |c| u64::from(c.tmu.fetches_per_trip)),
+        key("tmu.allocation", |c| name(&c.tmu.allocation)),
+        key("tile_maps", |c| c.tile_maps),
+        key("hsr", |c| name(&c.hsr)),
+        key("between_frames", |c| name(&c.between_frames)),
+    ]);
+    columns
+}
+
+/// The value that is tried alone, if any.
+pub fn change<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::text("change.key", "change", |r| {
+            let (key, _) = r.point.change.as_ref()?;
+            Some(key.clone())
+        })
+        .about("key that this row alone changes"),
+        Figure::text("change.value", "to", |r| {
+            let (_, value) = r.point.change.as_ref()?;
+            Some(plain(value))
+        })
+        .about("value that it has there"),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_of_the_configuration_is_a_column() {
+        let page = include_str!("../../../docs/configuration.md");
+        let documented = page.lines().filter_map(|line| {
+            let key = line.strip_prefix("| `")?;
+            Some(key.split_once('`')?.0)
+        });
+        let documented: Vec<&str> = documented.collect();
+        let columns = config();
+        let keys: Vec<&str> = columns.iter().map(|c| c.heading.key.as_ref()).collect();
+        assert!(keys.len() > 30);
+        assert_eq!(keys, documented);
+    }
+}
