@@ -122,6 +122,8 @@ fn the_example_experiments_can_be_planned() {
         (include_str!("../../experiments/caches.toml"), 48),
         (include_str!("../../experiments/open-choices.toml"), 39),
         (include_str!("../../experiments/texel-density.toml"), 36),
+        (include_str!("../../experiments/shadow-maps.toml"), 18),
+        (include_str!("../../experiments/modes.toml"), 24),
     ] {
         assert_eq!(plan(text).points.len(), points);
     }
