@@ -95,6 +95,75 @@ fn osmesa_samples_what_lavapipe_samples_to_the_last_bit() {
     hold_llvmpipe(&["atrium-shadows", "--size", "96x80", "--views", "left"]);
 }
 
+/// Writes a slanted floor whose texture is turned, scaled and moved by KHR_texture_transform.
+fn write_turned_floor(folder: &Path) -> PathBuf {
+    let positions = [
+        [-4.0, -1.0, 1.0],
+        [4.0, -1.3, 1.0],
+        [4.0, -0.7, -9.0],
+        [-4.0, -0.9, -9.0_f32],
+    ];
+    let coordinates = [[0.1, 0.2], [5.3, 0.3], [5.1, 7.7], [0.4, 7.9_f32]];
+    let mut bytes = Vec::new();
+    let numbers = positions
+        .as_flattened()
+        .iter()
+        .chain(coordinates.as_flattened());
+    numbers.for_each(|v| bytes.extend(v.to_le_bytes()));
+    bytes.extend([0_u16, 1, 2, 0, 2, 3].map(u16::to_le_bytes).as_flattened());
+    std::fs::write(folder.join("floor.bin"), &bytes).expect("a file");
+    let image = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, 99]));
+    image.save(folder.join("floor.png")).expect("a file");
+    let scene = serde_json::json!({
+        "asset": { "version": "2.0" },
+        "extensionsUsed": ["KHR_texture_transform"],
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0 }],
+        "buffers": [{ "uri": "floor.bin", "byteLength": 92 }],
+        "bufferViews": [
+            { "buffer": 0, "byteOffset": 0, "byteLength": 48 },
+            { "buffer": 0, "byteOffset": 48, "byteLength": 32 },
+            { "buffer": 0, "byteOffset": 80, "byteLength": 12 },
+        ],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+              "min": [-4.0, -1.3, -9.0], "max": [4.0, -0.7, 1.0] },
+            { "bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2" },
+            { "bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR" },
+        ],
+        "images": [{ "uri": "floor.png" }],
+        "textures": [{ "source": 0 }],
+        "materials": [{ "doubleSided": true, "pbrMetallicRoughness": { "baseColorTexture": {
+            "index": 0,
+            "extensions": { "KHR_texture_transform": {
+                "offset": [0.37, 0.21], "rotation": 0.7, "scale": [1.3, 0.9]
+            } },
+        } } }],
+        "meshes": [{ "primitives": [{
+            "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2, "material": 0
+        }] }],
+    });
+    let file = folder.join("floor.gltf");
+    std::fs::write(&file, scene.to_string()).expect("a file");
+    file
+}
+
+#[test]
+fn osmesa_samples_what_lavapipe_samples_where_a_texture_is_turned() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = write_turned_floor(folder.path());
+    let view = [
+        "--eye",
+        "0,0.5,0",
+        "--target",
+        "0,-0.5,-4",
+        "--size",
+        "128x128",
+    ];
+    hold_llvmpipe(&[&[scene.to_str().expect("UTF-8")][..], &view].concat());
+}
+
 #[test]
 fn osmesa_samples_what_lavapipe_samples_in_a_real_scene() {
     let Some(scene) = real_scene("stk-cocoa-temple/stk-cocoa-temple.gltf") else {

@@ -7,13 +7,18 @@ use std::path::Path;
 
 const SMALL: [&str; 2] = ["--size", "96x112"];
 
+/// The report of a capture that is as it should be.
 fn verify(arguments: &[&str]) -> Value {
-    let output = run_ok(
-        program("tracegen")
-            .arg("verify")
-            .args(arguments)
-            .arg("--json"),
-    );
+    verify_expecting(0, arguments)
+}
+
+/// The report of a capture, with the exit code of the verdict.
+fn verify_expecting(code: i32, arguments: &[&str]) -> Value {
+    let mut command = program("tracegen");
+    command.arg("verify").args(arguments).arg("--json");
+    let output = command.output().expect("the program starts");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{errors}");
     let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(report["schema"], "tracegen.verify/1");
     report
@@ -33,6 +38,7 @@ fn path(path: &Path) -> &str {
 /// Every footprint that differs has a cause, and all but one in ten thousand coordinates: of slivers, the bound of
 /// single precision knows the screen and not the cancelling terms of the transformation.
 fn hold_causes(report: &Value) {
+    assert_eq!(report["failures"], serde_json::json!([]), "{report:#}");
     for place in ["uv_error_texels", "capture_precision", "specification"] {
         let causes = report[place]["causes"].as_array().expect("causes");
         let last = causes.last().expect("a cause");
@@ -150,7 +156,7 @@ fn records_that_are_missing_moved_or_invented_are_told() {
             second.uv[0] += formats::textrace::SUBTEXELS;
         }
     });
-    let lying = verify(&["atrium", "--trace", path(&changed)]);
+    let lying = verify_expecting(1, &["atrium", "--trace", path(&changed)]);
     let missing = |report| number(report, "/coverage/only_reference");
     assert!(missing(&lying) > missing(&honest) + 10.0, "{lying:#}");
     let unexplained = lying["coverage"]["differences"]

@@ -75,7 +75,7 @@ pub fn main() -> ExitCode {
                 Command::Raster(args) => raster::run(&args)?,
                 Command::Techniques(args) => techniques::run(&args)?,
                 Command::Sweep(args) => sweep::run(&args)?,
-                Command::Verify(args) => verify::run(&args)?,
+                Command::Verify(args) => return verify::run(&args),
                 Command::Rays(args) => rays::run(&args)?,
                 Command::Stress(args) => return stress::run(&args),
                 Command::Precision(args) => precision::run(&args)?,

@@ -19,12 +19,16 @@ use raster::lighting::Lighting;
 use scene::LoadOptions;
 use shell::{Output, Progress, Threads, note};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::time::Instant;
 use techniques::{Planner, Settings, Skips};
 use textures::TextureSet;
 
 /// Memory for raw records.
 const RECORD_BUDGET_BYTES: u64 = 128 << 20;
+
+/// How many failures are printed one by one.
+const MOST_FAILURES: usize = 20;
 
 /// Arguments of `tracegen verify`.
 #[derive(Args, Debug)]
@@ -90,11 +94,11 @@ fn parse_formula(text: &str) -> Result<LodFormula, String> {
     }
 }
 
-/// Runs `tracegen verify`.
+/// Runs `tracegen verify`: exit code 1 where something has no cause that a correct capture has.
 ///
 /// # Errors
 /// Unreadable input, no driver where one is needed, or a file that cannot be written.
-pub fn run(args: &VerifyArgs) -> anyhow::Result<()> {
+pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     prepare_environment(args.threads.count);
     filter_in_single_precision();
     args.threads.start()?;
@@ -187,12 +191,24 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<()> {
         (started.elapsed() - captured).as_secs_f64(),
         captured.as_secs_f64()
     ));
-    let report = Report::new(&args.scene.scene, &trace.tables().meta, &verified, seed);
+    let report = Report::new(&args.scene.scene, trace.tables(), &verified, seed);
     if args.json {
-        shell::print(&(serde_json::to_string_pretty(&report)? + "\n"))
+        shell::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
     } else {
-        shell::print(&report.table())
+        shell::print(&report.table())?;
     }
+    let failures = report.failures();
+    for failure in failures.iter().take(MOST_FAILURES) {
+        shell::error(failure);
+    }
+    if failures.len() > MOST_FAILURES {
+        let more = failures.len() - MOST_FAILURES;
+        shell::error(&format!("and {more} more, which --json lists"));
+    }
+    if report.failures().is_empty() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    Ok(ExitCode::FAILURE)
 }
 
 impl VerifyArgs {

@@ -2,6 +2,7 @@
 
 use super::causes::{SampleCause, UvCause};
 use super::classes::Class;
+use super::means::Means;
 
 /// Who has a fragment that the other has not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,6 +119,14 @@ pub struct Agreement {
     pub uv_errors_texels: Distances,
     /// They by [`UvCause::ALL`].
     pub uv_causes: [u64; UvCause::ALL.len()],
+    /// Signed means of coordinates and of their differences over a quad.
+    pub means: Means,
+    /// Differences over a quad that neither rounding nor single precision explains, by record, column and axis.
+    pub differences_unexplained: u64,
+    /// Uv groups of common fragments without a record.
+    pub groups_missing: u64,
+    /// Records without a group of fragments that sample textures.
+    pub groups_unexpected: u64,
     /// Common fragments whose coordinates are no numbers on either side.
     pub not_finite: u64,
     /// Shadow-map look-ups of common fragments: not compared.
@@ -171,6 +180,10 @@ impl Agreement {
         for (sum, count) in self.uv_causes.iter_mut().zip(&other.uv_causes) {
             *sum += count;
         }
+        self.means.merge(&other.means);
+        self.differences_unexplained += other.differences_unexplained;
+        self.groups_missing += other.groups_missing;
+        self.groups_unexpected += other.groups_unexpected;
         self.not_finite += other.not_finite;
         self.shadow_lookups += other.shadow_lookups;
         self.capture.merge(&other.capture);

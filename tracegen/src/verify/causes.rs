@@ -10,14 +10,14 @@ use serde::Serialize;
 
 /// Distance of coordinates, and of levels of detail, that needs no cause but the rounding of a trace and of
 /// single precision.
-const SMALL: f64 = 1.0 / 64.0;
+pub(super) const SMALL: f64 = 1.0 / 64.0;
 
 /// By how much transforming, clipping and projecting in single precision moves a vertex on the screen: units in the
 /// last place of the largest coordinate there.
 const VERTEX_ULPS: f64 = 32.0;
 
 /// Where captures let the differences of a record end: sums of four stay in 32 bits.
-const LARGEST_DIFFERENCE: u32 = 1 << 28;
+pub(super) const LARGEST_DIFFERENCE: u32 = 1 << 28;
 
 /// A cause of an error of coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -124,6 +124,12 @@ impl Subject<'_> {
         let center = super::piece::center(self.pixel);
         let planes = self.coordinates.interpolation_error(center);
         let single = texels(self.by_single_precision(|s| s.uv) + planes);
+        let derived = texels(self.coordinates.single_precision(center));
+        let single = if derived.is_finite() {
+            single.max(derived)
+        } else {
+            single
+        };
         if self.formula == LodFormula::Softpipe {
             // From whichever lane the quad's coordinates come.
             let found = self.coordinates.at(center) + error;

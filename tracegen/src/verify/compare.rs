@@ -1,14 +1,15 @@
 //! How well the tiles of a captured pass agree with the reference.
 
 use super::agreement::{Agreement, Read, Side};
-use super::causes::{Subject, UvCause};
+use super::causes::{LARGEST_DIFFERENCE, SMALL, Subject, UvCause};
 use super::classes::classify;
 use super::geometry::Geometry;
 use super::lod::{clamped, level_of_detail, taps};
-use super::piece::center;
+use super::piece::{center, quad_center};
+use super::precision::rounding_texels;
 use super::reference::{AlphaTest, Fragment, origin, render_tile};
 use formats::footprint::{LodFormula, SamplingOptions, footprints, quad_lod};
-use formats::textrace::{QuadRecord, SUBTEXELS, Tables, Tile, UvGroup};
+use formats::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Tables, Tile, UvGroup};
 use formats::view::TILE_SIZE_PX;
 use glam::DVec2;
 use raster::backend::Fragments;
@@ -137,6 +138,7 @@ impl Comparison<'_> {
         let piece = geometry.piece(fragment.piece);
         let textures = geometry.material(piece).textures();
         let draw = &self.tables.draws[piece.draw as usize];
+        self.groups(geometry, fragment, lanes, result);
         for lane in lanes {
             let number = usize::from(lane.group);
             // Look-ups of shadow maps have groups of their own behind the material's.
@@ -169,7 +171,42 @@ impl Comparison<'_> {
             let cause = subject.of_uv(record, error);
             result.uv_errors_texels.0.push(error_texels as f32);
             result.uv_causes[cause as usize] += 1;
+            // softpipe's lanes lack the cross term, which no bound of the arithmetic holds.
+            if cause != UvCause::Saturated && self.formula != LodFormula::Softpipe {
+                let place = (piece.draw, lane.group);
+                add_to_means(&subject, record, index, error, place, result);
+            }
             self.samples(record, index, group, &subject, cause, result);
+        }
+    }
+
+    /// Counts a fragment's groups that have no record, and records that should have a group.
+    fn groups(
+        &self,
+        geometry: &Geometry<'_>,
+        fragment: &Fragment,
+        lanes: &[Lane],
+        result: &mut Agreement,
+    ) {
+        let piece = geometry.piece(fragment.piece);
+        let textures = geometry.material(piece).textures();
+        let groups = geometry.groups(piece);
+        let alone = lanes.iter().filter(|lane| lane.group == NO_GROUP).count();
+        if !groups.is_empty() {
+            result.groups_unexpected += alone as u64;
+        }
+        for (number, slots) in groups.iter().enumerate() {
+            let Some(leader) = slots.first().and_then(|&slot| textures[slot]) else {
+                continue;
+            };
+            if lanes.iter().any(|lane| usize::from(lane.group) == number) {
+                continue;
+            }
+            // A capture has no record of coordinates that are no numbers.
+            let coordinates = geometry.coordinates(piece, &leader);
+            let corner = |step| coordinates.single_precision(quad_center(fragment.pixel) + step);
+            let corners = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(corner);
+            result.groups_missing += u64::from(corners.iter().all(|bound| bound.is_finite()));
         }
     }
 
@@ -227,6 +264,69 @@ impl Comparison<'_> {
                     errors.causes[cause as usize] += 1;
                 }
             }
+        }
+    }
+}
+
+/// Adds a lane's error to the means of its draw and group, and with the first lane of a record those of its
+/// differences over the quad.
+fn add_to_means(
+    subject: &Subject<'_>,
+    record: &QuadRecord,
+    lane: u32,
+    error: DVec2,
+    (draw, group): (u32, u8),
+    result: &mut Agreement,
+) {
+    let (coordinates, extent) = (subject.coordinates, subject.extent);
+    let bound =
+        coordinates.single_precision(center(subject.pixel)) * extent + rounding_texels(lane);
+    let means = result.means.of(draw, group);
+    for axis in 0..2 {
+        means[axis].add(error[axis] * extent[axis], bound[axis]);
+    }
+    if lane != record.mask.trailing_zeros() {
+        return;
+    }
+    let quad = quad_center(subject.pixel);
+    let corners = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|step| {
+        let at = quad + step;
+        (
+            coordinates.at(at) * extent,
+            coordinates.single_precision(at) * extent,
+        )
+    });
+    let [top_left, top_right, bottom_left, bottom_right] = corners;
+    let sum = |of: &[(DVec2, DVec2)]| of.iter().map(|(_, bound)| *bound).sum::<DVec2>();
+    let columns = [
+        (
+            record.dx,
+            top_right.0 - top_left.0,
+            sum(&[top_left, top_right]),
+        ),
+        (
+            record.dy,
+            bottom_left.0 - top_left.0,
+            sum(&[top_left, bottom_left]),
+        ),
+        (
+            record.cross,
+            bottom_right.0 - bottom_left.0 - (top_right.0 - top_left.0),
+            sum(&corners),
+        ),
+    ];
+    for (column, (found, expected, bound)) in columns.into_iter().enumerate() {
+        for axis in 0..2 {
+            // Beyond the fixed point a record's differences end, or lose pairs of repeats.
+            let largest = f64::from(LARGEST_DIFFERENCE) / f64::from(SUBTEXELS);
+            if found[axis].unsigned_abs() >= LARGEST_DIFFERENCE || expected[axis].abs() >= largest {
+                continue;
+            }
+            let error = f64::from(found[axis]) / f64::from(SUBTEXELS) - expected[axis];
+            let bound = bound[axis] + rounding_texels(0);
+            means[2 + 2 * column + axis].add(error, bound);
+            let explained = error.abs() <= SMALL + bound || !error.is_finite();
+            result.differences_unexplained += u64::from(!explained);
         }
     }
 }

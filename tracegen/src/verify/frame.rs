@@ -52,6 +52,8 @@ pub struct Verified {
     pub tiles: usize,
     /// Tiles of all passes.
     pub all_tiles: usize,
+    /// What contradicts the scene in the trace's tables.
+    pub faults: Vec<String>,
     /// Records against the reference.
     pub agreement: Agreement,
     /// Colours by slot of the materials' textures, where texels were given.
@@ -176,6 +178,7 @@ impl<'a> Subject<'a> {
         let mut result = Verified {
             passes: passes.len(),
             all_tiles: counts.iter().sum(),
+            faults: super::tables::faults(self.scene, tables)?,
             ..Verified::default()
         };
         for (position, (number, pass, eye)) in passes.into_iter().enumerate() {

@@ -1,6 +1,7 @@
 //! The triangles of a view, and which of its tiles they may touch.
 
 use super::piece::{Piece, center, pieces, quad_center};
+use super::precision::VertexError;
 use formats::footprint::LodFormula;
 use formats::view::{EyeView, TILE_SIZE_PX};
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
@@ -46,10 +47,11 @@ impl<'a> Geometry<'a> {
             bins: vec![Vec::new(); tiles[0] as usize * tiles[1] as usize],
         };
         let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
-        let clip_from_world = wide(&view.eye_to_clip) * wide(&view.world_to_eye);
+        let view = [&view.eye_to_clip, &view.world_to_eye].map(wide);
         for (draw, call) in (0_u32..).zip(&draws.calls) {
             let world_from_object = Mat4::from(call.transform).as_dmat4();
-            geometry.add_draw(draw, call, clip_from_world * world_from_object, &wanted);
+            let matrices = [view[0], view[1], world_from_object];
+            geometry.add_draw(draw, call, &matrices, &wanted);
         }
         geometry
     }
@@ -58,11 +60,12 @@ impl<'a> Geometry<'a> {
         &mut self,
         draw: u32,
         call: &DrawCall,
-        clip_from_object: DMat4,
+        matrices: &[DMat4; 3],
         wanted: &impl Fn(usize) -> bool,
     ) {
         let mesh = &self.scene.meshes[call.mesh];
         let double_sided = self.scene.materials[call.material].double_sided;
+        let clip_from_object = matrices[0] * matrices[1] * matrices[2];
         let clip: Vec<DVec4> = (mesh.positions.iter())
             .map(|p| clip_from_object * p.as_dvec3().extend(1.0))
             .collect();
@@ -81,7 +84,11 @@ impl<'a> Geometry<'a> {
             }
             let shows =
                 |counter_clockwise: bool| double_sided || counter_clockwise != call.mirrored;
-            for piece in pieces(vertices, self.size_px, draw, number, shows) {
+            let errors = [0, 1, 2].map(|i| {
+                let position = mesh.positions[triangle[i] as usize];
+                VertexError::new(matrices, position.as_dvec3())
+            });
+            for piece in pieces(vertices, errors, self.size_px, draw, number, shows) {
                 // Of what is not drawn, only what another rounding might draw is of interest.
                 if !piece.dropped || piece.height_px() <= SLIVER_PX {
                     self.add(piece, wanted);
@@ -163,12 +170,18 @@ impl<'a> Geometry<'a> {
         let rows = texture.uv_transform.map(row);
         let vertex = |i: usize| {
             let uv = set.get(corner(mesh, piece, i)).copied().unwrap_or_default();
-            let uv = uv.as_dvec2().extend(1.0);
+            uv.as_dvec2()
+        };
+        let set = [vertex(0), vertex(1), vertex(2)];
+        let transformed = |uv: DVec2| {
+            let uv = uv.extend(1.0);
             DVec2::new(rows[0].dot(uv), rows[1].dot(uv))
         };
         Coordinates {
             piece,
-            uv: [vertex(0), vertex(1), vertex(2)],
+            uv: set.map(transformed),
+            set,
+            rows,
         }
     }
 
@@ -197,6 +210,9 @@ fn corner(mesh: &Mesh, piece: &Piece, vertex: usize) -> usize {
 pub struct Coordinates<'a> {
     piece: &'a Piece,
     uv: [DVec2; 3],
+    /// As the vertices have them, and the texture's transform.
+    set: [DVec2; 3],
+    rows: [DVec3; 2],
 }
 
 /// Coordinates and their derivatives by x and y, in units of the texture.
@@ -296,6 +312,21 @@ impl Coordinates<'_> {
     /// The same coordinates of the vertices over another piece.
     #[must_use]
     pub fn on<'p>(&self, piece: &'p Piece) -> Coordinates<'p> {
-        Coordinates { piece, uv: self.uv }
+        Coordinates {
+            piece,
+            uv: self.uv,
+            set: self.set,
+            rows: self.rows,
+        }
+    }
+
+    /// The vertices' coordinates before the texture's transform.
+    pub(super) fn set(&self) -> &[DVec2; 3] {
+        &self.set
+    }
+
+    /// The rows of the texture's transform.
+    pub(super) fn rows(&self) -> &[DVec3; 2] {
+        &self.rows
     }
 }

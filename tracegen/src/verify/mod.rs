@@ -15,10 +15,14 @@ pub mod compare;
 pub mod frame;
 pub mod geometry;
 pub mod lod;
+pub mod means;
 pub mod piece;
+mod precision;
 pub mod reference;
 pub mod report;
 pub mod sampler;
+pub mod tables;
+mod views;
 pub mod write;
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! A triangle on the screen: what it covers, how deep it lies, and where on its primitive a pixel is.
 
+use super::precision::VertexError;
 use glam::{DVec2, DVec3, DVec4};
 
 /// Steps per pixel to which vertices are snapped; every driver here has 8 bits.
@@ -11,18 +12,23 @@ pub(super) struct ClipVertex {
     pub clip: DVec4,
     /// Its weights of the primitive's three vertices.
     pub weights: DVec3,
+    pub error: VertexError,
 }
 
 /// A vertex on the screen.
 #[derive(Clone, Copy, Debug)]
-struct Corner {
+pub(super) struct Corner {
     /// Pixels, y down.
-    at: DVec2,
+    pub at: DVec2,
+    /// How far single precision may move it, pixels.
+    pub moves_px: DVec2,
     /// 1/256 pixels.
     snapped: [i64; 2],
     depth: f64,
-    inverse_w: f64,
-    weights: DVec3,
+    pub inverse_w: f64,
+    /// How far `inverse_w` may be off, as part of it.
+    pub inverse_w_error: f64,
+    pub weights: DVec3,
 }
 
 /// A primitive, or what clipping left of it, as a triangle that winds clockwise on the screen.
@@ -42,6 +48,7 @@ pub struct Piece {
 /// What becomes of a primitive: up to three triangles where planes cut corners off.
 pub(super) fn pieces(
     vertices: [DVec4; 3],
+    errors: [VertexError; 3],
     size_px: [u32; 2],
     draw: u32,
     number: u32,
@@ -51,6 +58,7 @@ pub(super) fn pieces(
     let vertex = |i: usize| ClipVertex {
         clip: vertices[i],
         weights: weights[i],
+        error: errors[i],
     };
     let corners = clip_to_depth_range(&[vertex(0), vertex(1), vertex(2)]);
     let clipped = corners.len() != 3 || (0..3).any(|i| corners[i].clip != vertices[i]);
@@ -89,6 +97,7 @@ fn clip_to_depth_range(triangle: &[ClipVertex; 3]) -> Vec<ClipVertex> {
                 kept.push(ClipVertex {
                     clip: previous.clip.lerp(current.clip, t),
                     weights: previous.weights.lerp(current.weights, t),
+                    error: previous.error.between(current.error),
                 });
             }
             if dc >= 0.0 {
@@ -113,7 +122,9 @@ fn project(vertex: &ClipVertex, size_px: [u32; 2]) -> Corner {
         at,
         snapped: at.to_array().map(|v| (v * SNAP).round_ties_even() as i64),
         depth: ndc.z,
+        moves_px: vertex.error.moves_px(vertex.clip, size_px, at),
         inverse_w,
+        inverse_w_error: vertex.error.inverse_w(vertex.clip),
         weights: vertex.weights,
     }
 }
@@ -141,6 +152,11 @@ pub fn quad_center(pixel: [u32; 2]) -> DVec2 {
 }
 
 impl Piece {
+    /// Its corners, clockwise.
+    pub(super) fn corners(&self) -> &[Corner; 3] {
+        &self.corners
+    }
+
     /// First and last column, then row, of the pixels that it may touch; `None` off the screen.
     pub(super) fn span_px(&self, size_px: [u32; 2]) -> Option<[[u32; 2]; 2]> {
         let axis = |axis: usize| {
@@ -211,7 +227,7 @@ impl Piece {
     }
 
     /// Weights of the corners at a point of the screen, linear in it.
-    fn screen_weights(&self, p: DVec2) -> [f64; 3] {
+    pub(super) fn screen_weights(&self, p: DVec2) -> [f64; 3] {
         let cross = |a: DVec2, b: DVec2| (b - a).perp_dot(p - a);
         let [a, b, c] = self.corners.map(|c| c.at);
         let total = (b - a).perp_dot(c - a);
@@ -268,7 +284,14 @@ mod tests {
             let [x, y] = corners[i].map(|v| v / f64::from(size) * 2.0 - 1.0);
             DVec4::new(x, -y, 0.5, 1.0) * w[i]
         };
-        let found = pieces([vertex(0), vertex(1), vertex(2)], [size; 2], 0, 0, |_| true);
+        let found = pieces(
+            [vertex(0), vertex(1), vertex(2)],
+            Default::default(),
+            [size; 2],
+            0,
+            0,
+            |_| true,
+        );
         assert_eq!(found.len(), 1);
         found[0]
     }
@@ -307,7 +330,14 @@ mod tests {
             [1.0, -1.0, 0.2, 1.0],
             [0.0, 1.0, -0.2, 0.6],
         ];
-        let found = pieces(vertices.map(DVec4::from), [64; 2], 0, 0, |_| true);
+        let found = pieces(
+            vertices.map(DVec4::from),
+            Default::default(),
+            [64; 2],
+            0,
+            0,
+            |_| true,
+        );
         assert_eq!(found.len(), 2);
         assert!(found.iter().all(|p| p.clipped && !p.dropped));
     }

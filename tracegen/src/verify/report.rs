@@ -5,6 +5,8 @@ use super::causes::{SampleCause, UvCause};
 use super::classes::Class;
 use super::colour::ColourErrors;
 use super::frame::Verified;
+use super::means::Bias;
+use formats::textrace::Tables;
 use serde::Serialize;
 
 /// Names of the textures of a material, in the order of their slots.
@@ -27,6 +29,8 @@ pub struct Report {
     size_px: [u32; 2],
     passes: usize,
     tiles: Tiles,
+    /// Why the capture is not the scene's; empty where everything has its cause.
+    failures: Vec<String>,
     coverage: Coverage,
     uv_error_texels: UvError,
     /// Against the same formula of the level of detail.
@@ -70,6 +74,83 @@ struct UvError {
     not_finite: u64,
     shadow_lookups_not_compared: u64,
     causes: Vec<Count<UvCause>>,
+    differences_unexplained: u64,
+    groups_missing: u64,
+    groups_unexpected: u64,
+    /// How many signed means were held against their bounds.
+    means: usize,
+    /// The largest of them, as parts of their bounds.
+    largest_means: Vec<Bias>,
+}
+
+/// How many of the means are reported.
+const LARGEST_MEANS: usize = 4;
+
+/// Means by how much of their bounds they are, the largest first.
+fn by_share(mut means: Vec<Bias>) -> Vec<Bias> {
+    means.sort_by(|a, b| b.share().total_cmp(&a.share()));
+    means
+}
+
+/// Everything that a correct capture does not have, with its place.
+fn failures(verified: &Verified, means: &[Bias]) -> Vec<String> {
+    let agreement = &verified.agreement;
+    let mut failures = verified.faults.clone();
+    let sample_causes = |errors: &SampleErrors| errors.causes[SampleCause::Unexplained as usize];
+    let colours = verified.colours.iter().zip(SLOTS);
+    let counts = [
+        (
+            agreement.of_class(Class::Unexplained),
+            "fragments on one side alone",
+        ),
+        (agreement.recorded_twice, "lanes recorded twice"),
+        (
+            agreement.groups_missing,
+            "uv groups of fragments without a record",
+        ),
+        (
+            agreement.groups_unexpected,
+            "records without a uv group of fragments that sample textures",
+        ),
+        (
+            agreement.uv_causes[UvCause::Unexplained as usize],
+            "coordinates",
+        ),
+        (
+            agreement.differences_unexplained,
+            "differences of coordinates over a quad",
+        ),
+        (sample_causes(&agreement.capture), "levels or texels"),
+        (
+            sample_causes(&agreement.specification),
+            "levels or texels against the specification",
+        ),
+    ];
+    let unexplained = |(count, what): &(u64, &str)| format!("{what}: {count} unexplained");
+    failures.extend(
+        counts
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(unexplained),
+    );
+    for (errors, slot) in colours {
+        let unexplained = Colour::new(slot, errors).beyond_unexplained;
+        if unexplained > 0 {
+            failures.push(format!("colours of {slot}: {unexplained} unexplained"));
+        }
+    }
+    failures.extend(
+        means
+            .iter()
+            .filter(|mean| mean.is_systematic())
+            .map(|mean| {
+                format!(
+                    "{}: mean error of {} over {} lanes: expected within {:.6} texels, found {:.6}",
+                    mean.of, mean.column, mean.count, mean.bound_texels, mean.mean_texels
+                )
+            }),
+    );
+    failures
 }
 
 /// How many differences have a cause.
@@ -125,12 +206,7 @@ fn share(part: u64, whole: u64) -> f64 {
 impl Report {
     /// The report of a verified frame of a scene; `seed` is that of a sample of tiles.
     #[must_use]
-    pub fn new(
-        scene: &str,
-        meta: &formats::textrace::TraceMeta,
-        verified: &Verified,
-        seed: Option<u64>,
-    ) -> Self {
+    pub fn new(scene: &str, tables: &Tables, verified: &Verified, seed: Option<u64>) -> Self {
         let Agreement {
             both,
             recorded_twice,
@@ -140,6 +216,8 @@ impl Report {
         } = verified.agreement;
         let agreement = &verified.agreement;
         let [mean, p99, max] = agreement.uv_errors_texels.summary();
+        let meta = &tables.meta;
+        let means = by_share(agreement.means.biases(tables));
         let difference = |class: Class| Difference {
             class,
             only_reference: agreement.only[Side::Reference as usize][class as usize],
@@ -157,6 +235,7 @@ impl Report {
                 of: verified.all_tiles,
                 seed,
             },
+            failures: failures(verified, &means),
             coverage: Coverage {
                 both,
                 only_reference: agreement.only(Side::Reference),
@@ -173,6 +252,11 @@ impl Report {
                 not_finite,
                 shadow_lookups_not_compared: shadow_lookups,
                 causes: counts(&UvCause::ALL, &agreement.uv_causes),
+                differences_unexplained: agreement.differences_unexplained,
+                groups_missing: agreement.groups_missing,
+                groups_unexpected: agreement.groups_unexpected,
+                means: means.len(),
+                largest_means: means.into_iter().take(LARGEST_MEANS).collect(),
             },
             capture_precision: Samples::new(&agreement.capture),
             specification: Samples::new(&agreement.specification),
@@ -181,6 +265,12 @@ impl Report {
                 .map(|(errors, texture)| Colour::new(texture, errors))
                 .collect(),
         }
+    }
+
+    /// Everything that a correct capture does not have.
+    #[must_use]
+    pub fn failures(&self) -> &[String] {
+        &self.failures
     }
 
     /// Lines for a terminal.
@@ -238,6 +328,18 @@ impl Report {
             if *count > 0 {
                 line(&format!("  {}", cause.told()), count.to_string());
             }
+        }
+        for mean in self.uv_error_texels.largest_means.iter().take(1) {
+            line(
+                "largest signed mean, as part of its bound",
+                format!(
+                    "{:.1} % of {:.6} texels ({}, {})",
+                    100.0 * mean.share(),
+                    mean.bound_texels,
+                    mean.of,
+                    mean.column
+                ),
+            );
         }
         for (name, samples) in [
             ("same LOD formula", &self.capture_precision),

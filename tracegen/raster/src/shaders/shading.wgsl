@@ -4,7 +4,11 @@ fn texture_uv(slot: u32, uv: vec4<f32>) -> vec2<f32> {
     let row0 = material.uv_rows[2u * slot];
     let row1 = material.uv_rows[2u * slot + 1u];
     let chosen = select(uv.xy, uv.zw, row0.w > 0.5);
-    return vec2(inner(row0.xyz, vec3(chosen, 1.0)), inner(row1.xyz, vec3(chosen, 1.0)));
+    // Sums in this order and not dot(), which each of Mesa's compilers expands in an order of its own.
+    return vec2(
+        (row0.x * chosen.x + row0.y * chosen.y) + row0.z,
+        (row1.x * chosen.x + row1.y * chosen.y) + row1.z,
+    );
 }
 
 fn base_color(in: Fragment) -> vec4<f32> {

@@ -1,0 +1,486 @@
+//! What `tracegen verify` reports of a capture with one thing wrong: each column of a record and each field of
+//! the tables. `results/verify-damage.csv` and the table in docs/verify.md hold what the test finds;
+//! `UPDATE_GOLDEN=1` writes both anew.
+
+use formats::textrace::{
+    NO_GROUP, PrimitiveRun, QuadRecord, SUBTEXELS, Tables, Textrace, TextraceWriter, Tile,
+};
+use formats::texture::{ColorSpace, Filter, MipFilter, TexelFormat, Wrap};
+use formats::view::Eye;
+use parallax_tests::{program, root, run_ok};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+const SCENE: &str = "atrium-shadows";
+const BEGIN: &str = "<!-- results/verify-damage.csv -->\n";
+const END: &str = "<!-- end -->\n";
+
+/// A trace in parts.
+#[derive(Clone)]
+struct Trace {
+    tables: Tables,
+    tiles: Vec<Vec<Tile>>,
+}
+
+impl Trace {
+    fn read(path: &Path) -> Self {
+        let trace = Textrace::open(path).expect("a trace");
+        let tables = trace.tables().clone();
+        let tile = |pass, number| {
+            let mut tile = Tile::default();
+            trace.decode_tile(pass, number, &mut tile).expect("a tile");
+            tile
+        };
+        let passes = tables.passes.iter().enumerate();
+        let tiles = passes
+            .map(|(pass, info)| {
+                (0..info.tile_count() as usize)
+                    .map(|n| tile(pass, n))
+                    .collect()
+            })
+            .collect();
+        Self { tables, tiles }
+    }
+
+    fn write(&self, path: &Path) {
+        let mut writer = TextraceWriter::create(path, &self.tables).expect("sound tables");
+        for (pass, tiles) in self.tiles.iter().enumerate() {
+            for (number, tile) in tiles.iter().enumerate() {
+                writer.write_tile(pass, number, tile).expect("a sound tile");
+            }
+        }
+        writer.finish().expect("a file");
+    }
+
+    /// Every record of a material's group.
+    fn each(&mut self, change: impl Fn(&mut QuadRecord)) {
+        let groups = |draw: u32, tables: &Tables| tables.draws[draw as usize].groups.len() - 4;
+        for tile in self.tiles.iter_mut().flatten() {
+            for run in &tile.runs {
+                let of_material = groups(run.draw, &self.tables);
+                let records = &mut tile.records[run.first as usize..][..run.count as usize];
+                let records = records.iter_mut();
+                records
+                    .filter(|r| usize::from(r.group) < of_material)
+                    .for_each(&change);
+            }
+        }
+    }
+
+    /// One record of a material's group, covered whole, in the middle of a picture, alone in its run.
+    fn one(&mut self, change: impl FnOnce(&mut QuadRecord)) {
+        let tables = &self.tables;
+        for tile in self.tiles[0].iter_mut().skip(30) {
+            for run in &tile.runs {
+                let of_material = tables.draws[run.draw as usize].groups.len() - 4;
+                let records = &mut tile.records[run.first as usize..][..run.count as usize];
+                let found = records.iter_mut().find(|r| {
+                    r.mask == 15 && of_material > 0 && r.group == 0 && r.dx[0].abs() > 0 && r.x < 7
+                });
+                if let Some(record) = found {
+                    change(record);
+                    return;
+                }
+            }
+        }
+        panic!("no whole record");
+    }
+
+    /// The last run of a tile, with its last record: covered whole, in a place from which it may move on.
+    fn last_of_run(&mut self, change: impl FnOnce(&mut PrimitiveRun, &mut QuadRecord)) {
+        let draws = &self.tables.draws;
+        for tile in self.tiles[0].iter_mut().skip(10) {
+            let (Some(run), Some(record)) = (tile.runs.last_mut(), tile.records.last_mut()) else {
+                continue;
+            };
+            let draw = &draws[run.draw as usize];
+            let is_last = run.primitive + 1 == draw.first_primitive + draw.primitives;
+            if record.mask == 15 && record.x % 2 == 0 && record.y % 2 == 0 && !is_last {
+                change(run, record);
+                return;
+            }
+        }
+        panic!("no whole record");
+    }
+}
+
+type Change = Box<dyn Fn(&mut Trace)>;
+
+/// A field, what is done to it, and how.
+struct Damage {
+    field: String,
+    what: String,
+    change: Change,
+}
+
+fn damage(field: &str, what: &str, change: impl Fn(&mut Trace) + 'static) -> Damage {
+    Damage {
+        field: field.into(),
+        what: what.into(),
+        change: Box::new(change),
+    }
+}
+
+fn of_tables(field: &str, what: &str, change: impl Fn(&mut Tables) + 'static) -> Damage {
+    damage(field, what, move |trace| change(&mut trace.tables))
+}
+
+/// A pair of a record by name.
+fn pair<'a>(record: &'a mut QuadRecord, name: &str) -> &'a mut [i32; 2] {
+    match name {
+        "uv" => &mut record.uv,
+        "dx" => &mut record.dx,
+        "dy" => &mut record.dy,
+        _ => &mut record.cross,
+    }
+}
+
+/// Steps of 1/2048 texel that every record of a draw's group, or of all draws, is off by when it is reported, and
+/// those of one record alone.
+const STEPS: [(&str, i32, i32); 4] = [
+    ("uv", 32, 256),
+    ("dx", 64, 256),
+    ("dy", 64, 256),
+    ("cross", 64, 256),
+];
+
+fn of_records() -> Vec<Damage> {
+    let mut all = Vec::new();
+    for (name, every, one) in STEPS {
+        for (axis, letter) in ["u", "v"].into_iter().enumerate() {
+            let field = format!("record: {name}, {letter}");
+            let texels = |steps: i32| format!("{steps}/{SUBTEXELS} texel");
+            all.push(damage(
+                &field,
+                &format!("every record + {}", texels(every)),
+                move |trace| trace.each(|r| pair(r, name)[axis] += every),
+            ));
+            all.push(damage(
+                &field,
+                &format!("one record + {}", texels(one)),
+                move |trace| trace.one(|r| pair(r, name)[axis] += one),
+            ));
+        }
+    }
+    all.push(damage(
+        "record: mask",
+        "one lane of one record less",
+        |trace| {
+            trace.one(|r| r.mask = 7);
+        },
+    ));
+    all.push(damage(
+        "record: group",
+        "one record without its group",
+        |trace| {
+            trace.one(|r| {
+                *r = QuadRecord {
+                    x: r.x,
+                    y: r.y,
+                    mask: r.mask,
+                    group: NO_GROUP,
+                    ..QuadRecord::default()
+                };
+            });
+        },
+    ));
+    all.push(damage(
+        "record: x",
+        "one record a quad to the right",
+        |trace| {
+            trace.last_of_run(|_, r| r.x += 1);
+        },
+    ));
+    all.push(damage("record: y", "one record a quad down", |trace| {
+        trace.last_of_run(|_, r| r.y += 1);
+    }));
+    all.push(damage("run: primitive", "one run's + 1", |trace| {
+        trace.last_of_run(|run, _| run.primitive += 1);
+    }));
+    all
+}
+
+fn of_textures() -> Vec<Damage> {
+    vec![
+        of_tables("texture: name", "the next one's", |t| {
+            t.textures[0].name = t.textures[1].name.clone();
+        }),
+        of_tables("texture: width", "+ 4 texels", |t| {
+            t.textures[0].size[0] += 4
+        }),
+        of_tables("texture: height", "+ 1 texel", |t| {
+            t.textures[0].size[1] += 1
+        }),
+        of_tables("texture: mip levels", "- 1", |t| t.textures[0].levels -= 1),
+        of_tables("texture: layers", "+ 1", |t| t.textures[0].layers += 1),
+        of_tables("texture: layers of the shadow maps", "+ 1", |t| {
+            t.textures.last_mut().expect("shadow maps").layers += 1;
+        }),
+        of_tables("texture: format", "BC3 for BC1", |t| {
+            t.textures[0].format = TexelFormat::Bc3;
+        }),
+        of_tables("texture: colour space", "linear for sRGB", |t| {
+            t.textures[0].color_space = ColorSpace::Linear;
+        }),
+        of_tables("texture table", "one more", |t| {
+            let next = t.textures[0].clone();
+            t.textures.push(next);
+        }),
+    ]
+}
+
+fn of_samplers() -> Vec<Damage> {
+    vec![
+        of_tables("sampler: wrap in u", "clamp for repeat", |t| {
+            t.samplers[0].wrap[0] = Wrap::ClampToEdge;
+        }),
+        of_tables("sampler: wrap in v", "mirrored for repeat", |t| {
+            t.samplers[0].wrap[1] = Wrap::MirroredRepeat;
+        }),
+        of_tables("sampler: magnification", "nearest for linear", |t| {
+            t.samplers[0].mag = Filter::Nearest;
+        }),
+        of_tables("sampler: minification", "nearest for linear", |t| {
+            t.samplers[0].min = Filter::Nearest;
+        }),
+        of_tables("sampler: mip filter", "nearest for linear", |t| {
+            t.samplers[0].mip = MipFilter::Nearest;
+        }),
+    ]
+}
+
+/// A draw with a texture.
+fn textured(tables: &mut Tables) -> &mut formats::textrace::Draw {
+    let draw = tables.draws.iter_mut().find(|draw| draw.groups.len() > 4);
+    draw.expect("a draw with a texture")
+}
+
+fn of_draws() -> Vec<Damage> {
+    vec![
+        of_tables("draw: material", "another name", |t| {
+            t.draws[0].material += "?"
+        }),
+        of_tables("draw: primitives", "the last one's - 1", |t| {
+            t.draws.last_mut().expect("a draw").primitives -= 1;
+        }),
+        of_tables("draw table", "one more", |t| {
+            let mut next = t.draws.last().expect("a draw").clone();
+            next.first_primitive += next.primitives;
+            t.draws.push(next);
+        }),
+        of_tables("uv group: extent in u", "+ 1", |t| {
+            textured(t).groups[0].extent[0] += 1
+        }),
+        of_tables("uv group: extent in v", "+ 1", |t| {
+            textured(t).groups[0].extent[1] += 1
+        }),
+        of_tables("uv group: samples", "one more", |t| {
+            let group = &mut textured(t).groups[0];
+            let next = group.samples[0];
+            group.samples.push(next);
+        }),
+        of_tables("sample: texture", "the next one", |t| {
+            textured(t).groups[0].samples[0].texture += 1;
+        }),
+        of_tables("sample: sampler", "the next one", |t| {
+            textured(t).groups[0].samples[0].sampler += 1;
+        }),
+        of_tables("sample: layer of a shadow map", "the next one", |t| {
+            let group = textured(t).groups.len() - 4;
+            textured(t).groups[group].samples[0].layer += 1;
+        }),
+        of_tables("sample: offset in u", "+ 1", |t| {
+            textured(t).groups[0].samples[0].offset[0] += 1;
+        }),
+        of_tables("sample: offset in v", "+ 1", |t| {
+            textured(t).groups[0].samples[0].offset[1] += 1;
+        }),
+    ]
+}
+
+fn of_description() -> Vec<Damage> {
+    let rows = |field: &str, what: &str, change: fn(&mut Tables)| of_tables(field, what, change);
+    vec![
+        rows("META: scene_triangles", "+ 1", |t| {
+            t.meta.scene_triangles += 1
+        }),
+        rows("META: seed", "+ 1", |t| t.meta.seed += 1),
+        rows("META: origin_m", "+ 1 m", |t| t.meta.origin_m[0] += 1.0),
+        rows("META: hmd.fov", "+ 0.0001", |t| {
+            t.meta.hmd.fov[0].left += 1e-4
+        }),
+        rows("META: hmd.ipd_m", "+ 0.1 mm", |t| t.meta.hmd.ipd_m += 1e-4),
+        rows("META: hmd.cant_deg", "+ 0.01 degrees", |t| {
+            t.meta.hmd.cant_deg += 0.01
+        }),
+        rows("META: world_to_eye", "+ 0.0001 in one element", |t| {
+            t.meta.frames[0].eyes[0].world_to_eye[0][0] += 1e-4;
+        }),
+        rows(
+            "META: world_to_eye",
+            "both eyes and positions 1 mm to the side",
+            |t| {
+                for eye in &mut t.meta.frames[0].eyes {
+                    let side = [0, 1, 2].map(|axis| eye.world_to_eye[axis][0]);
+                    eye.world_to_eye[3][0] -= 1e-3;
+                    for (at, side) in eye.position.iter_mut().zip(side) {
+                        *at += 1e-3 * side;
+                    }
+                }
+            },
+        ),
+        rows("META: eye_to_clip", "+ 0.0001 in one element", |t| {
+            t.meta.frames[0].eyes[1].eye_to_clip[1][1] += 1e-4;
+        }),
+        rows("META: position", "+ 0.1 mm", |t| {
+            t.meta.frames[0].eyes[0].position[1] += 1e-4
+        }),
+        rows("META: surfaces.depth_tested", "false for true", |t| {
+            t.meta.surfaces.as_mut().expect("surfaces").depth_tested = false;
+        }),
+        rows("META: surfaces.not_opaque", "draw 0 as well", |t| {
+            let surfaces = t.meta.surfaces.as_mut().expect("surfaces");
+            match surfaces.not_opaque.first_mut() {
+                Some([0, count]) => *count -= 1,
+                _ => surfaces.not_opaque.insert(0, [0, 1]),
+            }
+        }),
+        rows("pass: eye", "both left", |t| {
+            t.passes[1].eye = Some(Eye::Left)
+        }),
+    ]
+}
+
+/// Fields that nothing in a scene can contradict.
+const FREE: [(&str, &str); 6] = [
+    (
+        "META: tool, command_line",
+        "free text: they do not change what is sampled",
+    ),
+    (
+        "META: scene, camera",
+        "names as given: a file may lie anywhere, and an eye needs no camera",
+    ),
+    (
+        "META: backend, driver",
+        "free text that the driver chooses; `--lod` follows from it",
+    ),
+    (
+        "META: hmd.name, hmd.source",
+        "free text: the figures are held against the matrices",
+    ),
+    (
+        "pass, frame, tile and index numbers",
+        "a reader refuses what contradicts the other tables or a checksum",
+    ),
+    (
+        "records of shadow maps, later frames",
+        "not verified (see above)",
+    ),
+];
+
+/// Prepared textures of the scene are kept for the runs of this test.
+fn verify(trace: &Path, cache: &Path) -> (Option<i32>, String) {
+    let mut command = program("tracegen");
+    command.env("PARALLAX_CACHE_SIZE", "1GiB");
+    command.env("PARALLAX_CACHE_DIR", cache);
+    command
+        .args(["verify", SCENE, "--quiet", "--trace"])
+        .arg(trace);
+    let output = command.output().expect("the program starts");
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), errors)
+}
+
+/// The first error without what differs between machines.
+fn first_error(errors: &str) -> String {
+    let line = errors.lines().find(|line| line.contains("error"));
+    let line = line.unwrap_or_default();
+    let text = line.split_once("error: ").map_or(line, |(_, text)| text);
+    // Measured figures differ between drivers: the kind of report is what counts.
+    let mut kind = String::new();
+    for part in text.split_inclusive(": ").take(2) {
+        kind += part;
+    }
+    kind.trim_end_matches(": ").to_owned()
+}
+
+#[test]
+fn each_damage_is_reported() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name: &str| -> PathBuf { folder.path().join(name) };
+    let file = path("sound.textrace");
+    let mut capture = program("tracegen");
+    capture.args(["raster", SCENE, "--no-plain", "--size", "96x112", "-o"]);
+    run_ok(capture.arg(&file));
+    let cache = path("cache");
+    let sound = Trace::read(&file);
+    let (code, errors) = verify(&file, &cache);
+    assert_eq!(code, Some(0), "{errors}");
+    let mut csv = String::from(
+        "# command: UPDATE_GOLDEN=1 cargo test --release --workspace --test verify_damage\nfield,damage,exit code,reported as\n",
+    );
+    let mut table =
+        String::from("| field | damage | exit code | reported as |\n| --- | --- | --- | --- |\n");
+    let mut missed = Vec::new();
+    let damages = [
+        of_records(),
+        of_textures(),
+        of_samplers(),
+        of_draws(),
+        of_description(),
+    ];
+    for Damage {
+        field,
+        what,
+        change,
+    } in damages.into_iter().flatten()
+    {
+        let mut trace = sound.clone();
+        change(&mut trace);
+        let damaged = path("damaged.textrace");
+        trace.write(&damaged);
+        let (code, errors) = verify(&damaged, &cache);
+        assert!(!errors.contains("panicked"), "{field}: {what}: {errors}");
+        let reported = first_error(&errors)
+            .replace(',', ";")
+            .replace(&*damaged.to_string_lossy(), "FILE");
+        if !matches!(code, Some(1 | 2)) {
+            missed.push(format!("{field}: {what}: {errors}"));
+        }
+        let code = code.unwrap_or(-1);
+        let (field, what) = (field.replace(',', ";"), what.replace(',', ";"));
+        writeln!(csv, "{field},{what},{code},{reported}").expect("a string");
+        writeln!(table, "| {field} | {what} | {code} | {reported} |").expect("a string");
+    }
+    assert!(missed.is_empty(), "not reported:\n{}", missed.join("\n"));
+    for (field, why) in FREE {
+        let [field, why] = [field, why].map(|text| text.replace(',', ";"));
+        writeln!(csv, "{field},any,0,not verified: {why}").expect("a string");
+        writeln!(table, "| {field} | any | 0 | not verified: {why} |").expect("a string");
+    }
+    hold(&root().join("results/verify-damage.csv"), &csv, |_| {
+        csv.clone()
+    });
+    hold(&root().join("docs/verify.md"), &table, |text| {
+        let (before, rest) = text.split_once(BEGIN).expect("the table's first mark");
+        let (_, after) = rest.split_once(END).expect("the table's last mark");
+        format!("{before}{BEGIN}{table}{END}{after}")
+    });
+}
+
+/// Holds a file against what it should hold, or writes it.
+fn hold(file: &Path, part: &str, whole: impl Fn(&str) -> String) {
+    let found = std::fs::read_to_string(file).unwrap_or_default();
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        let folder = file.parent().expect("a folder");
+        std::fs::create_dir_all(folder).expect("a folder");
+        std::fs::write(file, whole(&found)).expect("a file");
+        return;
+    }
+    let name = file.display();
+    assert!(
+        found.contains(part),
+        "{name}: expected (UPDATE_GOLDEN=1 writes it)\n{part}"
+    );
+}

@@ -1,0 +1,178 @@
+//! How far single precision may move what a capture records: bounds from the arithmetic, none of them fitted.
+//!
+//! `UNIT` is what one rounding does to a term. A bound is the sum of the roundings on the way of a value, each
+//! times the magnitude of its terms (Higham 2002, chapter 3); docs/verify.md derives them.
+
+use super::geometry::Coordinates;
+use super::piece::Corner;
+use formats::textrace::SUBTEXELS;
+use glam::{DMat4, DVec2, DVec3, DVec4};
+
+/// Half a unit in the last place of 1, what an operation in single precision may be off by.
+pub(super) const UNIT: f64 = f32::EPSILON as f64 / 2.0;
+
+/// Roundings of a clip-space coordinate: three products of a matrix with a vector or matrix, of four products and
+/// three sums each (12), and its place in a region of the picture (4).
+const CLIP_ROUNDINGS: f64 = 16.0;
+
+/// What single precision may make of a vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct VertexError {
+    /// Sums of the magnitudes of the terms of its clip-space coordinates.
+    pub terms: DVec4,
+}
+
+impl VertexError {
+    /// Of a vertex that three matrices transform.
+    pub fn new(matrices: &[DMat4; 3], position: DVec3) -> Self {
+        let magnitudes = |m: &DMat4, v: DVec4| {
+            let columns = [m.x_axis, m.y_axis, m.z_axis, m.w_axis];
+            let terms = columns.into_iter().zip(v.to_array());
+            terms.map(|(column, v)| column.abs() * v).sum::<DVec4>()
+        };
+        let [clip, eye, world] = matrices;
+        let start = position.abs().extend(1.0);
+        Self {
+            terms: magnitudes(clip, magnitudes(eye, magnitudes(world, start))),
+        }
+    }
+
+    /// Of a point between two vertices: how far along is the same for its place and its coordinates.
+    pub fn between(self, other: Self) -> Self {
+        Self {
+            terms: self.terms.max(other.terms),
+        }
+    }
+
+    /// How far it may move on the screen, pixels.
+    pub fn moves_px(&self, clip: DVec4, size_px: [u32; 2], at: DVec2) -> DVec2 {
+        let half = DVec2::new(size_px[0].into(), size_px[1].into()) / 2.0;
+        let ndc = (clip.truncate().truncate() / clip.w).abs();
+        let terms = self.terms.truncate().truncate() + ndc * self.terms.w;
+        UNIT * (half * (CLIP_ROUNDINGS * terms / clip.w.abs() + 3.0 * ndc) + at.abs())
+    }
+
+    /// How far 1/w may be off, as part of it.
+    pub fn inverse_w(&self, clip: DVec4) -> f64 {
+        UNIT * (CLIP_ROUNDINGS * self.terms.w / clip.w.abs() + 2.0)
+    }
+}
+
+/// A plane over the screen that passes through the values of three corners.
+struct Plane {
+    values: [f64; 3],
+    gradient: DVec2,
+}
+
+impl Plane {
+    fn new(corners: &[Corner; 3], values: [f64; 3]) -> Self {
+        let [a, b, c] = corners.each_ref().map(|corner| corner.at);
+        let (ab, ac) = (b - a, c - a);
+        let (fab, fac) = (values[1] - values[0], values[2] - values[0]);
+        let area = ab.perp_dot(ac);
+        Self {
+            values,
+            gradient: DVec2::new(fab * ac.y - fac * ab.y, fac * ab.x - fab * ac.x) / area,
+        }
+    }
+
+    /// Error of its value at a point, as drivers set planes up: gradients from two differences and the area's
+    /// inverse, a value at the screen's corner from the first corner's, and from there to the point.
+    fn error(&self, corners: &[Corner; 3], p: DVec2) -> f64 {
+        let [a, b, c] = corners.each_ref().map(|corner| corner.at);
+        let (ab, ac) = (b - a, c - a);
+        let area = ab.perp_dot(ac).abs();
+        let [f0, f1, f2] = self.values.map(f64::abs);
+        let largest = f0.max(f1).max(f2);
+        let (fab, fac) = (
+            self.values[1] - self.values[0],
+            self.values[2] - self.values[0],
+        );
+        let area_error = 4.0 * ((ab.x * ac.y).abs() + (ab.y * ac.x).abs()) / area + 2.0;
+        let gradient_error = |along: f64, db: f64, dc: f64| {
+            let terms = 4.0 * ((fab * dc).abs() + (fac * db).abs());
+            let values = 4.0 * largest * (db.abs() + dc.abs());
+            (terms + values) / area + along.abs() * area_error
+        };
+        let errors = DVec2::new(
+            gradient_error(self.gradient.x, ab.y, ac.y),
+            gradient_error(self.gradient.y, ab.x, ac.x),
+        );
+        let away = corners.iter().map(|corner| (p - corner.at).abs());
+        let away = away.fold(DVec2::ZERO, DVec2::max);
+        let start = corners.iter().map(|corner| corner.at.abs());
+        let start = start.fold(DVec2::ZERO, DVec2::max);
+        let steps = 4.0 * (largest + self.gradient.abs().dot(start + p.abs()));
+        UNIT * (errors.dot(away) + steps)
+    }
+}
+
+impl Coordinates<'_> {
+    /// How far coordinates at a point of the screen may be off in single precision, in repeats: moved vertices,
+    /// interpolation, the texture's transform, and the record's sums. Infinite where nothing can be said.
+    #[must_use]
+    pub fn single_precision(&self, p: DVec2) -> DVec2 {
+        let corners = self.piece().corners();
+        let set = self.set();
+        let over_w = |values: [f64; 3]| {
+            let corner = |i: usize| values[i] * corners[i].inverse_w;
+            Plane::new(corners, [corner(0), corner(1), corner(2)])
+        };
+        let of_corner = |i: usize| {
+            let w = corners[i].weights;
+            set[0] * w.x + set[1] * w.y + set[2] * w.z
+        };
+        let uv = [of_corner(0), of_corner(1), of_corner(2)];
+        let screen = self.piece().screen_weights(p);
+        let shares = [0, 1, 2].map(|i| screen[i] * corners[i].inverse_w);
+        let below: f64 = shares.iter().sum();
+        if below.is_nan() || below <= 0.0 {
+            return DVec2::INFINITY;
+        }
+        let here = (0..3).map(|i| uv[i] * shares[i]).sum::<DVec2>() / below;
+        let one = over_w([1.0; 3]);
+        let one_error = one.error(corners, p);
+        let mut raw = DVec2::ZERO;
+        let mut by = [DVec2::ZERO; 2];
+        for axis in 0..2 {
+            let above = over_w(uv.map(|uv| uv[axis]));
+            let gradient = (above.gradient - here[axis] * one.gradient) / below;
+            by[axis] = gradient;
+            let interpolated = (above.error(corners, p) + here[axis].abs() * one_error) / below
+                + 3.0 * UNIT * here[axis].abs();
+            let moved: f64 = (0..3)
+                .map(|i| {
+                    let place = screen[i].abs() * gradient.abs().dot(corners[i].moves_px);
+                    let depth = shares[i].abs() / below * corners[i].inverse_w_error;
+                    place + depth * (uv[i][axis] - here[axis]).abs()
+                })
+                .sum();
+            raw[axis] = interpolated + moved;
+        }
+        let rows = self.rows();
+        let transformed = [0, 1].map(|axis: usize| {
+            let DVec3 { x, y, z } = rows[axis];
+            let own = x.abs() * raw.x + y.abs() * raw.y;
+            let value = x.abs() * here.x.abs() + y.abs() * here.y.abs() + z.abs();
+            // By how much they change over the quad.
+            let gradient = (x * by[0] + y * by[1]).abs().element_sum();
+            own + UNIT * (3.0 * value + 8.0 * (value + gradient))
+        });
+        let bound = DVec2::from(transformed);
+        if bound.is_nan() {
+            DVec2::INFINITY
+        } else {
+            bound
+        }
+    }
+}
+
+/// What rounding to the trace's steps may do to a lane of a record, texels of the group: half a step a term.
+pub(super) fn rounding_texels(lane: u32) -> f64 {
+    let terms = match lane {
+        0 => 1.0,
+        1 | 2 => 2.0,
+        _ => 4.0,
+    };
+    terms * 0.5 / f64::from(SUBTEXELS)
+}
