@@ -2,16 +2,16 @@
 //! L2 sets that hold them, and of no others, are a *cluster*, which can be replayed alone and exactly.
 
 use crate::cache::{AnyCache, Cache, Levels};
-use crate::config::{Assign, ConfigError, Order, RunConfig};
+use crate::config::{BetweenFrames, ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::order::{self, Phase};
 use crate::stream::{
-    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave,
+    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, shaded,
 };
 
 /// What is replayed.
 pub struct Part<'a> {
-    /// Frames by number, in this order; caches stay as they are between them.
+    /// Frames by number, in this order; what becomes of the caches between them is the configuration's to say.
     pub frames: &'a [u32],
     /// Work items of the order, by their number since the start.
     pub item: &'a dyn Fn(usize) -> bool,
@@ -80,7 +80,8 @@ pub fn counts(
     part: &Part<'_>,
 ) -> Result<Counts, ReplayError> {
     config.validate()?;
-    let expander = Expander::new(trace, config)?;
+    let shaded = shaded(trace, config.hsr)?;
+    let expander = Expander::new(&shaded, config)?;
     let mut accesses = TraceCounts::new(expander.bins());
     let clusters = cluster_count(config)?;
     let Levels { l1, l2 } = Levels::build(config)?;
@@ -100,6 +101,10 @@ pub fn counts(
     let mut index = 0;
     for &number in part.frames {
         let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+        if config.between_frames == BetweenFrames::Flush {
+            counting.l1.iter_mut().for_each(Cache::clear);
+            counting.l2.clear();
+        }
         let frame = expander.frame(number, &memory, &mut accesses)?;
         let mut keep = |phase: Phase| -> Phase {
             let kept = phase.into_iter().filter(|_| {
@@ -112,7 +117,7 @@ pub fn counts(
         let phases: Vec<Phase> = plan.into_iter().map(&mut keep).collect();
         let before: u64 = counting.counts.by_cluster.iter().sum();
         let mut cores = Cores::new(&frame, config.cores as usize);
-        interleave(&mut cores, &phases, Assign::FirstIdle, &mut counting)?;
+        interleave(&mut cores, &phases, config.assign, &mut counting)?;
         let after: u64 = counting.counts.by_cluster.iter().sum();
         counting.counts.by_frame.push(after - before);
     }
@@ -137,9 +142,77 @@ pub fn frames(trace: &dyn TileSource) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{CacheConfig, Mode};
+    use crate::config::{Assign, CacheConfig, Hsr, Mode};
     use crate::engine::replay;
     use crate::stream::synthetic::Synthetic;
+    use formats::textrace::{Pass, Surfaces};
+
+    /// Every option that moves which lines a functional replay misses moves the sample as well.
+    #[test]
+    fn samples_follow_assignment_flushing_and_hidden_surface_removal() {
+        let mut trace = Synthetic {
+            size_px: [96, 96],
+            patch_px: 24,
+            layers: 2,
+            materials: 4,
+            ..Synthetic::default()
+        }
+        .generate();
+        trace.tables.meta.surfaces = Some(Surfaces {
+            depth_tested: true,
+            not_opaque: Vec::new(),
+        });
+        let (passes, tiles) = (trace.tables.passes.clone(), trace.tiles.clone());
+        for frame in 1..3 {
+            let again = passes.iter().map(|pass| Pass { frame, ..*pass });
+            trace.tables.passes.extend(again);
+            trace.tiles.extend(tiles.iter().cloned());
+        }
+        let plain = RunConfig {
+            mode: Mode::Functional,
+            l1: CacheConfig::lru(2 << 10),
+            l2: CacheConfig::lru(64 << 10),
+            ..RunConfig::default()
+        };
+        let variants = [
+            RunConfig {
+                assign: Assign::Static,
+                ..plain
+            },
+            RunConfig {
+                between_frames: BetweenFrames::Flush,
+                ..plain
+            },
+            RunConfig {
+                hsr: Hsr::Deferred,
+                ..plain
+            },
+        ];
+        let sampled = |config: &RunConfig| {
+            let found = counts(
+                &trace,
+                config,
+                Order::MORTON,
+                &Part::frames(&frames(&trace)),
+            );
+            let found = found.unwrap();
+            let footprints = found.by_tile.iter().map(|tile| tile.1).sum::<u64>();
+            (found.by_cluster.iter().sum::<u64>(), footprints)
+        };
+        for config in variants {
+            let config = RunConfig {
+                order: Order::MORTON,
+                ..config
+            };
+            let expected = replay(&trace, &config).unwrap();
+            assert_eq!(sampled(&config), (expected.l2.misses, expected.footprints));
+            assert_ne!(
+                sampled(&config),
+                sampled(&plain),
+                "the option has no effect here"
+            );
+        }
+    }
 
     #[test]
     fn clusters_and_tiles_add_up_to_the_functional_replay() {
