@@ -3,7 +3,7 @@
 use super::figures::Figures;
 use super::place::Place;
 use super::profile::{Profile, StreamCache, check_size};
-use crate::config::{ConfigError, Order, RunConfig};
+use crate::config::{BetweenFrames, CacheConfig, ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::order::{self, Phase};
 use crate::stream::{
@@ -146,6 +146,9 @@ pub fn analyse(
                     None => Analysis::new(config, merged)?,
                 };
                 let places = Places::new(passes, number, &phases, expander.bins().first_tiles());
+                if config.between_frames == BetweenFrames::Flush {
+                    analysis.flush()?;
+                }
                 analysis.begin_frame(places);
                 let mut cores = Cores::new(&frame, config.cores as usize);
                 interleave(&mut cores, &phases, config.assign, &mut analysis)?;
@@ -221,6 +224,16 @@ struct Analysis {
     l2: Shared,
     merged: Option<Shared>,
     places: Option<Places>,
+    /// Figures of what was asked for before the caches were emptied last.
+    flushed: Vec<(Stream, Figures)>,
+}
+
+/// Adds figures to those of their stream.
+fn add(streams: &mut Vec<(Stream, Figures)>, stream: Stream, figures: Figures) {
+    match streams.iter_mut().find(|(of, _)| *of == stream) {
+        Some((_, sum)) => sum.add(&figures),
+        None => streams.push((stream, figures)),
+    }
 }
 
 /// A core's analysis, and where the core is.
@@ -250,9 +263,9 @@ impl Shared {
 impl Analysis {
     fn new(config: &RunConfig, merged: bool) -> Result<Self, ConfigError> {
         // Seeds as in a replay.
-        let profile = |level: &'static str, cache, number: u32| {
+        let profile = |level: &'static str, cache: &CacheConfig, number: u32| {
             Profile::new(StreamCache {
-                cache,
+                cache: *cache,
                 level,
                 line_bytes: config.line_bytes,
                 seed: config.seed.wrapping_add(number.into()),
@@ -275,7 +288,23 @@ impl Analysis {
             l2: shared(profile("L2", &config.l2, 0)?),
             merged: merged.map(shared),
             places: None,
+            flushed: Vec::new(),
         })
+    }
+
+    /// Empties all caches, unless nothing was asked for yet.
+    fn flush(&mut self) -> Result<(), ConfigError> {
+        if self.places.is_none() {
+            return Ok(());
+        }
+        for core in &mut self.l1 {
+            add(&mut self.flushed, Stream::L1, core.profile.flush()?);
+        }
+        add(&mut self.flushed, Stream::L2, self.l2.profile.flush()?);
+        if let Some(merged) = &mut self.merged {
+            add(&mut self.flushed, Stream::Merged, merged.profile.flush()?);
+        }
+        Ok(())
     }
 
     fn begin_frame(&mut self, places: Places) {
@@ -294,16 +323,14 @@ impl Analysis {
     }
 
     fn finish(self, order: Order) -> OrderFigures {
-        let mut l1 = Figures::default();
-        for (number, core) in self.l1.into_iter().enumerate() {
-            match number {
-                0 => l1 = core.profile.finish(),
-                _ => l1.add(&core.profile.finish()),
-            }
+        let mut streams = self.flushed;
+        for core in self.l1 {
+            add(&mut streams, Stream::L1, core.profile.finish());
         }
-        let mut streams = vec![(Stream::L1, l1), (Stream::L2, self.l2.profile.finish())];
-        let merged = self.merged.map(|shared| shared.profile.finish());
-        streams.extend(merged.map(|figures| (Stream::Merged, figures)));
+        add(&mut streams, Stream::L2, self.l2.profile.finish());
+        if let Some(merged) = self.merged {
+            add(&mut streams, Stream::Merged, merged.profile.finish());
+        }
         OrderFigures {
             order: Sequence::Order(order),
             streams,

@@ -24,7 +24,7 @@ impl Level {
         number: u64,
     ) -> Result<Self, ConfigError> {
         let profile = Profile::new(StreamCache {
-            cache,
+            cache: *cache,
             level,
             line_bytes: config.line_bytes,
             // As in a replay.

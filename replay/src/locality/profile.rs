@@ -19,9 +19,9 @@ use crate::config::{CacheConfig, ConfigError, RunConfig};
 
 /// The cache that a stream goes to.
 #[derive(Clone, Copy, Debug)]
-pub struct StreamCache<'a> {
+pub struct StreamCache {
     /// Size, ways and policy.
-    pub cache: &'a CacheConfig,
+    pub cache: CacheConfig,
     /// `L1` or `L2`, for errors.
     pub level: &'static str,
     /// Bytes of a line.
@@ -63,6 +63,7 @@ const FIRST_AXIS: u32 = 1 << 16;
 
 /// An analysis under way. Tell it the place, then every line asked for there.
 pub struct Profile {
+    of: StreamCache,
     cache: Box<dyn Cache>,
     /// Capacity of the cache in lines.
     lines: u32,
@@ -104,12 +105,12 @@ impl Profile {
     ///
     /// # Errors
     /// A cache that cannot be built.
-    pub fn new(of: StreamCache<'_>) -> Result<Self, ConfigError> {
+    pub fn new(of: StreamCache) -> Result<Self, ConfigError> {
         Self::with_axis(of, FIRST_AXIS)
     }
 
     /// An analysis whose first axis has so many times, a multiple of 64.
-    pub(super) fn with_axis(of: StreamCache<'_>, times: u32) -> Result<Self, ConfigError> {
+    pub(super) fn with_axis(of: StreamCache, times: u32) -> Result<Self, ConfigError> {
         let sets = of.cache.sets(of.level, of.line_bytes)?;
         let ways = of.cache.ways;
         let lines = sets * ways;
@@ -133,7 +134,8 @@ impl Profile {
         });
         let opt = sizes.iter();
         Ok(Self {
-            cache: AnyCache::build(of.cache, of.level, of.line_bytes, of.seed)?.into_box(),
+            of,
+            cache: AnyCache::build(&of.cache, of.level, of.line_bytes, of.seed)?.into_box(),
             lines,
             here: TileOfEye::NONE,
             item: None,
@@ -158,6 +160,20 @@ impl Profile {
             frame_lines_of_both_eyes: 0,
             frame_lines_of_earlier_frames: 0,
         })
+    }
+
+    /// Empties all caches and returns the figures of what was asked for until then. What follows is
+    /// analysed as a stream of its own. The configured cache stays the same one, since random
+    /// replacement goes on with its numbers.
+    ///
+    /// # Errors
+    /// A cache that cannot be built.
+    pub fn flush(&mut self) -> Result<Figures, ConfigError> {
+        let next = Self::with_axis(self.of, self.times)?;
+        let mut last = std::mem::replace(self, next);
+        std::mem::swap(&mut self.cache, &mut last.cache);
+        self.cache.clear();
+        Ok(last.finish())
     }
 
     /// A frame begins. Caches keep what they hold.

@@ -3,9 +3,11 @@
 mod plain;
 
 use super::*;
-use crate::config::{CacheConfig, Order, Replacement, RunConfig};
+use crate::config::{BetweenFrames, CacheConfig, Mode, Order, Replacement, RunConfig};
 use crate::engine::replay;
+use crate::stream::MemoryTrace;
 use crate::stream::synthetic::Synthetic;
+use formats::textrace::Pass;
 use formats::view::Eye;
 use proptest::prelude::*;
 
@@ -74,9 +76,9 @@ fn geometries() -> impl Strategy<Value = CacheConfig> {
         })
 }
 
-fn of(cache: &CacheConfig) -> StreamCache<'_> {
+fn of(cache: &CacheConfig) -> StreamCache {
     StreamCache {
-        cache,
+        cache: *cache,
         level: "L1",
         line_bytes: 16,
         seed: 3,
@@ -223,6 +225,65 @@ fn misses_are_those_of_a_replay() {
             let (_, merged) = &of_order.streams[2];
             assert_eq!(merged.unique_lines, result.unique_lines);
             assert_eq!(of_order.streams[1].1.unique_lines, result.unique_lines);
+        }
+    }
+}
+
+/// The first frame again, so many times.
+fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
+    let mut out = trace.clone();
+    for frame in 1..frames {
+        let again = trace.tables.passes.iter();
+        out.tables
+            .passes
+            .extend(again.map(|pass| Pass { frame, ..*pass }));
+        out.tiles.extend(trace.tiles.iter().cloned());
+    }
+    out
+}
+
+#[test]
+fn caches_that_are_emptied_between_frames_find_in_each_frame_what_they_find_in_it_alone() {
+    let one = Synthetic {
+        size_px: [64, 48],
+        patch_px: 16,
+        ..Synthetic::default()
+    }
+    .generate();
+    let three = repeated(&one, 3);
+    let orders = [Order::MORTON, Order::Z2_STA];
+    for replacement in [Replacement::LRU, Replacement::RANDOM] {
+        let cache = |size_bytes| CacheConfig {
+            replacement,
+            ..CacheConfig::lru(size_bytes)
+        };
+        let config = RunConfig {
+            mode: Mode::Functional,
+            between_frames: BetweenFrames::Flush,
+            l1: cache(2 << 10),
+            l2: cache(16 << 10),
+            ..RunConfig::default()
+        };
+        let of = |trace: &MemoryTrace| analyse(trace, &config, &orders, true, &|_| ()).unwrap();
+        for (single, flushed) in of(&one).iter().zip(of(&three)) {
+            let Sequence::Order(order) = flushed.order else {
+                panic!("traces are analysed in tile orders");
+            };
+            let result = replay(&three, &RunConfig { order, ..config }).unwrap();
+            let levels = [&result.l1, &result.l2];
+            for ((_, figures), level) in flushed.streams.iter().zip(levels) {
+                assert_eq!(figures.accesses, level.counters.line_lookups);
+                assert_eq!(figures.split.misses(), level.counters.line_misses);
+            }
+            if replacement != Replacement::LRU {
+                continue;
+            }
+            for ((_, alone), (_, figures)) in single.streams.iter().zip(&flushed.streams) {
+                let mut expected = alone.clone();
+                expected.add(alone);
+                expected.add(alone);
+                assert_eq!(*figures, expected);
+            }
         }
     }
 }

@@ -91,8 +91,8 @@ pub fn opt(lines: &[u32], sets: u32, ways: u32) -> Vec<bool> {
 }
 
 /// Hits of the configured cache.
-pub fn policy(lines: &[u32], of: StreamCache<'_>) -> Vec<bool> {
-    let cache = AnyCache::build(of.cache, of.level, of.line_bytes, of.seed);
+pub fn policy(lines: &[u32], of: StreamCache) -> Vec<bool> {
+    let cache = AnyCache::build(&of.cache, of.level, of.line_bytes, of.seed);
     let mut cache = cache.unwrap().into_box();
     lines.iter().map(|&line| cache.access(line)).collect()
 }
