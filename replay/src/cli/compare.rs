@@ -55,7 +55,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let traces = Traces::open(&[args.a.clone(), args.b.clone()])?;
     let subjects = traces.subjects();
     let [a, b] = [&subjects[0], &subjects[1]];
-    let comparison = compare([a.source, b.source], &config.sampling)
+    let comparison = compare([a.source, b.source], &config)
         .with_context(|| format!("{} and {}", args.a.display(), args.b.display()))?;
     let name = |order: &Order| Value::String(order.name().to_owned());
     let axis = Axis {

@@ -16,9 +16,9 @@ pub use fault::NotComparable;
 pub use spread::Spread;
 pub use tally::Tally;
 
-use crate::config::SamplingConfig;
+use crate::config::RunConfig;
 use crate::order::TileRef;
-use crate::stream::{StreamError, TileSource};
+use crate::stream::{StreamError, TileSource, shaded};
 use formats::textrace::Tables;
 use partners::Partners;
 use rayon::prelude::*;
@@ -69,18 +69,23 @@ pub fn comparable(tables: [&Tables; 2]) -> Result<(), NotComparable> {
     Partners::new(tables).map(drop)
 }
 
-/// Holds two captures against each other under one sampling.
+/// Compares what a replay of two captures shades: their fragments after the configuration's
+/// hidden-surface removal, sampled as it says.
 ///
 /// # Errors
-/// Captures that do not show the same views of the same textured triangles; a tile that cannot be
-/// read.
+/// Captures that do not show the same views of the same textured triangles; a removal that a trace
+/// does not hold the fragments for; a tile that cannot be read.
 pub fn compare(
     traces: [&dyn TileSource; 2],
-    sampling: &SamplingConfig,
+    config: &RunConfig,
 ) -> Result<Comparison, CompareError> {
     /// Tiles that a thread compares at a time.
     const CHUNK: usize = 64;
     let partners = Partners::new(traces.map(TileSource::tables))?;
+    let [a, b] = traces;
+    let shaded = [shaded(a, config.hsr)?, shaded(b, config.hsr)?];
+    let traces = shaded.each_ref().map(|trace| trace as &dyn TileSource);
+    let sampling = &config.sampling;
     let passes = &traces[0].tables().passes;
     let tiles: Vec<TileRef> = (0..)
         .zip(passes)

@@ -1,9 +1,11 @@
 //! An altered capture whose differences are known exactly.
 
 use super::*;
+use crate::config::{Hsr, Mode};
+use crate::engine::replay;
 use crate::stream::MemoryTrace;
 use crate::stream::synthetic::Synthetic;
-use formats::textrace::SUBTEXELS;
+use formats::textrace::{SUBTEXELS, Surfaces};
 
 fn small() -> MemoryTrace {
     Synthetic {
@@ -18,14 +20,14 @@ fn small() -> MemoryTrace {
 }
 
 fn compared(a: &MemoryTrace, b: &MemoryTrace) -> Comparison {
-    compare([a, b], &SamplingConfig::default()).unwrap()
+    compare([a, b], &RunConfig::default()).unwrap()
 }
 
 fn refused(change: impl FnOnce(&mut MemoryTrace)) -> String {
     let a = small();
     let mut b = a.clone();
     change(&mut b);
-    let error = compare([&a, &b], &SamplingConfig::default()).unwrap_err();
+    let error = compare([&a, &b], &RunConfig::default()).unwrap_err();
     error.to_string()
 }
 
@@ -61,6 +63,50 @@ fn a_capture_does_not_differ_from_itself() {
     assert_eq!(differences, [0; 5]);
     assert_eq!(found.all.uv_texels.largest(), 0.0);
     assert_eq!(found.all.intersection_over_union_pct(), 100.0);
+}
+
+#[test]
+fn fragments_are_those_that_a_replay_with_the_same_removal_shades() {
+    let mut trace = small();
+    trace.tables.meta.surfaces = Some(Surfaces {
+        depth_tested: true,
+        not_opaque: Vec::new(),
+    });
+    let mut hidden = trace.clone();
+    let (tile, record) = hidden_quad(&hidden);
+    hidden.tiles[1][tile].records[record].uv[0] += 5 * SUBTEXELS;
+    let with = |hsr| {
+        let config = RunConfig {
+            hsr,
+            mode: Mode::Functional,
+            ..RunConfig::default()
+        };
+        let found = compare([&trace, &hidden], &config).unwrap().all;
+        let replayed = replay(&trace, &config).unwrap().lanes;
+        assert_eq!(found.fragments_in_both, replayed);
+        found
+    };
+    let (all, seen) = (with(Hsr::EarlyZ), with(Hsr::Deferred));
+    assert!(seen.fragments_in_both < all.fragments_in_both);
+    // What lies behind another opaque fragment is shaded by neither replay.
+    assert_eq!(
+        (all.uv_texels.largest(), seen.uv_texels.largest()),
+        (5.0, 0.0)
+    );
+}
+
+/// A quad of the right eye that a later one covers: its tile and its record.
+fn hidden_quad(trace: &MemoryTrace) -> (usize, usize) {
+    let find = |(tile, t): (usize, &formats::textrace::Tile)| {
+        let covered = |at: usize| {
+            let own = &t.records[at];
+            let mut later = t.records[at + 1..].iter();
+            own.mask == 15 && later.any(|r| (r.x, r.y, r.mask) == (own.x, own.y, 15))
+        };
+        let record = (0..t.records.len()).find(|&at| covered(at))?;
+        Some((tile, record))
+    };
+    trace.tiles[1].iter().enumerate().find_map(find).unwrap()
 }
 
 #[test]
