@@ -8,21 +8,21 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tempfile::{NamedTempFile, TempPath};
 
-/// Temporary files that a signal handler has to remove. Files are made, renamed and removed with
+/// Temporary files and folders that a signal handler has to remove. They are made, renamed and removed with
 /// the lock held, so that none is missed.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+pub(super) fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every unfinished file of this process, which has to end after it: no output can be
+/// Removes every unfinished file and folder of this process, which has to end after it: no output can be
 /// started or finished any more, and threads that try to wait forever.
 pub fn discard_unfinished() {
     let files = unfinished();
     for file in &*files {
         // Whatever cannot be removed now cannot be helped.
-        let _gone = fs::remove_file(file);
+        let _gone = fs::remove_file(file).or_else(|_| fs::remove_dir_all(file));
     }
     std::mem::forget(files);
 }
@@ -48,7 +48,7 @@ pub struct AtomicFile {
 
 /// An entry of [`UNFINISHED`].
 #[derive(Debug)]
-struct Listed(PathBuf);
+pub(super) struct Listed(pub PathBuf);
 
 impl Drop for Listed {
     fn drop(&mut self) {

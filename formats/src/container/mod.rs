@@ -7,6 +7,7 @@
 mod atomic;
 mod header;
 mod reader;
+mod scratch;
 mod writer;
 
 pub use atomic::{
@@ -14,6 +15,7 @@ pub use atomic::{
 };
 pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 pub use reader::Container;
+pub use scratch::ScratchFolder;
 pub use writer::ContainerWriter;
 
 use std::fmt;

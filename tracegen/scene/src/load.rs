@@ -5,6 +5,9 @@ use crate::files::{check_regular, shown};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
+/// Largest extent of a scene along an axis, metres: cubes of lengths must stay within single precision.
+const MAX_EXTENT_M: f32 = 1e12;
+
 /// Loads a glTF or OBJ file and completes it as [`complete`] does.
 ///
 /// # Errors
@@ -37,6 +40,17 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
             place: "scene".into(),
             expected: "at least one triangle".into(),
             found: "none".into(),
+        });
+    }
+    let bounds = loaded.scene.bounds();
+    let extent_m = bounds.map_or(0.0, |(low, high)| (high - low).max_element());
+    // Not a number where both ends are infinite.
+    if !(extent_m <= MAX_EXTENT_M) {
+        return Err(SceneError::Invalid {
+            file: path.to_owned(),
+            place: "positions".into(),
+            expected: format!("a scene of at most {MAX_EXTENT_M:e} m along each axis"),
+            found: format!("{extent_m:e} m"),
         });
     }
     make_names_printable(&mut loaded.scene);
@@ -84,6 +98,24 @@ fn make_names_printable(scene: &mut Scene) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_scene_whose_lengths_leave_single_precision_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("far.obj");
+        let load = |extent: &str| {
+            let text = format!("v 0 0 0\nv {extent} 0 0\nv 0 1 0\nf 1 2 3\n");
+            std::fs::write(&file, text).unwrap();
+            load_file(&file, &LoadOptions::ALL)
+        };
+        let camera = load("9e11").unwrap().scene.cameras[0].clone();
+        assert!(camera.eye.is_finite() && camera.far.is_finite());
+        for extent in ["1.1e12", "1e30", "3e38"] {
+            let error = load(extent).unwrap_err().to_string();
+            let parts = ["far.obj: positions", "at most 1e12 m", "found"];
+            assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+        }
+    }
 
     #[test]
     fn cameras_of_one_name_are_numbered() {

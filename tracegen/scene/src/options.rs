@@ -1,6 +1,7 @@
 //! What a loader is asked for and what it hands over.
 
 use crate::Scene;
+use std::path::PathBuf;
 
 /// What a loader reads besides geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,4 +29,6 @@ pub struct Loaded {
     pub scene: Scene,
     /// One sentence each; nothing here stops the scene from being used.
     pub warnings: Vec<String>,
+    /// Every file that the scene refers to, read or not, its own first; none for a built-in scene.
+    pub files: Vec<PathBuf>,
 }

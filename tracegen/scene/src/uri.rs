@@ -26,9 +26,12 @@ pub(crate) fn parse(uri: &str) -> Result<Uri, String> {
         return Err(format!("a URI of scheme '{scheme}'"));
     }
     let bytes = percent_decode(uri)?;
-    String::from_utf8(bytes)
-        .map(Uri::Path)
-        .map_err(|_| "a path that is not UTF-8".to_owned())
+    let path = String::from_utf8(bytes).map_err(|_| "a path that is not UTF-8".to_owned())?;
+    // glTF 2.0, section 2.8: references are relative, so that a scene's folder can be moved.
+    if path.starts_with(['/', '\\']) || path.get(1..2) == Some(":") {
+        return Err(format!("the absolute path '{path}'"));
+    }
+    Ok(Uri::Path(path))
 }
 
 fn percent_decode(text: &str) -> Result<Vec<u8>, String> {
@@ -106,6 +109,9 @@ mod tests {
             ("data:;base64", "without a comma"),
             ("data:;base64,a*b", "0x2a"),
             ("%FF", "not UTF-8"),
+            ("/etc/hostname", "absolute path '/etc/hostname'"),
+            ("%2Fetc/hostname", "absolute path"),
+            ("C:/textures/a.png", "absolute path"),
         ] {
             let error = parse(uri).unwrap_err();
             assert!(error.contains(part), "{uri}: {error}");

@@ -201,8 +201,11 @@ pub fn load_with(spec: &str, options: &LoadOptions) -> Result<Loaded, SceneError
         if options.slots != LoadOptions::ALL.slots {
             scene.keep_texture_slots(options.slots);
         }
-        let warnings = Vec::new();
-        return Ok(Loaded { scene, warnings });
+        return Ok(Loaded {
+            scene,
+            warnings: Vec::new(),
+            files: Vec::new(),
+        });
     }
     scene::load_file(Path::new(spec), options).map_err(|error| match error {
         SceneError::Unknown { spec, .. } => {

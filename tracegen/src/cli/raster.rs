@@ -3,7 +3,7 @@
 use super::cache_args::CacheArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::raster_summary::{Summary, worked_since};
-use super::scene_args::{SceneArgs, SceneSetup};
+use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
 use super::technique_args::TechniqueArgs;
 use crate::doubtful::Doubtful;
 use crate::picture;
@@ -225,8 +225,8 @@ impl RasterArgs {
 pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     prepare_environment(args.threads.count);
     args.threads.start()?;
-    args.scene
-        .check_outputs(&args.output, args.image.as_deref())?;
+    let outputs = capture_outputs(&args.output, args.image.as_deref());
+    args.scene.check_outputs(&args.path, &outputs)?;
     if args.hsr == Hsr::None {
         args.check_without_depth_test()?;
     }
@@ -234,7 +234,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         args.check_plain_frames()?;
     }
     if let Some(budget) = args.auto {
-        return super::raster_auto::run(args, budget);
+        return super::raster_auto::run(args, budget, &outputs);
     }
     let started = Instant::now();
     let cache = args.cache.open()?;
@@ -242,6 +242,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let setup = args
         .scene
         .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
+    setup.check_outputs(&outputs)?;
     let loaded = started.elapsed();
     let cascades = cascades(&setup.scene, args.shadows);
     progress.stage("preparing textures and shaders", 0, "");

@@ -10,18 +10,19 @@ use anyhow::Context;
 use formats::textrace::TextraceWriter;
 use record::CaptureCounts;
 use scene::LoadOptions;
-use shell::{Progress, note};
+use shell::{Output, Progress, note};
 use visibility::Occlusion;
 
 /// Chooses, and captures each frame of the path with what holds the budget there.
 ///
 /// # Errors
 /// Unreadable input, no driver, a budget that nothing meets, or a file that cannot be written.
-pub fn run(args: &RasterArgs, budget: Budget) -> anyhow::Result<()> {
+pub fn run(args: &RasterArgs, budget: Budget, outputs: &[Output]) -> anyhow::Result<()> {
     let progress = Progress::new("loading the scene", 0, "");
     let setup = args
         .scene
         .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
+    setup.check_outputs(outputs)?;
     let sizes = [
         cascades(&setup.scene, args.shadows).into(),
         args.record_budget,

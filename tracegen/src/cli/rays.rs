@@ -1,7 +1,7 @@
 //! `tracegen rays`.
 
 use super::path_args::PathArgs;
-use super::scene_args::{SceneArgs, SceneSetup};
+use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use formats::container::AtomicFile;
@@ -84,8 +84,8 @@ impl RaysArgs {
 /// Unreadable input or wrong use.
 pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     args.threads.start()?;
-    args.scene
-        .check_outputs(&args.output, args.image.as_deref())?;
+    let outputs = capture_outputs(&args.output, args.image.as_deref());
+    args.scene.check_outputs(&args.path, &outputs)?;
     let start = Instant::now();
     let progress = Progress::new("loading the scene", 0, "");
     let textures = LoadOptions {
@@ -96,6 +96,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
         let frames = args.frame..args.frame + 1;
         (args.scene).setup(Some(DEFAULT_SIZE_PX), &args.path, frames, &textures)?
     };
+    setup.check_outputs(&outputs)?;
     let loaded = start.elapsed();
     progress.stage("building the hierarchy", 0, "");
     let (camera, bounds, world) = (
@@ -131,6 +132,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
         hmd,
         frames,
         moments,
+        ..
     } = setup;
     scene.pose(moments.time_s(moments.frames.start));
     let (scene_triangles, scene_origin) = (scene.triangle_count(), scene.origin);

@@ -9,7 +9,7 @@ use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd};
 use scenes::load_with;
 use shell::Output;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Scene, camera and display of a capture.
 #[derive(Args, Clone, Debug)]
@@ -25,6 +25,14 @@ pub struct SceneArgs {
     pub hmd: HmdArgs,
 }
 
+/// A capture's outputs: the trace and perhaps a picture.
+#[must_use]
+pub fn capture_outputs(trace: &Path, image: Option<&Path>) -> Vec<Output> {
+    let mut outputs = vec![Output::binary("--output", trace)];
+    outputs.extend(image.map(|image| Output::binary("--image", image)));
+    outputs
+}
+
 /// Everything that a capture needs to know about its scene and views.
 #[derive(Debug)]
 pub struct SceneSetup {
@@ -38,19 +46,22 @@ pub struct SceneSetup {
     pub frames: Vec<FrameViews>,
     /// When the frames are.
     pub moments: Moments,
+    /// Every file that scene and path were read from or refer to.
+    pub inputs: Vec<PathBuf>,
 }
 
 impl SceneArgs {
-    /// Checks trace and picture before the work, see [`shell::check_outputs`].
+    /// Checks outputs before minutes go into loading the scene, as far as its arguments tell; see
+    /// [`SceneSetup::check_outputs`] for the rest.
     ///
     /// # Errors
-    /// One that cannot be written, or that would replace the scene or the other.
-    pub fn check_outputs(&self, trace: &Path, image: Option<&Path>) -> anyhow::Result<()> {
-        let mut outputs = vec![Output::binary("--output", trace)];
-        outputs.extend(image.map(|image| Output::binary("--image", image)));
+    /// One that cannot be written, or that would replace the scene, the path or another.
+    pub fn check_outputs(&self, path: &PathArgs, outputs: &[Output]) -> anyhow::Result<()> {
         // The names of built-in scenes have no extension and name no file.
         let scene = Path::new(&self.scene);
-        shell::check_outputs(&outputs, scene.extension().map(|_| scene))?;
+        let path = path.file();
+        let inputs = scene.extension().map(|_| scene).into_iter();
+        shell::check_outputs(outputs, inputs.chain(path.as_deref()))?;
         Ok(())
     }
 
@@ -71,8 +82,10 @@ impl SceneArgs {
         // Flags that need no scene are checked before minutes go into loading one.
         self.hmd.resolve(default_size_px, None)?;
         self.camera.validate_alone()?;
+        let path_file = path.file();
         let (path, moments) = path.open(frames)?;
-        let scene = load_scene(&self.scene, options)?;
+        let (scene, mut inputs) = load_scene(&self.scene, options)?;
+        inputs.extend(path_file);
         let path = path.relative_to(scene.origin);
         let camera = self.camera.resolve(&scene)?;
         let vfov_deg = match self.camera.vfov {
@@ -91,7 +104,19 @@ impl SceneArgs {
             hmd,
             frames,
             moments,
+            inputs,
         })
+    }
+}
+
+impl SceneSetup {
+    /// Checks a command's outputs against every file that scene and path refer to, which only loading them tells.
+    ///
+    /// # Errors
+    /// See [`shell::check_outputs`].
+    pub fn check_outputs(&self, outputs: &[Output]) -> anyhow::Result<()> {
+        shell::check_outputs(outputs, self.inputs.iter().map(PathBuf::as_path))?;
+        Ok(())
     }
 }
 
@@ -109,16 +134,20 @@ fn warn_of_coarse_places(camera: &Camera, frames: &[FrameViews], origin: DVec3) 
     }
 }
 
-/// Loads a scene and prints its warnings on stderr.
+/// Loads a scene, with the files that it refers to, and prints its warnings on stderr.
 ///
 /// # Errors
 /// An unreadable scene.
-pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<Scene> {
-    let Loaded { scene, warnings } = load_with(spec, options)?;
+pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<(Scene, Vec<PathBuf>)> {
+    let Loaded {
+        scene,
+        warnings,
+        files,
+    } = load_with(spec, options)?;
     for warning in &warnings {
         shell::warn(&format!("{spec}: {warning}"));
     }
-    Ok(scene)
+    Ok((scene, files))
 }
 
 /// Warns of a picture without any part of the scene; coordinates are relative to `origin`.

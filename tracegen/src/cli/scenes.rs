@@ -90,7 +90,7 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
                     read_textures(&spec, cache.as_ref())?
                 }
             } else {
-                describe(&load_scene(&spec, &LoadOptions::ALL)?)
+                describe(&load_scene(&spec, &LoadOptions::ALL)?.0)
             };
             if args.json {
                 json(&description)?
@@ -105,7 +105,7 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
 /// Loads and compresses everything; how long that took goes to stderr.
 fn read_textures(spec: &str, cache: Option<&Cache>) -> anyhow::Result<Description> {
     let start = Instant::now();
-    let scene = load_scene(spec, &LoadOptions::ALL)?;
+    let (scene, _) = load_scene(spec, &LoadOptions::ALL)?;
     let loaded = start.elapsed();
     let set = TextureSet::prepare(&scene, |_| Some(0), cache)?;
     for note in &set.notes {

@@ -3,14 +3,15 @@
 use crate::stress::{self, SWEEPS};
 use anyhow::Context;
 use clap::Args;
-use shell::Progress;
+use formats::container::{AtomicFile, ScratchFolder};
+use shell::{Output, Progress};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Arguments of `tracegen stress`.
 #[derive(Args, Debug)]
 pub struct StressArgs {
-    /// Folder for stress.json, stress.md and scratch files.
+    /// Folder for stress.json and stress.md; what else it holds stays as it is.
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     /// Sweeps to run, separated by commas [default: all].
@@ -31,22 +32,30 @@ fn names() -> clap::builder::PossibleValuesParser {
 /// A folder that cannot be written.
 pub fn run(args: &StressArgs) -> anyhow::Result<ExitCode> {
     super::raster::prepare_environment(None);
+    shell::check_folder("--output", &args.output)?;
+    let [json_file, markdown_file] = ["stress.json", "stress.md"].map(|f| args.output.join(f));
+    let outputs = [&json_file, &markdown_file].map(|file| Output::text("--output", file));
+    std::fs::create_dir_all(&args.output)
+        .with_context(|| format!("cannot make {}", args.output.display()))?;
+    shell::check_outputs(&outputs, None)?;
     let count = if args.only.is_empty() {
         SWEEPS.len()
     } else {
         args.only.len()
     };
+    let scratch = ScratchFolder::create_in(&args.output)
+        .with_context(|| format!("cannot make a folder in {}", args.output.display()))?;
     let progress = Progress::new("stress", count as u64, "sweeps");
-    let scratch = args.output.join("scratch");
-    let report = stress::run(&scratch, &args.only, args.full, |_| progress.advance(1))?;
+    let report = stress::run(scratch.path(), &args.only, args.full, |_| {
+        progress.advance(1)
+    })?;
     drop(progress);
-    std::fs::remove_dir_all(&scratch)
-        .with_context(|| format!("cannot remove {}", scratch.display()))?;
+    drop(scratch);
     let json = serde_json::to_string_pretty(&report)? + "\n";
     let markdown = report.markdown();
-    for (name, text) in [("stress.json", &json), ("stress.md", &markdown)] {
-        let path = args.output.join(name);
-        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    for (file, text) in [(&json_file, &json), (&markdown_file, &markdown)] {
+        AtomicFile::write_whole(file, text.as_bytes())
+            .with_context(|| format!("cannot write {}", file.display()))?;
     }
     shell::print(&markdown)?;
     let broken = report.broken();

@@ -90,9 +90,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         Some(list) => Row::parse_list(list).context("--only")?,
         None => Row::all(),
     };
-    let inputs = args.inputs();
-    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
-    folder::check(&args.output, &inputs)?;
+    folder::check(&args.output, &args.inputs())?;
     ensure!(
         args.frames <= args.path_frames,
         "--frames: expected at most {}, the frames of the path, found {}",
@@ -107,6 +105,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         0..args.path_frames,
         &LoadOptions::ALL,
     )?;
+    folder::check(&args.output, &setup.inputs)?;
     let extent = args.extent();
     progress.stage("preparing textures and shaders", 0, "");
     let (adapter, captures) = (gpu.adapter.clone(), gpu.no_capture.is_none());
@@ -147,7 +146,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         trace_frames: extent.trace_frames.clone(),
         trace_encoding: args.encoding.encoding(),
         shadow_cascades: cascades,
-        input_checksum: checksum(&inputs)?,
+        input_checksum: checksum(&setup.inputs)?,
     };
     if !captures {
         subject.trace_frames.clear();
@@ -298,11 +297,17 @@ impl TechniquesArgs {
     }
 }
 
-/// Checksum of files' bytes, one after the other.
-fn checksum(files: &[&Path]) -> anyhow::Result<String> {
+/// Checksum of the files' bytes, one after the other.
+fn checksum(files: &[PathBuf]) -> anyhow::Result<String> {
     let mut sums = Vec::new();
     for file in files {
-        let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
+        // A scene may name an image that no material uses, and that nobody has looked for.
+        let bytes = match std::fs::metadata(file) {
+            Ok(found) if found.is_file() => {
+                std::fs::read(file).with_context(|| file.display().to_string())?
+            }
+            Ok(_) | Err(_) => Vec::new(),
+        };
         sums.extend(xxh3_64(&bytes).to_le_bytes());
     }
     Ok(format!("{:016x}", xxh3_64(&sums)))

@@ -102,12 +102,13 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     prepare_environment(args.threads.count);
     filter_in_single_precision();
     args.threads.start()?;
-    args.check_outputs()?;
+    let outputs = args.outputs()?;
     let started = Instant::now();
     let cache = args.cache.open()?;
     let existing = args.trace.as_deref().map(Textrace::open).transpose()?;
     let progress = Progress::new("loading the scene", 0, "");
     let mut setup = (args.scene).setup(None, &PathArgs::still(), 0..1, &LoadOptions::ALL)?;
+    setup.check_outputs(&outputs)?;
     let mut shadow_cascades = cascades(&setup.scene, args.shadows);
     if let (Some(trace), Some(file)) = (&existing, &args.trace) {
         look_as(trace, file, &mut setup)?;
@@ -212,20 +213,19 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
 }
 
 impl VerifyArgs {
-    fn check_outputs(&self) -> anyhow::Result<()> {
+    /// What the command writes, checked as far as its arguments tell.
+    fn outputs(&self) -> anyhow::Result<Vec<Output>> {
         let Some(file) = &self.write_reference else {
-            return Ok(());
+            return Ok(Vec::new());
         };
         ensure!(
             self.tiles == Tiles::All,
             "--write-reference: expected --tiles all, found a sample: a trace holds every tile"
         );
-        let input = self.trace.as_deref().or_else(|| {
-            let scene = Path::new(&self.scene.scene);
-            scene.extension().map(|_| scene)
-        });
-        shell::check_outputs(&[Output::binary("--write-reference", file)], input)?;
-        Ok(())
+        let outputs = vec![Output::binary("--write-reference", file)];
+        shell::check_outputs(&outputs, self.trace.as_deref())?;
+        self.scene.check_outputs(&PathArgs::still(), &outputs)?;
+        Ok(outputs)
     }
 }
 

@@ -167,7 +167,7 @@ pub struct Folder {
 ///
 /// # Errors
 /// A file in its place, a folder of something else, or one that holds an input.
-pub fn check(root: &Path, inputs: &[&Path]) -> anyhow::Result<()> {
+pub fn check(root: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
     ensure!(
         !root.as_os_str().is_empty() && !formats::container::is_stdout(root),
         "--output: expected a folder, found '{}'",
@@ -438,14 +438,15 @@ mod tests {
     #[test]
     fn a_folder_of_something_else_is_left_alone() {
         let root = tempfile::tempdir().unwrap();
-        let refused = |path: &Path, inputs: &[&Path]| check(path, inputs).unwrap_err().to_string();
+        let refused =
+            |path: &Path, inputs: &[PathBuf]| check(path, inputs).unwrap_err().to_string();
         check(root.path(), &[]).unwrap();
         check(&root.path().join("new"), &[]).unwrap();
         let file = root.path().join("file.obj");
         fs::write(&file, "").unwrap();
         assert!(refused(&file, &[]).contains("found a file"));
         assert!(refused(root.path(), &[]).contains("found other files"));
-        assert!(refused(root.path(), &[&file]).contains("holds the input"));
+        assert!(refused(root.path(), std::slice::from_ref(&file)).contains("holds the input"));
         assert!(refused(Path::new("-"), &[]).contains("expected a folder"));
         Folder::create(root.path(), &subject(&[0])).unwrap();
         check(root.path(), &[]).unwrap();

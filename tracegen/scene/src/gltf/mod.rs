@@ -11,7 +11,9 @@ mod accessors;
 mod animation;
 #[cfg(test)]
 mod animation_tests;
+mod binary;
 mod features;
+mod instancing;
 mod materials;
 mod meshes;
 mod nodes;
@@ -32,7 +34,7 @@ use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{Path as JsonPath, Root};
 use std::borrow::Cow;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use transforms::Local;
 
 /// Loads a `.gltf` or `.glb` file.
@@ -54,7 +56,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let buffers = read_buffers(&origin, root, blob, &mut warnings)?;
     let buffers = Buffers::new(root, buffers, &origin, json_bytes);
 
-    let placed = nodes::walk(root, &transforms, &origin, &mut warnings)?;
+    let placed = nodes::walk(root, &transforms, &origin)?;
     let mut scene = Scene::default();
     // Meshes with their places in the world.
     let mut in_world: Vec<(usize, DAffine3)> = Vec::new();
@@ -62,7 +64,12 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let mut materials = materials::Table::new(&document, &buffers, &origin, options);
     // The scene's meshes of each glTF mesh (one a primitive), filled on first use.
     let mut loaded: Vec<Option<Range<usize>>> = vec![None; root.meshes.len()];
-    for (mesh, transform) in placed.meshes {
+    for (node, transform) in placed.meshes {
+        let Some(mesh) = root.nodes[node].mesh.map(|mesh| mesh.value()) else {
+            continue;
+        };
+        let instances =
+            nodes::mesh_transforms(node, &transforms[node], transform, &buffers, &mut warnings)?;
         let primitives = match &loaded[mesh] {
             Some(primitives) => primitives.clone(),
             None => {
@@ -74,10 +81,11 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
                 primitives
             }
         };
-        buffers.spend::<Instance>(primitives.len() as u64, || {
-            format!("instances of meshes[{mesh}]")
-        })?;
-        in_world.extend(primitives.map(|mesh| (mesh, transform)));
+        let made = primitives.len() as u64 * instances.len() as u64;
+        buffers.spend::<Instance>(made, || format!("instances of meshes[{mesh}]"))?;
+        for transform in instances {
+            in_world.extend(primitives.clone().map(|mesh| (mesh, transform)));
+        }
     }
     (scene.origin, scene.instances) = origin::place(&mut scene.meshes, &in_world);
     let transform = |(node, transform)| (node, origin::relative_transform(transform, scene.origin));
@@ -94,7 +102,24 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     Ok(Loaded {
         scene,
         warnings: warnings.into_sentences(),
+        files: referenced_files(&origin, root),
     })
+}
+
+/// The file itself and all that its URIs name.
+fn referenced_files(origin: &Origin, root: &Root) -> Vec<PathBuf> {
+    let buffers = root
+        .buffers
+        .iter()
+        .filter_map(|buffer| buffer.uri.as_deref());
+    let images = root.images.iter().filter_map(|image| image.uri.as_deref());
+    let named = buffers
+        .chain(images)
+        .filter_map(|uri| match uri::parse(uri) {
+            Ok(Uri::Path(path)) => Some(origin.sibling(Path::new(&path))),
+            Ok(Uri::Data(_)) | Err(_) => None,
+        });
+    std::iter::once(origin.file.clone()).chain(named).collect()
 }
 
 /// A file without its buffers.
@@ -109,17 +134,14 @@ struct Parsed {
 /// Parses the container and the JSON and checks every index.
 fn parse(origin: &Origin, bytes: &[u8], warnings: &mut Warnings) -> Result<Parsed, SceneError> {
     let (json, blob) = if bytes.starts_with(b"glTF") {
-        let length = bytes.get(8..12).and_then(|b| b.try_into().ok());
-        let length = length.map_or(0, u32::from_le_bytes) as usize;
-        // The crate subtracts the header from this length unchecked.
-        if length < 12 || length > bytes.len() {
-            return Err(origin.invalid(
-                "GLB header, byte 8",
-                format!("a length of at most the file's {} bytes", bytes.len()),
-                length.to_string(),
+        let whole = binary::check(bytes, origin)?;
+        if whole.len() < bytes.len() {
+            let rest = bytes.len() - whole.len();
+            warnings.say(&format!(
+                "{rest} bytes after the length in the GLB header are left out"
             ));
         }
-        let glb = Glb::from_slice(bytes)
+        let glb = Glb::from_slice(whole)
             .map_err(|e| origin.invalid("GLB", "a glTF 2.0 asset", e.to_string()))?;
         (glb.json, glb.bin)
     } else {

@@ -1,5 +1,6 @@
 //! The node graph: where meshes, cameras and lights are in the world.
 
+use super::accessors::Buffers;
 use super::transforms::Local;
 use crate::files::Origin;
 use crate::warnings::Warnings;
@@ -20,7 +21,7 @@ const FAR_OUT: f32 = 1024.0;
 /// What the nodes place, in depth-first order, with transforms to the world.
 #[derive(Default)]
 pub(super) struct Placed {
-    /// glTF meshes.
+    /// Nodes with a mesh.
     pub meshes: Vec<(usize, DAffine3)>,
     /// Nodes with a camera.
     pub cameras: Vec<(usize, DAffine3)>,
@@ -33,7 +34,6 @@ pub(super) fn walk(
     root: &Root,
     transforms: &[Local],
     origin: &Origin,
-    warnings: &mut Warnings,
 ) -> Result<Placed, SceneError> {
     let scene = root.scene.map_or(0, |s| s.value());
     let roots: Vec<usize> = match root.scenes.get(scene) {
@@ -66,15 +66,8 @@ pub(super) fn walk(
                 "NaN or infinity",
             ));
         }
-        if let Some(mesh) = &node.mesh {
-            // Neither 0 nor so small or large that normals could not be transformed.
-            if !rounded.matrix3.determinant().is_normal() {
-                warnings.count("no scale", || {
-                    format!("nodes[{index}] is scaled to nothing or beyond measure; skipped")
-                });
-            } else {
-                placed.meshes.push((mesh.value(), transform));
-            }
+        if node.mesh.is_some() {
+            placed.meshes.push((index, transform));
         }
         if node.camera.is_some() {
             placed.cameras.push((index, transform));
@@ -90,6 +83,37 @@ pub(super) fn walk(
         stack.extend(children.map(|child| (child.value(), transform)));
     }
     Ok(placed)
+}
+
+/// Where the mesh of a node stands: once, or once per instance (EXT_mesh_gpu_instancing).
+pub(super) fn mesh_transforms(
+    index: usize,
+    local: &Local,
+    transform: DAffine3,
+    buffers: &Buffers<'_>,
+    warnings: &mut Warnings,
+) -> Result<Vec<DAffine3>, SceneError> {
+    let mut transforms = match local.instancing() {
+        None => vec![transform],
+        Some(instancing) => {
+            let relative = instancing.transforms(index, buffers)?;
+            (relative.into_iter())
+                .map(|instance| transform * instance)
+                .collect()
+        }
+    };
+    // Neither 0 nor so small or large that normals could not be transformed.
+    let has_scale = |t: &DAffine3| t.as_affine3a().matrix3.determinant().is_normal();
+    transforms.retain(|transform| {
+        let keeps = has_scale(transform);
+        if !keeps {
+            warnings.count("no scale", || {
+                format!("nodes[{index}] is scaled to nothing or beyond measure; skipped")
+            });
+        }
+        keeps
+    });
+    Ok(transforms)
 }
 
 fn parentless(root: &Root) -> Vec<usize> {

@@ -1,6 +1,7 @@
 //! Where nodes stand, in double precision: the crate that parses the rest rounds to single.
 
 use super::features::not_gltf;
+use super::instancing::Instancing;
 use crate::SceneError;
 use crate::files::Origin;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
@@ -13,6 +14,14 @@ pub(super) struct Local {
     translation: Option<[f64; 3]>,
     rotation: Option<[f64; 4]>,
     scale: Option<[f64; 3]>,
+    #[serde(default)]
+    extensions: Extensions,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+struct Extensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    instancing: Option<Instancing>,
 }
 
 #[derive(Deserialize)]
@@ -28,6 +37,11 @@ pub(super) fn read(json: &[u8], origin: &Origin) -> Result<Vec<Local>, SceneErro
 }
 
 impl Local {
+    /// Where the instances of the node's mesh stand, if there are several.
+    pub fn instancing(&self) -> Option<Instancing> {
+        self.extensions.instancing
+    }
+
     /// To the parent's space.
     pub fn transform(&self) -> DAffine3 {
         if let Some(matrix) = &self.matrix {

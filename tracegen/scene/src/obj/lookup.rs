@@ -1,7 +1,7 @@
 //! Finding the files that OBJ and MTL files name, whichever system wrote the names.
 
 use super::statements::latin1;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
@@ -18,12 +18,25 @@ pub(super) struct Found {
 pub(super) struct Lookup {
     /// By folder: its names by how they read in lower case.
     listings: HashMap<PathBuf, HashMap<String, OsString>>,
+    /// What was found so far.
+    found: BTreeSet<PathBuf>,
 }
 
 impl Lookup {
     /// The first of `names` that is there: as it stands, else in another letter case, else without
     /// its first folders. Backslashes separate folders.
     pub fn find(&mut self, folder: &Path, names: &[String]) -> Option<Found> {
+        let found = self.search(folder, names)?;
+        self.found.insert(found.path.clone());
+        Some(found)
+    }
+
+    /// Every file that was found, in the order of their paths.
+    pub fn into_found(self) -> impl Iterator<Item = PathBuf> {
+        self.found.into_iter()
+    }
+
+    fn search(&mut self, folder: &Path, names: &[String]) -> Option<Found> {
         let paths: Vec<PathBuf> = names
             .iter()
             .map(|name| name.replace('\\', "/").into())

@@ -4,7 +4,7 @@
 //! materials with `d` below 1 let `1 - d` through.
 
 use super::library::{Entry, Map};
-use super::lookup::Lookup;
+use super::lookup::{Found, Lookup};
 use crate::files::Origin;
 use crate::image_files::{Request, Requests, Source, Usage, is_png_or_jpeg};
 use crate::warnings::Warnings;
@@ -129,18 +129,27 @@ impl Maker<'_> {
         map: Option<&Map>,
         usage: Usage,
     ) -> Option<TextureRef> {
-        let map = map.filter(|_| self.options.slots[slot])?;
+        let map = map?;
+        if !self.options.slots[slot] {
+            // The scene refers to the file all the same: no output may replace it.
+            self.find(map);
+            return None;
+        }
         let request = self.request(entry, map, usage)?;
         Some(reference(self.requests.index(request), map))
+    }
+
+    /// The map's file, beside the library or else beside the scene.
+    fn find(&mut self, map: &Map) -> Option<Found> {
+        let folders = [self.library.folder(), self.scene.folder()];
+        (folders.iter()).find_map(|folder| self.lookup.find(folder, &map.names))
     }
 
     /// `None`, with a warning, for a file that is not there or is neither PNG nor JPEG.
     fn request(&mut self, entry: &Entry, map: &Map, usage: Usage) -> Option<Request> {
         let name = &map.names[0];
         let place = place(self.library, entry);
-        let folders = [self.library.folder(), self.scene.folder()];
-        let found = (folders.iter()).find_map(|folder| self.lookup.find(folder, &map.names));
-        let Some(found) = found else {
+        let Some(found) = self.find(map) else {
             self.warnings.count("missing texture", || {
                 format!("{place}: texture '{name}' is not there; left out")
             });

@@ -94,9 +94,11 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
         scene.meshes.push(mesh);
     }
     scene.images = requests.images(&origin)?;
+    let files = std::iter::once(path.to_owned()).chain(lookup.into_found());
     Ok(Loaded {
         scene,
         warnings: warnings.into_sentences(),
+        files: files.collect(),
     })
 }
 

@@ -175,19 +175,15 @@ fn a_stride_below_the_elements_size_is_told() {
 #[test]
 fn devices_and_pipes_are_refused_as_buffers_and_images() {
     for (json, place) in [
+        (with(base(), "/buffers/0/uri", json!("zero")), "buffers[0]"),
         (
-            with(base(), "/buffers/0/uri", json!("/dev/zero")),
-            "buffers[0]",
-        ),
-        (
-            with(textured(), "/images/0/uri", json!("/dev/zero")),
+            with(textured(), "/images/0/uri", json!("zero")),
             "images[0]",
         ),
     ] {
-        let error = Files::new(&json).load().unwrap_err().to_string();
-        for part in ["/dev/zero", place, "a regular file", "a device"] {
-            assert!(error.contains(part), "'{part}' is not in: {error}");
-        }
+        let files = Files::new(&json);
+        std::os::unix::fs::symlink("/dev/zero", files.path("zero")).unwrap();
+        files.fails_with(&["zero", place, "a regular file", "a device"]);
     }
     let files = Files::new(&base());
     std::fs::remove_file(files.path("mesh.bin")).unwrap();
@@ -241,18 +237,15 @@ fn a_huge_image_is_refused_before_it_is_decoded() {
 
 #[test]
 fn required_extensions_that_are_not_supported_are_named_before_all_else() {
-    // As such files are: accessors and textures that only the extension fills.
+    // As such files are: accessors that only the extension fills.
     let mut draco = base();
     draco["accessors"][0]
         .as_object_mut()
         .unwrap()
         .remove("bufferView");
-    let mut basis = textured();
-    basis["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
     for (name, json) in [
         ("KHR_draco_mesh_compression", draco.clone()),
         ("EXT_meshopt_compression", draco),
-        ("KHR_texture_basisu", basis),
     ] {
         let required = json!(["KHR_texture_transform", name, name]);
         let files = Files::new(&with(json, "/extensionsRequired", required));
@@ -303,4 +296,82 @@ fn no_single_changed_byte_of_the_json_panics() {
         // Either outcome will do: what counts is that there is one.
         let _ = files.load();
     }
+}
+
+#[test]
+fn versions_other_than_two_are_refused() {
+    for (asset, place) in [
+        (json!({"version": "9.9"}), "asset.version"),
+        (json!({"version": "1.0"}), "asset.version"),
+        (json!({"version": "two"}), "asset.version"),
+        (
+            json!({"version": "2.1", "minVersion": "2.1"}),
+            "asset.minVersion",
+        ),
+    ] {
+        Files::new(&with(base(), "/asset", asset)).fails_with(&[place, "expected 2.0"]);
+    }
+    let later = json!({"version": "2.1", "minVersion": "2.0"});
+    Files::new(&with(base(), "/asset", later)).load().unwrap();
+}
+
+#[test]
+fn a_texture_in_another_format_alone_is_told_with_its_number_and_extension() {
+    for (extension, format) in [("KHR_texture_basisu", "KTX2"), ("EXT_texture_webp", "WebP")] {
+        let texture = json!({"extensions": {extension: {"source": 0}}});
+        let json = with(textured(), "/textures", json!([texture]));
+        for list in ["/extensionsUsed", "/extensionsRequired"] {
+            let json = with(json.clone(), list, json!([extension]));
+            Files::new(&json).fails_with(&["textures[0]", extension, format, "PNG or JPEG"]);
+        }
+        // With a fallback the file is read.
+        let texture = json!({"source": 0, "extensions": {extension: {"source": 0}}});
+        let json = with(textured(), "/textures", json!([texture]));
+        let files = Files::new(&with(json, "/extensionsUsed", json!([extension])));
+        files.write("my image.png", &png([4, 4], [1, 2, 3, 255]));
+        files.load().unwrap();
+    }
+}
+
+#[test]
+fn lengths_of_a_glb_that_do_not_fit_are_told_and_what_follows_is_left_out_with_a_warning() {
+    let glb = |length: i32, json_length: i32, kind: &[u8; 4]| {
+        let mut json = base();
+        json["buffers"] = json!([{"byteLength": 42}]);
+        let mut text = json.to_string().into_bytes();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let mut bin = triangle_bytes(CORNERS, [0, 1, 2]);
+        bin.resize(44, 0);
+        let plus = |a: usize, b: i32| (a as i32 + b).to_le_bytes();
+        let whole = 12 + 8 + text.len() + 8 + bin.len();
+        let head = [
+            b"glTF".as_slice(),
+            &2_u32.to_le_bytes(),
+            &plus(whole, length),
+        ]
+        .concat();
+        let json_chunk = [&plus(text.len(), json_length), kind.as_slice(), &text].concat();
+        let bin_chunk = [&plus(bin.len(), 0), b"BIN\0".as_slice(), &bin].concat();
+        [head, json_chunk, bin_chunk].concat()
+    };
+    let load = |bytes: &[u8]| {
+        let files = Files::new(&base());
+        files.write("scene.glb", bytes);
+        load_file(&files.path("scene.glb"), &LoadOptions::ALL)
+    };
+    load(&glb(0, 0, b"JSON")).unwrap();
+    for (bytes, place) in [
+        (glb(4, 0, b"JSON"), "byte 8"),
+        (glb(0, 1 << 20, b"JSON"), "GLB chunk 0, byte 12"),
+        (glb(0, 4, b"JSON"), "GLB chunk 1"),
+        (glb(-4, 0, b"JSON"), "GLB chunk 1"),
+        (glb(0, 0, b"json"), "GLB chunk 0"),
+    ] {
+        let error = load(&bytes).unwrap_err().to_string();
+        assert!(error.contains(place), "{error}");
+    }
+    let mut longer = glb(0, 0, b"JSON");
+    longer.extend([0; 100]);
+    let warnings = load(&longer).unwrap().warnings.join("\n");
+    assert!(warnings.contains("100 bytes after"), "{warnings}");
 }

@@ -380,3 +380,95 @@ fn degenerate_triangles_are_kept() {
     files.write("mesh.bin", &triangle_bytes([[1.0; 3]; 3], [0, 0, 0]));
     assert_eq!(files.load().unwrap().scene.triangle_count(), 1);
 }
+
+/// `base()` with instances: three translations, rotations of `component`, and scales.
+fn instanced(rotation_component: u32, rotations: &[u8]) -> Files {
+    let mut json = base();
+    json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    json["nodes"] = json!([{
+        "mesh": 0,
+        "translation": [10, 0, 0],
+        "extensions": {"EXT_mesh_gpu_instancing": {
+            "attributes": {"TRANSLATION": 2, "ROTATION": 3, "SCALE": 4}
+        }}
+    }]);
+    let rotation_bytes = rotations.len();
+    let (views, accessors) = ("bufferViews", "accessors");
+    for (at, length) in [(0, 36), (36, rotation_bytes), (36 + rotation_bytes, 36)] {
+        let view = json!({"buffer": 1, "byteOffset": at, "byteLength": length});
+        json[views].as_array_mut().unwrap().push(view);
+    }
+    for (view, component, of) in [
+        (2, 5126, "VEC3"),
+        (3, rotation_component, "VEC4"),
+        (4, 5126, "VEC3"),
+    ] {
+        let normalized = component != 5126;
+        json[accessors].as_array_mut().unwrap().push(json!({
+            "bufferView": view, "componentType": component, "count": 3, "type": of, "normalized": normalized
+        }));
+    }
+    let floats = |values: [[f32; 3]; 3]| -> Vec<u8> {
+        values
+            .concat()
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect()
+    };
+    let translations = floats([[0.0; 3], [0.0, 5.0, 0.0], [0.0, 0.0, 7.0]]);
+    let scales = floats([[1.0; 3], [2.0; 3], [1.0; 3]]);
+    let bytes = [translations, rotations.to_vec(), scales].concat();
+    json["buffers"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({"uri": "instances.bin", "byteLength": bytes.len()}));
+    let files = Files::new(&json);
+    files.write("instances.bin", &bytes);
+    files
+}
+
+#[test]
+fn instances_of_the_extension_stand_where_it_says_whether_it_is_required_or_not() {
+    // The third is turned by 180 degrees about y.
+    let float: Vec<u8> = [
+        [0.0_f32, 0.0, 0.0, 1.0],
+        [0.0, 0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0, 0.0],
+    ]
+    .concat()
+    .iter()
+    .flat_map(|v| v.to_le_bytes())
+    .collect();
+    let short: Vec<u8> = [[0_i16, 0, 0, 32767], [0, 0, 0, 32767], [0, 32767, 0, 0]]
+        .concat()
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
+    let byte = vec![0, 0, 0, 127, 0, 0, 0, 127, 0, 127, 0, 0];
+    for (component, rotations) in [(5126, float), (5122, short), (5120, byte)] {
+        let scene = instanced(component, &rotations).load().unwrap().scene;
+        let corner =
+            |instance: usize, at: Vec3| scene.instances[instance].transform.transform_point3(at);
+        assert_eq!(scene.instances.len(), 3);
+        let near = |found: Vec3, expected: [f32; 3]| {
+            assert!((found - Vec3::from(expected)).length() < 1e-5, "{found}");
+        };
+        near(corner(0, Vec3::X), [11.0, 0.0, 0.0]);
+        near(corner(1, Vec3::X), [12.0, 5.0, 0.0]);
+        near(corner(2, Vec3::X), [9.0, 0.0, 7.0]);
+    }
+}
+
+#[test]
+fn instances_whose_attributes_differ_in_number_are_refused() {
+    let files = instanced(5120, &[0, 0, 0, 127, 0, 0, 0, 127, 0, 127, 0, 0]);
+    let text = std::fs::read_to_string(files.path("scene.gltf")).unwrap();
+    let json: Value = serde_json::from_str(&text).unwrap();
+    let json = with(json, "/accessors/4/count", json!(2));
+    files.write("scene.gltf", json.to_string().as_bytes());
+    files.fails_with(&[
+        "nodes[0].extensions.EXT_mesh_gpu_instancing",
+        "one count, 3",
+        "found 2",
+    ]);
+}
