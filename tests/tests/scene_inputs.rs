@@ -1,6 +1,6 @@
 //! No output replaces a file that a scene or a path refers to, whether the command reads it or not.
 
-use parallax_tests::{program, refuse};
+use parallax_tests::{program, refuse, run_ok};
 use std::fs;
 use std::path::Path;
 
@@ -100,4 +100,45 @@ fn no_output_replaces_a_file_that_the_scene_or_the_path_refers_to() {
         refuse(verify.arg(files[0]), &["would replace the input", files[0]]);
     }
     assert!(contents(folder.path()) == before, "a file has changed");
+}
+
+#[test]
+fn a_study_is_measured_anew_when_a_file_that_the_scene_refers_to_has_changed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    write_scenes(folder.path());
+    let study = || {
+        let mut tracegen = program("tracegen");
+        tracegen.current_dir(folder.path());
+        tracegen.args([
+            "techniques",
+            "scene.gltf",
+            "--only",
+            "superfrustum",
+            "-o",
+            "study",
+        ]);
+        tracegen.args(["--frames", "1", "--path-frames", "1", "--repeats", "1"]);
+        run_ok(&mut tracegen);
+        let row = folder.path().join("study/rows/superfrustum.json");
+        fs::read(row).expect("a finished row")
+    };
+    let first = study();
+    assert!(study() == first, "a finished row is kept");
+    let mut bytes = fs::read(folder.path().join("scene.bin")).expect("a buffer");
+    // The second corner moves by a millimetre.
+    bytes[12..16].copy_from_slice(&1.001_f32.to_le_bytes());
+    fs::write(folder.path().join("scene.bin"), bytes).expect("writable");
+    let with_other_buffer = study();
+    assert!(
+        with_other_buffer != first,
+        "the row of another buffer is kept"
+    );
+    let mut png = PNG.to_vec();
+    // Bytes after the image's end make another file, though not another picture.
+    png.push(0);
+    fs::write(folder.path().join("colour.png"), png).expect("writable");
+    assert!(
+        study() != with_other_buffer,
+        "the row of another image is kept"
+    );
 }
