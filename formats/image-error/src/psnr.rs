@@ -20,6 +20,23 @@ pub fn psnr_db(reference: &Picture, test: &Picture) -> f64 {
     psnr_of_squares(squares, count)
 }
 
+/// The ratio of several pictures of one size together, from theirs: the mean of their squared errors in decibels.
+/// A mean of decibels would hide a bad picture among identical ones.
+#[must_use]
+pub fn pooled_db(of_pictures: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut pictures) = (0.0, 0_u32);
+    for db in of_pictures {
+        pictures += 1;
+        if db < IDENTICAL_DB {
+            sum += 10.0_f64.powf(-db / 10.0);
+        }
+    }
+    if sum == 0.0 {
+        return IDENTICAL_DB;
+    }
+    (-10.0 * (sum / f64::from(pictures)).log10()).min(IDENTICAL_DB)
+}
+
 /// The ratio from the sum of squared differences of 8-bit codes and the number of codes.
 pub(crate) fn psnr_of_squares(squares: u64, count: usize) -> f64 {
     if squares == 0 || count == 0 {
@@ -39,6 +56,22 @@ mod tests {
         let a = Picture::filled([4, 4], [10; 3]);
         let b = Picture::filled([4, 4], [11; 3]);
         assert!((psnr_db(&a, &b) - 48.1308).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_ratio_of_several_pictures_is_that_of_one_that_holds_them_all() {
+        let [a, b] = [noise([8, 8], 1), noise([8, 8], 2)];
+        let join = |x: &Picture, y: &Picture| Picture {
+            size_px: [8, 16],
+            pixels: [x.pixels.clone(), y.pixels.clone()].concat(),
+        };
+        for (first, second) in [(&a, &b), (&a, &a), (&b, &a)] {
+            // Of two pictures the second may be perfect.
+            let whole = psnr_db(&join(&a, &a), &join(first, second));
+            let pooled = pooled_db([psnr_db(&a, first), psnr_db(&a, second)]);
+            assert!((whole - pooled).abs() < 1e-9, "{whole} {pooled}");
+        }
+        assert_eq!(pooled_db([]), IDENTICAL_DB);
     }
 
     #[test]

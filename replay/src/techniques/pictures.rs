@@ -3,6 +3,7 @@
 use super::{Folder, FolderError};
 use formats::view::Eye;
 use image_error::flicker::flicker;
+use image_error::psnr::pooled_db;
 use image_error::{Picture, PictureError, Reference};
 use rayon::prelude::*;
 
@@ -19,7 +20,7 @@ pub struct PictureFigures {
     pub worst_frame: usize,
     /// Its eye.
     pub worst_eye: Eye,
-    /// Mean of the pictures' peak signal-to-noise ratios.
+    /// Peak signal-to-noise ratio of all pictures together.
     pub psnr_db: f64,
     /// The lowest of them.
     pub psnr_worst_db: f64,
@@ -149,7 +150,7 @@ fn figures(views: &[(usize, Eye)], compared: &[Compared]) -> PictureFigures {
         flip_worst,
         worst_frame,
         worst_eye,
-        psnr_db: mean(|e| e.psnr_db),
+        psnr_db: pooled_db(compared.iter().map(|c| c.error.psnr_db)),
         psnr_worst_db: lowest(|e| e.psnr_db),
         ssim: mean(|e| e.ssim),
         ssim_worst: lowest(|e| e.ssim),

@@ -182,6 +182,8 @@ fn errors_count_where_pictures_differ_and_nowhere_else() {
     assert_eq!((grey.worst_frame, grey.worst_eye), (1, Eye::Left));
     assert!((grey.flip_worst - 3.0 * grey.flip_mean).abs() < 1e-12);
     assert!((grey.identical_pct - 200.0 / 3.0).abs() < 1e-9);
+    // A third of the squared error of the worst picture, not a third of its distance to the cap.
+    assert!((grey.psnr_db - (grey.psnr_worst_db + 10.0 * 3.0_f64.log10())).abs() < 0.5);
     assert_eq!(grey.by_frame[0], 0.0);
     assert!(
         grey.by_frame[1] > 0.01 && grey.ssim_worst < 0.99,

@@ -45,7 +45,7 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
     let bounds = loaded.scene.bounds();
     let extent_m = bounds.map_or(0.0, |(low, high)| (high - low).max_element());
     // Not a number where both ends are infinite.
-    if !(extent_m <= MAX_EXTENT_M) {
+    if extent_m.is_nan() || extent_m > MAX_EXTENT_M {
         return Err(SceneError::Invalid {
             file: path.to_owned(),
             place: "positions".into(),
