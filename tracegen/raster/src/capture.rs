@@ -53,8 +53,10 @@ pub type Pictures = Vec<Vec<u8>>;
 
 impl CaptureJob<'_> {
     /// How a frame is rendered.
-    #[must_use]
-    pub fn plan(&self, views: &FrameViews) -> FramePlan {
+    ///
+    /// # Errors
+    /// Eyes that no far field serves.
+    pub fn plan(&self, views: &FrameViews) -> Result<FramePlan, RasterError> {
         let objects = || {
             let size_px = self.planner.hmd().eye_size_px;
             let object = |call: &DrawCall| {
@@ -63,18 +65,18 @@ impl CaptureJob<'_> {
             };
             self.draws.calls.iter().filter_map(object).collect()
         };
-        self.planner.plan(views, objects)
+        Ok(self.planner.plan(views, objects)?)
     }
 
-    /// Passes of the frames in the order in which [`Self::capture_frame`] writes them.
-    #[must_use]
-    pub fn passes(&self, frames: &[FrameViews]) -> Vec<Pass> {
-        let of_frame = |views: &FrameViews| {
-            let plan = self.plan(views);
-            let pass = |number| pass(views.frame, &plan, number);
-            (0..plan.layers.len()).map(pass).collect::<Vec<_>>()
-        };
-        frames.iter().flat_map(of_frame).collect()
+    /// Passes of a frame in the order in which [`Self::capture_frame`] writes them. Where draws move, they have
+    /// to stand where they are in that frame.
+    ///
+    /// # Errors
+    /// As [`Self::plan`].
+    pub fn passes(&self, views: &FrameViews) -> Result<Vec<Pass>, RasterError> {
+        let plan = self.plan(views)?;
+        let pass = |number| pass(views.frame, &plan, number);
+        Ok((0..plan.layers.len()).map(pass).collect())
     }
 
     /// The recorder of this job's passes; `tables` are the trace's.
@@ -110,7 +112,7 @@ impl CaptureJob<'_> {
             far,
         );
         let (culling, number) = (self.planner.settings().culling, views.frame);
-        let (plan, rig) = (self.plan(views), self.rig(views));
+        let (plan, rig) = (self.plan(views)?, self.rig(views));
         Ok(Frame::new(
             self.draws, lighting, plan, rig, culling, number,
         )?)

@@ -16,7 +16,7 @@ pub enum Driver {
     Lavapipe,
     /// Mesa's OpenGL without a window: plain frames alone.
     Osmesa,
-    /// The first where it is found, else the second.
+    /// The first where it is found and can capture, else the second.
     Auto,
 }
 
@@ -33,20 +33,83 @@ impl Driver {
         textures: &TextureSet,
         view_size_px: [u32; 2],
         record_budget_bytes: u64,
-    ) -> Result<Box<dyn CaptureBackend>, RasterError> {
-        let osmesa = || Osmesa::new(scene, draws, textures, record_budget_bytes);
-        if self == Self::Osmesa {
-            return Ok(Box::new(osmesa()?));
-        }
-        let gpu = match device::open(None) {
-            Err(none @ RasterError::NoDriver(_)) if self == Self::Auto => {
-                let nor = |e| RasterError::NoBackend(Box::new(none), Box::new(e));
-                return Ok(Box::new(osmesa().map_err(nor)?));
-            }
-            gpu => gpu?,
-        };
+    ) -> Result<Opened, RasterError> {
         let budget = record_budget_bytes;
-        let lavapipe = Lavapipe::on(gpu, scene, draws, textures, view_size_px, budget)?;
-        Ok(Box::new(lavapipe))
+        let osmesa = || -> Result<Box<dyn CaptureBackend>, RasterError> {
+            Ok(Box::new(Osmesa::new(scene, draws, textures, budget)?))
+        };
+        let lavapipe = || -> Result<Box<dyn CaptureBackend>, RasterError> {
+            let gpu = device::open(None)?;
+            let lavapipe = Lavapipe::on(gpu, scene, draws, textures, view_size_px, budget)?;
+            Ok(Box::new(lavapipe))
+        };
+        match self {
+            Self::Lavapipe => Opened::first(lavapipe()),
+            Self::Osmesa => Opened::first(osmesa()),
+            Self::Auto => Opened::either(lavapipe(), osmesa),
+        }
+    }
+}
+
+/// A driver that was opened.
+pub struct Opened {
+    /// The driver.
+    pub backend: Box<dyn CaptureBackend>,
+    /// Why the one that would have come first does not capture, where there was one.
+    pub instead_of: Option<RasterError>,
+}
+
+impl Opened {
+    fn first(backend: Result<Box<dyn CaptureBackend>, RasterError>) -> Result<Self, RasterError> {
+        Ok(Self {
+            backend: backend?,
+            instead_of: None,
+        })
+    }
+
+    /// The first, or the second where the first one's driver is missing or lacks something.
+    fn either(
+        first: Result<Box<dyn CaptureBackend>, RasterError>,
+        second: impl FnOnce() -> Result<Box<dyn CaptureBackend>, RasterError>,
+    ) -> Result<Self, RasterError> {
+        match first {
+            Err(error) if error.is_of_the_driver() => match second() {
+                Ok(backend) => Ok(Self {
+                    backend,
+                    instead_of: Some(error),
+                }),
+                Err(other) => Err(RasterError::NoBackend(Box::new(error), Box::new(other))),
+            },
+            first => Self::first(first),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lacking() -> RasterError {
+        RasterError::Unsupported {
+            driver: "lavapipe".into(),
+            what: "PRIMITIVE_INDEX".into(),
+        }
+    }
+
+    #[test]
+    fn a_driver_that_lacks_a_feature_gives_way_to_the_next_and_both_reasons_are_named() {
+        let both = Opened::either(Err(lacking()), || {
+            Err(RasterError::NoLibrary("libOSMesa.so.8", "absent".into()))
+        });
+        let error = both.err().expect("no driver at all").to_string();
+        assert!(error.contains("PRIMITIVE_INDEX"), "{error}");
+        assert!(error.contains("libOSMesa.so.8"), "{error}");
+        let mut tried = false;
+        let other = RasterError::Scene("inconsistent".into());
+        let error = Opened::either(Err(other), || {
+            tried = true;
+            Err(lacking())
+        });
+        assert!(error.is_err() && !tried, "another driver helps no scene");
     }
 }

@@ -1,7 +1,16 @@
 //! Why a capture failed.
 
 use record::RecordError;
+use techniques::far_field::FarFieldError;
 use visibility::TooWide;
+
+impl RasterError {
+    /// Whether another backend may do what this one cannot.
+    #[must_use]
+    pub fn is_of_the_driver(&self) -> bool {
+        matches!(self, Self::NoDriver(_) | Self::Unsupported { .. })
+    }
+}
 
 /// Why a capture failed.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +68,9 @@ pub enum RasterError {
     /// Eyes that the culling technique is not made for.
     #[error(transparent)]
     Culling(#[from] TooWide),
+    /// Eyes that no far field serves.
+    #[error(transparent)]
+    FarField(#[from] FarFieldError),
     /// The records could not become a trace.
     #[error(transparent)]
     Record(#[from] RecordError),

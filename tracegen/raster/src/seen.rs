@@ -25,11 +25,28 @@ impl CaptureJob<'_> {
     /// # Errors
     /// Eyes that the culling technique is not made for.
     pub fn finest_levels(&self, frames: &[FrameViews]) -> Result<Vec<Option<u32>>, RasterError> {
+        let mut finest = Vec::new();
+        for views in frames {
+            self.add_finest_levels(views, &mut finest)?;
+        }
+        Ok(finest)
+    }
+
+    /// [`Self::finest_levels`] of one frame, added to those of others; an empty list has none yet.
+    ///
+    /// # Errors
+    /// As [`Self::finest_levels`].
+    pub fn add_finest_levels(
+        &self,
+        views: &FrameViews,
+        finest: &mut Vec<Option<u32>>,
+    ) -> Result<(), RasterError> {
         let scene = self.scene;
         if !self.skips.images {
-            return Ok(vec![Some(0); scene.images.len()]);
+            *finest = vec![Some(0); scene.images.len()];
+            return Ok(());
         }
-        let mut finest = vec![None; scene.images.len()];
+        finest.resize(scene.images.len(), None);
         // What moves is elsewhere in every frame, and little: whatever it has is wanted.
         for &draw in &self.draws.moving {
             let material = &scene.materials[self.draws.calls[draw as usize].material];
@@ -39,30 +56,28 @@ impl CaptureJob<'_> {
                 }
             }
         }
-        for views in frames {
-            let frame = self.boxes_seen(views)?;
-            for view in frame.views() {
-                let projection = view.layer.view.eye_to_clip;
-                let pixels = Pixels {
-                    clip_from_world: view.clip_from_world(),
-                    size_px: view.layer.size_px,
-                    least_w: projection[3][2] / projection[2][2],
-                };
-                let all = |_| MATERIAL_TEXTURES;
-                self.sample(scene, &pixels, view.visible, all, &mut finest);
-            }
-            for (cascade, casters) in frame.lighting.cascades.iter().zip(&frame.casters) {
-                // A masked caster samples its base colour, the first slot.
-                let slots = |mode| usize::from(mode == DrawMode::Masked);
-                let pixels = Pixels {
-                    clip_from_world: cascade.clip_from_world,
-                    size_px: [SHADOW_SIZE; 2],
-                    least_w: 1.0,
-                };
-                self.sample(scene, &pixels, casters, slots, &mut finest);
-            }
+        let frame = self.boxes_seen(views)?;
+        for view in frame.views() {
+            let projection = view.layer.view.eye_to_clip;
+            let pixels = Pixels {
+                clip_from_world: view.clip_from_world(),
+                size_px: view.layer.size_px,
+                least_w: projection[3][2] / projection[2][2],
+            };
+            let all = |_| MATERIAL_TEXTURES;
+            self.sample(scene, &pixels, view.visible, all, finest);
         }
-        Ok(finest)
+        for (cascade, casters) in frame.lighting.cascades.iter().zip(&frame.casters) {
+            // A masked caster samples its base colour, the first slot.
+            let slots = |mode| usize::from(mode == DrawMode::Masked);
+            let pixels = Pixels {
+                clip_from_world: cascade.clip_from_world,
+                size_px: [SHADOW_SIZE; 2],
+                least_w: 1.0,
+            };
+            self.sample(scene, &pixels, casters, slots, finest);
+        }
+        Ok(())
     }
 
     /// Adds what a view samples through the first `slots` of its draws' materials.

@@ -11,9 +11,9 @@ use std::ops::AddAssign;
 /// What a capture counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CaptureCounts {
-    /// Covered quads, counted once whatever the number of their uv groups.
+    /// Covered quads with a record in the trace, counted once whatever the number of their uv groups.
     pub quads: u64,
-    /// Covered lanes of those quads.
+    /// Covered lanes of those quads that have a record in the trace.
     pub fragments: u64,
     /// Records in the trace.
     pub records: u64,
@@ -135,7 +135,6 @@ impl TileRules {
             if mask == 0 {
                 continue;
             }
-            lanes |= mask;
             let mut result = QuadRecord {
                 x,
                 y,
@@ -156,6 +155,7 @@ impl TileRules {
                 result.dy = fixed.dy;
                 result.cross = fixed.cross;
             }
+            lanes |= mask;
             push(&mut scratch.tile, result);
         }
         counts.quads += u64::from(lanes != 0);

@@ -76,7 +76,7 @@ pub struct RasterArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     no_skip: Vec<Skip>,
     /// Choose the techniques under a budget, for each frame: `flip=ERROR` (mean FLIP inside the
-    /// lens) or `pixels=PX` for the cheapest inside it, `budget-ms=MS` for the least error whose
+    /// lens, 0 for lossless ones alone) or `pixels=PX` for the cheapest inside it, `budget-ms=MS` for the least error whose
     /// median frame takes no longer.
     #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
           conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "far_field", "foveate",
@@ -256,11 +256,19 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         args.views.eyes(),
         args.path.fps,
     )?;
-    if let Some(first) = setup.frames.first() {
-        planner.check_views(first)?;
+    let (mut passes, mut finest) = (Vec::new(), Vec::new());
+    for views in &setup.frames {
+        // What moves decides what a frame's layers are.
+        draws.pose(&setup.scene, setup.moments.time_s(views.frame));
+        let job = self::job(args, &setup, &draws, &planner, bounds);
+        passes.extend(job.passes(views)?);
+        job.add_finest_levels(views, &mut finest)?;
     }
+    draws.pose(
+        &setup.scene,
+        setup.moments.time_s(setup.moments.frames.start),
+    );
     let job = job(args, &setup, &draws, &planner, bounds);
-    let finest = job.finest_levels(&setup.frames)?;
     let searched = started.elapsed();
     let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
     let textured = started.elapsed();
@@ -268,8 +276,11 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         shell::warn(note);
     }
     let driver = args.backend.driver();
-    let mut backend = driver.open(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
-    let backend = backend.as_mut();
+    let mut opened = driver.open(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
+    let backend = opened.backend.as_mut();
+    if let Some(reason) = &opened.instead_of {
+        shell::warn(&format!("{reason}; {} captures instead", backend.name()));
+    }
     if backend.name() == "osmesa" {
         args.check_plain_frames()?;
     }
@@ -279,7 +290,6 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
             backend.driver()
         ));
     }
-    let passes = job.passes(&setup.frames);
     let tables = tables(
         &setup,
         &args.scene.scene,

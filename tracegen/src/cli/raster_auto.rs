@@ -47,7 +47,7 @@ pub fn run(args: &RasterArgs, budget: Budget, outputs: &[Output]) -> anyhow::Res
     let frames: Vec<u32> = (0..args.frames).collect();
     let planners = choice.planners(&world)?;
     let planner = |frame: u32| &planners[choice.held.of_frame[frame as usize]];
-    let tables = world.trace_tables(planner, &frames);
+    let tables = world.trace_tables(planner, &frames)?;
     let writer = TextraceWriter::create(&args.output, &tables)?;
     let writer = writer.with_encoding(args.encoding.encoding());
     let mut tracer = Tracer::new(&tables, writer);

@@ -271,7 +271,7 @@ fn capture(
     textures: &TextureSet,
     backend: &mut Lavapipe,
 ) -> anyhow::Result<Textrace> {
-    let passes = job.passes(&setup.frames);
+    let passes = job.passes(&setup.frames[0])?;
     let tables = tables(
         setup,
         scene,

@@ -141,7 +141,10 @@ impl Bench<'_> {
         let extent = self.extent;
         let (kept, left_out): (Vec<u32>, Vec<u32>) =
             (extent.frames().into_iter()).partition(|frame| extent.trace_frames.contains(frame));
-        let tables = [&kept, &left_out].map(|frames| self.world.trace_tables(planner, frames));
+        let tables = [
+            self.world.trace_tables(planner, &kept)?,
+            self.world.trace_tables(planner, &left_out)?,
+        ];
         let (trace_name, trace_path) = self.folder.trace(&row.name);
         let mut traced = match kept.is_empty() || !self.captures {
             true => None,

@@ -87,7 +87,9 @@ impl World {
     /// They do not.
     pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
         let planner = self.planner(settings)?;
-        planner.check_views(&self.views[0])?;
+        self.views
+            .iter()
+            .try_for_each(|views| planner.check_views(views))?;
         self.job(&planner).frame(&self.views[0])?;
         Ok(())
     }
@@ -151,19 +153,25 @@ impl World {
     }
 
     /// The tables of a trace of some frames, each with its planner.
-    #[must_use]
-    pub fn trace_tables<'s>(&self, planner: impl Fn(u32) -> &'s Planner, frames: &[u32]) -> Tables {
+    ///
+    /// # Errors
+    /// As [`CaptureJob::plan`].
+    pub fn trace_tables<'s>(
+        &mut self,
+        planner: impl Fn(u32) -> &'s Planner,
+        frames: &[u32],
+    ) -> Result<Tables, RasterError> {
         let mut tables = self.tables.clone();
         tables.meta.frames = (frames.iter())
             .map(|&number| self.views[number as usize].clone())
             .collect();
-        tables.passes = (tables.meta.frames.iter())
-            .flat_map(|views| {
-                let job = self.job(planner(views.frame));
-                job.passes(std::slice::from_ref(views))
-            })
-            .collect();
-        tables
+        for views in &tables.meta.frames {
+            // What moves decides what a frame's layers are.
+            self.draws.pose(&self.scene, views.frame as f32 / self.fps);
+            let passes = self.job(planner(views.frame)).passes(views)?;
+            tables.passes.extend(passes);
+        }
+        Ok(tables)
     }
 }
 

@@ -35,6 +35,11 @@ pub(crate) struct EyePatches {
 }
 
 impl Patch {
+    /// Whether the mask leaves any pixel to be drawn.
+    pub fn draws_something(&self) -> bool {
+        self.mask.as_ref().is_none_or(|mask| mask.first().is_some())
+    }
+
     /// A whole picture, of which what `drawn` says may be drawn.
     pub fn whole(picture: &EyePicture, mask: Option<Arc<Mask>>) -> Self {
         Self {

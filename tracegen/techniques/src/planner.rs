@@ -112,14 +112,20 @@ impl Planner {
     }
 
     /// Plans a frame; `objects` tells what draws it has where a technique needs to know.
-    #[must_use]
-    pub fn plan(&self, views: &FrameViews, objects: impl FnOnce() -> Vec<Object>) -> FramePlan {
-        // Eyes that have none have been refused: see `check_views`.
-        if let Ok(Some(far)) = self.far_view(views, objects) {
+    ///
+    /// # Errors
+    /// As [`Self::check_views`].
+    pub fn plan(
+        &self,
+        views: &FrameViews,
+        objects: impl FnOnce() -> Vec<Object>,
+    ) -> Result<FramePlan, FarFieldError> {
+        if let Some(far) = self.far_view(views, objects)? {
             let masks = self.patches([0.0; 2]);
             let mask = |eye: usize| masks[eye].patches.first().and_then(|p| p.mask.clone());
             let size_px = self.hmd.eye_size_px;
-            return far_field::plan::plan(&far, views, size_px, [mask(0), mask(1)]);
+            let masks = [mask(0), mask(1)];
+            return Ok(far_field::plan::plan(&far, views, size_px, masks));
         }
         let time_s = views.frame as f32 / self.fps;
         let gaze = (self.settings.foveation.as_ref())
@@ -155,7 +161,7 @@ impl Planner {
         let rate_px: f64 = eyes.iter().map(|eye| eye.rate_px).sum();
         let drawn_px: u64 = layers.iter().map(|layer| layer.drawn_px()).sum();
         let shares = self.settings.foveation.is_some() || self.settings.hidden_area_mask;
-        FramePlan {
+        Ok(FramePlan {
             predicted: Predicted {
                 shaded_share: shares.then_some((drawn_px as f64 / all) as f32),
                 rate_share: shares.then_some((rate_px / all) as f32),
@@ -163,7 +169,7 @@ impl Planner {
             },
             pictures: eyes.iter().enumerate().map(picture).collect(),
             layers,
-        }
+        })
     }
 
     /// The layers of each eye for a gaze.
@@ -176,7 +182,7 @@ impl Planner {
         let of_eye = |eye: &Eye| {
             let lens = (self.settings.hidden_area_mask).then_some(self.lenses[*eye as usize]);
             let picture = EyePicture::new(&self.hmd, *eye as usize, lens, gaze_deg);
-            match &self.settings.foveation {
+            let mut made = match &self.settings.foveation {
                 None => hidden_area::patches(&picture),
                 Some(foveation) => match foveation.kind {
                     FoveationKind::Rings => rings::patches(&picture, &foveation.rates),
@@ -185,7 +191,10 @@ impl Planner {
                         radial_density::patches(&picture, &foveation.rates)
                     }
                 },
-            }
+            };
+            // A rate that no tile has needs no layer.
+            made.patches.retain(|patch| patch.draws_something());
+            made
         };
         let patches = Arc::new(self.eyes.iter().map(of_eye).collect());
         *last = Some((gaze_deg, Arc::clone(&patches)));

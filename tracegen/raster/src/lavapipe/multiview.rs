@@ -113,6 +113,7 @@ impl Lavapipe {
         self.work.calls = before.calls;
         self.work.vertices = before.vertices;
         self.work.triangles = before.triangles;
+        self.work.bytes_uploaded = before.bytes_uploaded + size_of::<[ViewData; 2]>() as u64;
         let plan = self.plan(draws, &list, Purpose::Plain)?;
         self.work.state_changes = before.state_changes + state_changes(draws, &plan);
         Ok(())

@@ -8,7 +8,7 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Budget {
-    /// Mean FLIP inside the lens of the worse eye, against the baseline's picture, 0 to 1.
+    /// Mean FLIP inside the lens of the worse eye, against the baseline's picture, 0 (lossless) to 1.
     Flip(f64),
     /// Pixels between a point's place in the picture and its true place. Only techniques whose
     /// error is such a shift may be used.
@@ -17,9 +17,6 @@ pub enum Budget {
     /// allows.
     BudgetMs(f64),
 }
-
-/// The search keeps this share of an error budget: other frames may be worse than those it sees.
-const SEARCH_SHARE: f64 = 0.8;
 
 impl Budget {
     /// The largest error of a frame, if errors are bounded.
@@ -30,17 +27,6 @@ impl Budget {
             Self::BudgetMs(_) => None,
         }
     }
-
-    /// The largest error of a frame that the search takes.
-    #[must_use]
-    pub fn search_limit(self) -> Option<f64> {
-        match self {
-            Self::Flip(limit) => Some(SEARCH_SHARE * limit),
-            // The shift is a bound that holds for every frame alike.
-            Self::Pixels(limit) => Some(limit),
-            Self::BudgetMs(_) => None,
-        }
-    }
 }
 
 impl FromStr for Budget {
@@ -48,17 +34,17 @@ impl FromStr for Budget {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let known = || {
-            format!("expected flip=ERROR, pixels=PX or budget-ms=MS, each above 0, found '{text}'")
+            format!(
+                "expected flip=ERROR from 0 (lossless) to 1, pixels=PX or budget-ms=MS above 0, found '{text}'"
+            )
         };
         let (name, value) = text.split_once('=').ok_or_else(known)?;
         let value: f64 = value.parse().map_err(|_| known())?;
-        if !(value.is_finite() && value > 0.0) {
-            return Err(known());
-        }
+        let is_positive = value.is_finite() && value > 0.0;
         match name {
-            "flip" => Ok(Self::Flip(value)),
-            "pixels" => Ok(Self::Pixels(value)),
-            "budget-ms" => Ok(Self::BudgetMs(value)),
+            "flip" if (0.0..=1.0).contains(&value) => Ok(Self::Flip(value)),
+            "pixels" if is_positive => Ok(Self::Pixels(value)),
+            "budget-ms" if is_positive => Ok(Self::BudgetMs(value)),
             _ => Err(known()),
         }
     }

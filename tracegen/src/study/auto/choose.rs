@@ -156,7 +156,8 @@ fn options(budget: Budget, hmd: &Hmd) -> Vec<Part> {
         .filter(|part| !baseline.parts.contains(part))
         .filter(|part| match budget {
             Budget::Pixels(_) => part.lossless || part.is_shift(),
-            Budget::Flip(_) | Budget::BudgetMs(_) => true,
+            Budget::Flip(limit) => part.lossless || limit > 0.0,
+            Budget::BudgetMs(_) => true,
         })
         .collect()
 }
@@ -185,6 +186,9 @@ mod tests {
         };
         assert_eq!(lossy(Budget::Pixels(1.0)), 0);
         assert!(lossy(Budget::Flip(0.01)) > 0);
+        // No error is allowed, so nothing with one is tried.
+        let options = options(Budget::Flip(0.0), &Hmd::default());
+        assert!(!options.is_empty() && options.iter().all(|part| part.lossless));
     }
 
     #[test]

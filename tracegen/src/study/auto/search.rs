@@ -118,7 +118,7 @@ pub fn search<J: Judge>(
             alone.push(search.try_row(row)?);
         }
     }
-    let fits_error = |tried: &Tried| match budget.search_limit() {
+    let fits_error = |tried: &Tried| match budget.error_limit() {
         Some(limit) => tried.row.lossless || tried.verdict.error <= limit,
         None => true,
     };

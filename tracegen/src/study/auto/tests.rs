@@ -118,9 +118,9 @@ fn the_cheapest_inside_the_error_budget_is_chosen_and_no_dearer_than_the_best_si
     assert_eq!(strict.best_single.row.name, "superfrustum");
     let loose = found(COSTS, Budget::Flip(0.03)).unwrap();
     assert_eq!(loose.chosen.row.name, "round-robin");
-    // 0.02 is inside the budget, but not inside the share that the search keeps.
-    let tight = found(COSTS, Budget::Flip(0.021)).unwrap();
-    assert_eq!(tight.chosen.row.name, "superfrustum");
+    // The whole budget may be used: nothing cheaper inside it is passed over.
+    let tight = found(COSTS, Budget::Flip(0.02)).unwrap();
+    assert_eq!(tight.chosen.row.name, "round-robin");
     for found in [strict, loose, tight] {
         let cost = |tried: &Tried| tried.verdict.frame_time_ratio;
         assert!(cost(&found.chosen) <= cost(&found.best_single));
@@ -218,13 +218,17 @@ fn a_frame_that_breaks_the_budget_falls_back_to_what_is_safer() {
 #[test]
 fn budgets_are_read_and_nonsense_is_told() {
     assert_eq!("flip=0.01".parse(), Ok(Budget::Flip(0.01)));
+    assert_eq!("flip=0".parse(), Ok(Budget::Flip(0.0)));
+    assert_eq!("flip=1".parse(), Ok(Budget::Flip(1.0)));
     assert_eq!("pixels=1".parse(), Ok(Budget::Pixels(1.0)));
     assert_eq!("budget-ms=11".parse(), Ok(Budget::BudgetMs(11.0)));
     for text in [
         "",
         "flip",
         "flip=",
-        "flip=0",
+        "flip=2",
+        "flip=1.01",
+        "pixels=0",
         "flip=nan",
         "flip=-1",
         "ssim=0.9",

@@ -133,7 +133,7 @@ pub(super) fn capture_skipping(
         textures,
         samplers,
         draws: draw_table,
-        passes: job.passes(std::slice::from_ref(&views)),
+        passes: job.passes(&views).unwrap(),
     };
     let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;

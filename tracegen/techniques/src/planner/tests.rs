@@ -2,7 +2,7 @@ use super::*;
 use crate::gaze::Gaze;
 use crate::layer::Layer;
 use crate::plan::{Filter, Part};
-use crate::settings::{Foveation, Rates};
+use crate::settings::{FarField, Foveation, Rates, Split, Variant};
 use formats::view::{EyeView, FovTangents};
 
 const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
@@ -37,7 +37,7 @@ fn foveated(kind: FoveationKind, gaze: [f32; 2], hidden_area_mask: bool) -> Sett
 fn plan(settings: &Settings, hmd: &Hmd) -> FramePlan {
     let lenses = hmd.fov.map(|fov| Lens::of(&fov));
     let planner = Planner::new(settings, hmd, lenses, BOTH, 72.0).unwrap();
-    planner.plan(&FrameViews::default(), Vec::new)
+    planner.plan(&FrameViews::default(), Vec::new).unwrap()
 }
 
 /// Every setting that makes layers, with a gaze ahead and one at a corner.
@@ -171,7 +171,8 @@ fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
         let lenses = hmd.fov.map(|fov| Lens::of(&fov));
         let plan = Planner::new(&settings, &hmd, lenses, BOTH, 72.0)
             .unwrap()
-            .plan(&views, Vec::new);
+            .plan(&views, Vec::new)
+            .unwrap();
         for picture in &plan.pictures {
             let Picture::Composed { parts, .. } = picture else {
                 continue;
@@ -272,6 +273,48 @@ fn left_and_right_layers_of_a_number_follow_each_other() {
 }
 
 #[test]
+fn a_rate_that_no_tile_has_makes_no_layer() {
+    let hmd = hmd([320, 320]);
+    let mut settings = foveated(FoveationKind::Rings, [0.0; 2], true);
+    // The second ring has no width, and the last begins beyond the display's corners.
+    let rates = Rates {
+        edges_deg: [10.0, 10.0, 20.0, 120.0],
+    };
+    settings.foveation.as_mut().unwrap().rates = rates;
+    let plan = plan(&settings, &hmd);
+    let mut numbers: Vec<u16> = plan.layers.iter().map(|layer| layer.number).collect();
+    numbers.dedup();
+    assert_eq!(numbers, [0, 2, 3]);
+    assert!(plan.layers.iter().all(|layer| layer.drawn_px() > 0));
+}
+
+#[test]
+fn eyes_that_no_far_field_serves_are_an_error_of_the_plan() {
+    let hmd = hmd([64, 64]);
+    let settings = Settings {
+        far_field: Some(FarField {
+            split: Split::Metres(7.0),
+            variant: Variant::Plain,
+        }),
+        ..Settings::default()
+    };
+    let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+    let planner = Planner::new(&settings, &hmd, lenses, BOTH, 72.0).unwrap();
+    let view = |turn_deg: f32| EyeView {
+        world_to_eye: glam::Mat4::from_rotation_y(turn_deg.to_radians()).to_cols_array_2d(),
+        eye_to_clip: glam::camera::rh::proj::directx::perspective(1.5, 1.0, 0.1, 100.0)
+            .to_cols_array_2d(),
+        ..EyeView::default()
+    };
+    // Eyes that look apart: no picture of less than 180 degrees holds both views.
+    let views = FrameViews {
+        frame: 3,
+        eyes: [view(-80.0), view(80.0)],
+    };
+    planner.plan(&views, Vec::new).unwrap_err();
+}
+
+#[test]
 fn the_layers_of_a_gaze_that_stays_are_made_once() {
     let hmd = hmd([131, 97]);
     let lenses = hmd.fov.map(|fov| Lens::of(&fov));
@@ -285,7 +328,8 @@ fn the_layers_of_a_gaze_that_stays_are_made_once() {
             },
             Vec::new,
         );
-        plan.layers
+        plan.unwrap()
+            .layers
             .into_iter()
             .map(|layer| layer.mask)
             .collect::<Vec<_>>()
