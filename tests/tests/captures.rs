@@ -137,7 +137,8 @@ fn the_plan_tells_recipes_costs_and_what_is_done() {
         .map(|c| &c["done"])
         .collect();
     assert_eq!(done, [true, false, false, false]);
-    assert_eq!(plan["captures"][0]["cost"], 2 * 16 * 24);
+    // Samples, and the teapot's triangles at ten samples each.
+    assert_eq!(plan["captures"][0]["cost"], 2 * 16 * 24 + 10 * 14_972);
 }
 
 #[test]
@@ -157,13 +158,22 @@ fn a_slurm_script_captures_a_shard_a_task() {
 
 #[test]
 fn bad_captures_are_refused_before_the_first_and_failures_are_named_after_the_last() {
+    let scene = |line: &str| {
+        let usual = if line.starts_with("scene") {
+            ""
+        } else {
+            "scene = \"teapot\"\n"
+        };
+        usual.to_owned()
+    };
     for (line, expected) in [
         ("hmd = \"rift\"", "rift"),
         ("shadow = true", "--shadow"),
         ("size = \"0x4\"", "0x4"),
         ("threads = 2", "the sweep sets it itself"),
+        ("scene = [\"teapot\", \"none.gltf\"]", "none.gltf"),
     ] {
-        let captures = Captures::new(&format!("[[captures]]\nscene = \"teapot\"\n{line}\n"));
+        let captures = Captures::new(&format!("[[captures]]\n{}{line}\n", scene(line)));
         refuse(
             &mut captures.command("out", &[]),
             &["m.toml", "[[captures]] 1", expected],
@@ -171,13 +181,16 @@ fn bad_captures_are_refused_before_the_first_and_failures_are_named_after_the_la
         assert!(!captures.path("out").exists());
     }
     let captures = Captures::new(
-        "[base]\nsize = \"16x16\"\ncommand = \"rays\"\n[[captures]]\nscene = [\"none.gltf\", \"teapot\"]\n",
+        "[base]\nsize = \"16x16\"\ncommand = \"rays\"\n[[captures]]\nscene = \"teapot\"\ncamera = [\"none\", \"low\"]\n",
     );
     refuse(
         &mut captures.command("out", &[]),
-        &["none.gltf", "1 of 2 captures failed: none.raytrace"],
+        &["none", "1 of 2 captures failed: teapot-none.raytrace"],
     );
-    assert_eq!(captures.names("out"), ["teapot.raytrace", "teapot.recipe"]);
+    assert_eq!(
+        captures.names("out"),
+        ["teapot-low.raytrace", "teapot-low.recipe"]
+    );
     refuse(&mut captures.command("out", &["--json"]), &["--plan"]);
     refuse(
         &mut captures.command("out", &["--shard", "3/2"]),

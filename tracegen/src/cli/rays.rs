@@ -26,7 +26,7 @@ const DEFAULT_SIZE_PX: [u32; 2] = [1024, 1024];
 #[derive(Args, Debug)]
 pub struct RaysArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    pub(super) scene: SceneArgs,
     /// The trace to write.
     #[arg(short, long, value_name = "FILE.raytrace")]
     output: PathBuf,

@@ -2,11 +2,14 @@
 
 use super::{Cli, Command};
 use crate::captures::{self, Capture};
+use ::scenes::load_with;
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Parser};
 use formats::container::{AtomicFile, remove_abandoned};
+use scene::LoadOptions;
 use serde::Serialize;
 use shell::{Output, Piece, Progress, Shard, ShardArgs, SlurmArray, Threads, balanced};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Stdio};
 use std::time::Duration;
@@ -16,6 +19,11 @@ const PLAN_SCHEMA: &str = "tracegen.plan/1";
 
 /// An unfinished trace that nobody has written to for so long has no writer.
 const ABANDONED_AFTER: Duration = Duration::from_secs(24 * 3600);
+
+/// Pixels that take as long to draw as a triangle to load and prepare, and samples to trace
+/// (results/capture-costs.csv).
+const PIXELS_PER_TRIANGLE: u64 = 8;
+const SAMPLES_PER_TRIANGLE: u64 = 10;
 
 /// A manifest is a page of settings.
 const LONGEST_MANIFEST_BYTES: u64 = 4 << 20;
@@ -52,7 +60,7 @@ pub struct SweepArgs {
 struct Planned {
     capture: Capture,
     trace: PathBuf,
-    /// Estimated, in pixels.
+    /// Estimated, in pixels or samples.
     cost: u64,
     done: bool,
 }
@@ -79,9 +87,10 @@ struct PlannedCapture<'a> {
 pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     let name = || args.manifest.display().to_string();
     let captures = captures::parse(&read(&args.manifest)?).with_context(name)?;
+    let mut scenes = SceneSizes::new(folder_of(&args.manifest));
     let planned = captures
         .into_iter()
-        .map(|capture| plan(capture, &args.output));
+        .map(|capture| plan(capture, &args.output, &mut scenes));
     let planned: Vec<Planned> = planned.collect::<Result<_, _>>().with_context(name)?;
     if let Some(shards) = args.shards.emit_slurm {
         return shell::print(&slurm_script(args, shards)?);
@@ -107,8 +116,50 @@ fn read(path: &Path) -> anyhow::Result<String> {
     std::fs::read_to_string(path).with_context(place)
 }
 
-/// Checks a capture's arguments, and looks whether it is there.
-fn plan(capture: Capture, folder: &Path) -> anyhow::Result<Planned> {
+/// The folder that paths in a manifest are relative to.
+fn folder_of(manifest: &Path) -> &Path {
+    match manifest.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// Triangles of scenes, each loaded once, without its images.
+struct SceneSizes<'a> {
+    /// What paths are relative to.
+    folder: &'a Path,
+    triangles: HashMap<String, u64>,
+}
+
+impl<'a> SceneSizes<'a> {
+    fn new(folder: &'a Path) -> Self {
+        Self {
+            folder,
+            triangles: HashMap::new(),
+        }
+    }
+
+    fn triangles(&mut self, scene: &str) -> anyhow::Result<u64> {
+        if let Some(builtin) = scenes::BUILTINS.iter().find(|b| b.name == scene) {
+            return Ok(builtin.triangles);
+        }
+        if let Some(triangles) = self.triangles.get(scene) {
+            return Ok(*triangles);
+        }
+        let path = self.folder.join(scene);
+        let spec = match path.to_str() {
+            Some(path) if Path::new(path).is_file() => path,
+            _ => scene,
+        };
+        let without_images = LoadOptions { slots: [false; 6] };
+        let triangles = load_with(spec, &without_images)?.scene.triangle_count();
+        self.triangles.insert(scene.to_owned(), triangles);
+        Ok(triangles)
+    }
+}
+
+/// Checks a capture's arguments and its scene, and looks whether it is there.
+fn plan(capture: Capture, folder: &Path, scenes: &mut SceneSizes) -> anyhow::Result<Planned> {
     let trace = folder.join(&capture.file);
     let place = || format!("[[captures]] {}: {}", capture.table, capture.recipe());
     let words = ["tracegen"]
@@ -119,15 +170,21 @@ fn plan(capture: Capture, folder: &Path) -> anyhow::Result<Planned> {
         let first = text.lines().next().unwrap_or_default();
         anyhow::anyhow!("{}", first.trim_start_matches("error: "))
     });
-    let cost = match parsed.with_context(place)?.command {
-        Command::Raster(args) => args.pixels(),
-        Command::Rays(args) => args.samples(),
+    let (scene, pixels, per_triangle) = match parsed.with_context(place)?.command {
+        Command::Raster(args) => (args.scene.scene.clone(), args.pixels(), PIXELS_PER_TRIANGLE),
+        Command::Rays(args) => (
+            args.scene.scene.clone(),
+            args.samples(),
+            SAMPLES_PER_TRIANGLE,
+        ),
         _ => bail!("{}: expected a capture", place()),
     };
+    let triangles = scenes.triangles(&scene).with_context(place)?;
+    let cost = pixels.with_context(place)? + per_triangle * triangles;
     let recipe = std::fs::read_to_string(folder.join(capture.recipe_file()));
     Ok(Planned {
         done: trace.is_file() && recipe.is_ok_and(|found| found.trim_end() == capture.recipe()),
-        cost: cost.with_context(place)?,
+        cost,
         trace,
         capture,
     })
@@ -175,10 +232,7 @@ fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
         .collect();
     shell::check_outputs(&outputs, [args.manifest.as_path()])?;
     let program = std::env::current_exe().context("the program's own path")?;
-    let folder = match args.manifest.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(&args.manifest);
     let open: Vec<&Planned> = planned.iter().filter(|p| !p.done).collect();
     let progress = Progress::new("capturing", open.len() as u64, "traces");
     let mut failed = Vec::new();
