@@ -9,6 +9,8 @@ pub const HISTORY: &[&str] = &[
     "The first numbered version.",
     // 2
     "Shadow maps lie in Morton order; anisotropic filtering takes its level from the unrounded ratio.",
+    // 3
+    "Ray tracing: traffic goes by lines and waiting by visits, whether misses come from rates or from addresses; curves go by addresses, too.",
 ];
 
 /// The version of the models, recorded with every result and part of every point's key.

@@ -37,7 +37,7 @@ fn rules(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
     let mut choices = Vec::new();
     for rays in &inputs.rays {
         let loaded = LoadedTrace::load(rays.source)?;
-        let curve = loaded.curve(&curve_rules(), &[Reuse::Primary], &SgrtConfig::default());
+        let curve = loaded.curve(&curve_rules(), &[Reuse::Primary], &SgrtConfig::default())?;
         choices.extend(curve.into_iter().map(|point| {
             Choice {
                 name: point.rule.to_string(),

@@ -178,7 +178,9 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         },
         paper: paper::values(scene, scene_name(scene), &args.paper_scenes)?,
         curve: if args.curve {
-            loaded.curve(&curve_rules(), &Reuse::ALL, config)
+            loaded
+                .curve(&curve_rules(), &Reuse::ALL, config)
+                .with_context(in_file)?
         } else {
             Vec::new()
         },

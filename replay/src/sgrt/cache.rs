@@ -8,27 +8,51 @@ use super::work::{BatchWork, RayClass};
 use crate::cache::{self, AnyWays};
 use formats::raytrace::{BvhSummary, Visit};
 
-/// Misses of a batch.
+/// Misses of a batch. Traffic goes by lines; time goes by visits, since a visit asks for all lines
+/// of its node or triangle at once and waits for the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Misses {
-    /// Look-ups that missed an L1.
-    pub l1: f64,
-    /// Of those, look-ups that missed the L2.
-    pub l2: f64,
-    /// Bytes that the L2 fetched.
-    pub dram_bytes: f64,
+    /// Lines that missed an L1.
+    pub l1_lines: f64,
+    /// Of those, lines that missed the L2.
+    pub l2_lines: f64,
+    /// Visits that waited for a line from the L2 or from memory.
+    pub l1_visits: f64,
+    /// Of those, visits that waited for a line from memory.
+    pub l2_visits: f64,
 }
 
 impl Misses {
     /// Adds another batch's misses.
     pub fn add(&mut self, other: &Self) {
-        self.l1 += other.l1;
-        self.l2 += other.l2;
-        self.dram_bytes += other.dram_bytes;
+        self.l1_lines += other.l1_lines;
+        self.l2_lines += other.l2_lines;
+        self.l1_visits += other.l1_visits;
+        self.l2_visits += other.l2_visits;
+    }
+
+    /// Bytes that the L2 fetched.
+    #[must_use]
+    pub fn dram_bytes(&self, line_bytes: u64) -> f64 {
+        self.l2_lines * line_bytes as f64
     }
 }
 
-/// Misses of a batch by the stated hit rates. Re-tests count as primary accesses.
+/// Lines that records of so many bytes, packed one after another, lie in: the mean over all records.
+/// A record of `b` bytes begins at a multiple of `g = gcd(b, line)`, each multiple as often as the
+/// others, and lies in `1 + (b - g) / line` lines on average.
+#[must_use]
+pub fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
+    let bytes = u64::from(record_bytes).max(1);
+    let (mut divisor, mut rest) = (bytes, line_bytes);
+    while rest > 0 {
+        (divisor, rest) = (rest, divisor % rest);
+    }
+    1.0 + (bytes - divisor) as f64 / line_bytes as f64
+}
+
+/// Misses of a batch by the stated hit rates, which are shares of visits: a visit finds all its
+/// lines or none. Re-tests count as primary accesses.
 #[must_use]
 pub fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Misses {
     let cache = &config.cache;
@@ -37,14 +61,8 @@ pub fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Miss
         RayClass::Shadow => rates.shadow,
         RayClass::Secondary => rates.secondary,
     };
-    let fill_bytes = |bytes: u32| {
-        let lines = u64::from(bytes).div_ceil(cache.line_bytes).max(1);
-        (lines * cache.line_bytes) as f64
-    };
-    let (node_bytes, triangle_bytes) = (
-        fill_bytes(bvh.bytes_per_node),
-        fill_bytes(bvh.bytes_per_triangle),
-    );
+    let node_lines = lines_per_record(bvh.bytes_per_node, cache.line_bytes);
+    let triangle_lines = lines_per_record(bvh.bytes_per_triangle, cache.line_bytes);
     let mut misses = Misses::default();
     for class in RayClass::ALL {
         let w = &work.by_class[class as usize];
@@ -57,10 +75,12 @@ pub fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Miss
         let triangles =
             (w.triangle_tests + retests) as f64 * (1.0 - rate(&cache.triangle_l1_hit_rate, class));
         let past_l2 = 1.0 - rate(&cache.l2_hit_rate, class);
+        let lines = nodes * node_lines + triangles * triangle_lines;
         misses.add(&Misses {
-            l1: nodes + triangles,
-            l2: (nodes + triangles) * past_l2,
-            dram_bytes: (nodes * node_bytes + triangles * triangle_bytes) * past_l2,
+            l1_lines: lines,
+            l2_lines: lines * past_l2,
+            l1_visits: nodes + triangles,
+            l2_visits: (nodes + triangles) * past_l2,
         });
     }
     misses
@@ -102,6 +122,7 @@ impl Hierarchy {
         let first = bvh.address(visit);
         let last = first + u64::from(bvh.visit_bytes(visit)).max(1) - 1;
         let unit = unit % self.nodes.len();
+        let before = *misses;
         for line in first / self.line_bytes..=last / self.line_bytes {
             let l1 = match visit {
                 Visit::Node(_) => &mut self.nodes[unit],
@@ -110,12 +131,13 @@ impl Hierarchy {
             if l1.access(line) {
                 continue;
             }
-            misses.l1 += 1.0;
+            misses.l1_lines += 1.0;
             if !self.l2.access(line) {
-                misses.l2 += 1.0;
-                misses.dram_bytes += self.line_bytes as f64;
+                misses.l2_lines += 1.0;
             }
         }
+        misses.l1_visits += f64::from(misses.l1_lines > before.l1_lines);
+        misses.l2_visits += f64::from(misses.l2_lines > before.l2_lines);
     }
 }
 
@@ -134,8 +156,46 @@ mod tests {
             }
         }
         let lines = 64.0 * f64::from(bvh().bytes_per_node) / 64.0;
-        assert_eq!((misses.l1, misses.l2), (lines, lines));
-        assert_eq!(misses.dram_bytes, lines * 64.0);
+        assert_eq!((misses.l1_lines, misses.l2_lines), (lines, lines));
+        assert_eq!(misses.dram_bytes(64), lines * 64.0);
+    }
+
+    /// Caches too small to hold anything until its next use: rates of 0 must count what addresses count.
+    #[test]
+    fn rates_and_addresses_count_lines_and_visits_alike() {
+        for (node_bytes, triangle_bytes) in [(64, 48), (256, 48), (80, 36), (32, 64), (100, 7)] {
+            let bvh = BvhSummary {
+                bytes_per_node: node_bytes,
+                bytes_per_triangle: triangle_bytes,
+                nodes: 1024,
+                ..bvh()
+            };
+            let mut config = SgrtConfig::default();
+            config.tni.units = 1;
+            let c = &mut config.cache;
+            let lowest = HitRates {
+                primary: 0.0,
+                shadow: 0.0,
+                secondary: 0.0,
+            };
+            c.node_l1_hit_rate = lowest;
+            c.triangle_l1_hit_rate = lowest;
+            c.l2_hit_rate = lowest;
+            (c.node_l1_bytes, c.triangle_l1_bytes, c.l2_bytes) = (64, 64, 64);
+            (c.l1_ways, c.l2_ways) = (1, 1);
+            let mut caches = Hierarchy::new(&config);
+            let mut found = Misses::default();
+            // 389 has no divisor in common with 1024, and no two visits in a row share a line.
+            let spread = (0..1024).map(|at| at * 389 % 1024);
+            for index in spread {
+                caches.visit(0, Visit::Node(index), &bvh, &mut found);
+                caches.visit(0, Visit::Triangle(index), &bvh, &mut found);
+            }
+            let mut work = BatchWork::default();
+            work.by_class[0].steps = 1024;
+            work.by_class[0].triangle_tests = 1024;
+            assert_eq!(by_rates(&work, &bvh, &config), found, "{node_bytes} bytes");
+        }
     }
 
     #[test]
@@ -153,7 +213,7 @@ mod tests {
         let mut misses = Misses::default();
         caches.visit(0, Visit::Node(5), &bvh(), &mut misses);
         caches.visit(1, Visit::Node(5), &bvh(), &mut misses);
-        assert_eq!((misses.l1, misses.l2), (2.0, 1.0));
+        assert_eq!((misses.l1_lines, misses.l2_lines), (2.0, 1.0));
     }
 
     #[test]

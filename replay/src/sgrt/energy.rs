@@ -44,7 +44,7 @@ pub fn energy(run: &Run, bvh: &BvhSummary, config: &SgrtConfig) -> EnergyPj {
         tni_pj: steps * step_pj + tests * e.triangle_test_pj + rays * e.ray_pj,
         srp_pj: run.srp.lane_cycles() * e.srp_lane_cycle_pj,
         caches_pj: read_bytes * e.l1_pj_per_byte
-            + run.misses.l1 * config.cache.line_bytes as f64 * e.l2_pj_per_byte,
+            + run.misses.l1_lines * config.cache.line_bytes as f64 * e.l2_pj_per_byte,
         sram_pj: run.on_chip_bytes as f64 * e.sram_pj_per_byte,
         dram_pj: run.dram.total() as f64 * e.dram_pj_per_byte,
         // A milliwatt is a picojoule a nanosecond.

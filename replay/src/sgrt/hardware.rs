@@ -314,7 +314,7 @@ impl Model<'_> {
         let tni = tni::cycles(work, misses, self.frame.tables.bvh.traversal, config);
         let srp = srp::cycles(work, config);
         let dram = DramBytes {
-            hierarchy_bytes: misses.dram_bytes.round() as u64,
+            hierarchy_bytes: misses.dram_bytes(config.cache.line_bytes).round() as u64,
             gbuffer_bytes: gbuffer.dram_bytes,
             shading_bytes: (work.shaded as f64 * config.memory.shading_bytes).round() as u64,
             frame_buffer_bytes: pixels * u64::from(config.memory.frame_buffer_bytes),

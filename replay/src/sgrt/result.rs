@@ -165,9 +165,9 @@ pub struct Work {
     pub retests: u64,
     /// Shading kernels.
     pub shaded: u64,
-    /// Look-ups that missed an L1.
+    /// Lines that missed an L1.
     pub l1_misses: u64,
-    /// Look-ups that missed the L2.
+    /// Lines that missed the L2.
     pub l2_misses: u64,
 }
 
@@ -179,8 +179,8 @@ impl Work {
             triangle_tests: run.work.triangle_tests(),
             retests: run.work.retest_tests,
             shaded: run.work.shaded,
-            l1_misses: run.misses.l1.round() as u64,
-            l2_misses: run.misses.l2.round() as u64,
+            l1_misses: run.misses.l1_lines.round() as u64,
+            l2_misses: run.misses.l2_lines.round() as u64,
         }
     }
 }

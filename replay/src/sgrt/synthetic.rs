@@ -6,7 +6,7 @@ use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::half::round3;
 use formats::raytrace::{
     BvhSummary, EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayMaterial, RayRecord,
-    RayTile, RayTriangle, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
+    RayTile, RayTriangle, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind, Visit,
     encode_ray_tile,
 };
 use formats::textrace::TraceMeta;
@@ -215,6 +215,23 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
             .collect()
     });
     Synthetic { tables, tiles }
+}
+
+impl Synthetic {
+    /// With addresses: every ray of a pixel walks down a path of its own that neighbours share in part.
+    pub fn with_visits(mut self) -> Self {
+        self.tables.meta.has_visits = true;
+        for tile in self.tiles.iter_mut().flatten() {
+            let mut visits = Vec::new();
+            for (number, ray) in (0u32..).zip(&tile.rays) {
+                let at = |step: u32, count: u32| (number / 8 * 37 + step * step) % count;
+                visits.extend((0..ray.steps).map(|step| Visit::Node(at(step, 999))));
+                visits.extend((0..ray.triangle_tests).map(|test| Visit::Triangle(at(test, 1000))));
+            }
+            tile.visits = visits;
+        }
+        self
+    }
 }
 
 /// The scene's frame, through the same loading as a file's.

@@ -7,7 +7,7 @@
 //! `max(traversal issue, intersection issue, ray hand-over, latency / rays in flight)`
 //!
 //! where latency is what a ray would take alone: its steps and tests through the full depth of
-//! their pipelines, plus what its cache misses wait. Batches follow each other without a gap, so
+//! their pipelines, plus what its visits wait that miss a cache, once a visit however many lines it misses. Batches follow each other without a gap, so
 //! filling and draining cancel. A cycle-by-cycle simulation of one unit in the tests stays within
 //! a few per cent of this.
 
@@ -85,8 +85,8 @@ pub fn cycles(
     let dram_cycles = config.memory.latency_ns * tni.clock_mhz * 1e-3;
     let latency = steps * (f64::from(tni.trv_depth_cycles) + (step_cycles - 1.0).max(0.0))
         + tests * f64::from(tni.ist_depth_cycles)
-        + misses.l1 * f64::from(config.cache.l2_latency_cycles)
-        + misses.l2 * dram_cycles;
+        + misses.l1_visits * f64::from(config.cache.l2_latency_cycles)
+        + misses.l2_visits * dram_cycles;
 
     TniCycles {
         traversal: steps * step_cycles / (units * f64::from(tni.trv_pipelines)),

@@ -5,7 +5,7 @@ use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::decide;
 use super::frame::FrameError;
-use super::hardware::{Comparison, misses_by_rates, tile_work};
+use super::hardware::{Comparison, tile_work};
 use super::loaded::{LoadedTrace, RuleRun};
 use super::result::{CurvePoint, Sensitivity};
 use super::rules::Rule;
@@ -13,9 +13,17 @@ use image_error::Picture;
 use image_error::flip::FlipMap;
 
 impl LoadedTrace<'_> {
-    /// Units' cycles saved against image error, over rules and levels of reuse.
-    #[must_use]
-    pub fn curve(&self, rules: &[Rule], levels: &[Reuse], config: &SgrtConfig) -> Vec<CurvePoint> {
+    /// Units' cycles saved against image error, over rules and levels of reuse. Misses are counted as
+    /// in [`LoadedTrace::run`], so that a point is what a run of its rule gives.
+    ///
+    /// # Errors
+    /// [`FrameError`] where a tile cannot be read again for its addresses.
+    pub fn curve(
+        &self,
+        rules: &[Rule],
+        levels: &[Reuse],
+        config: &SgrtConfig,
+    ) -> Result<Vec<CurvePoint>, FrameError> {
         let mut points = Vec::new();
         for rule in rules {
             let decisions = decide(&self.frame, &self.arrived, rule);
@@ -23,8 +31,7 @@ impl LoadedTrace<'_> {
             let mut last: Option<(Picture, FlipMap)> = None;
             for &reuse in levels {
                 let work = tile_work(&self.frame, &decisions, reuse);
-                // By rates for all points: a point should cost no second pass over the trace.
-                let misses = misses_by_rates(&work, &self.frame, config);
+                let misses = self.misses(&work, &decisions, reuse, config)?;
                 let comparison = self.compare(&work, &misses, rule.reads(), config);
                 let picture = self.picture(&decisions, reuse);
                 let (_, flip) = match last.take() {
@@ -49,7 +56,7 @@ impl LoadedTrace<'_> {
                 });
             }
         }
-        points
+        Ok(points)
     }
 
     /// Halves and doubles every parameter in turn.
@@ -125,15 +132,22 @@ mod tests {
     }
 
     #[test]
-    fn the_curve_agrees_with_single_runs() {
-        let source = scene();
-        let loaded = LoadedTrace::load(&source).expect("loads");
+    fn the_curve_agrees_with_single_runs_by_rates_and_by_addresses() {
+        for source in [scene(), scene().with_visits()] {
+            agrees(&source);
+        }
+    }
+
+    fn agrees(source: &super::super::synthetic::Synthetic) {
+        let loaded = LoadedTrace::load(source).expect("loads");
         let config = SgrtConfig::default();
         let rules: Vec<Rule> = vec!["depth=0.02".parse().expect("a rule")];
-        for point in loaded.curve(&rules, &Reuse::ALL, &config) {
+        for point in loaded.curve(&rules, &Reuse::ALL, &config).expect("runs") {
             let run = loaded.run(&rules[0], point.reuse, &config).expect("runs");
             assert_eq!(point.flip_mean, run.outcome.flip_mean);
             assert_eq!(point.tni_reduction_pct, run.outcome.tni_reduction_pct);
+            assert_eq!(point.relative_energy, run.outcome.relative_energy);
+            assert_eq!(point.relative_performance, run.outcome.relative_performance);
         }
     }
 

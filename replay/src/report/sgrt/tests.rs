@@ -42,7 +42,9 @@ fn entry_of(view: View) -> Entry {
                 relative_performance: 1.64,
                 relative_energy: 0.96,
             }),
-            curve: loaded.curve(&curve_rules()[..3], &Reuse::ALL, &model),
+            curve: loaded
+                .curve(&curve_rules()[..3], &Reuse::ALL, &model)
+                .expect("runs"),
             sensitivity: loaded
                 .sensitivity(&ours, Reuse::Primary, &model)
                 .expect("runs"),

@@ -29,9 +29,9 @@ fn steps_over_pipelines_is_the_time_of_a_traversal_bound_batch() {
 fn twice_the_units_halve_everything() {
     let mut config = SgrtConfig::default();
     let misses = Misses {
-        l1: 50.0,
-        l2: 20.0,
-        dram_bytes: 20.0 * 64.0,
+        l1_visits: 50.0,
+        l2_visits: 20.0,
+        ..Misses::default()
     };
     let one = cycles(&batch(10, 900, 300), &misses, &config);
     config.tni.units *= 2;
@@ -106,7 +106,7 @@ fn twin(rays: &[TwinRay], config: &SgrtConfig) -> (u64, BatchWork, Misses) {
                 work.by_class[0].steps += 1;
                 if slot.done.is_multiple_of(slot.ray.miss_every) {
                     slot.ready += l2;
-                    misses.l1 += 1.0;
+                    misses.l1_visits += 1.0;
                 }
             }
         }
@@ -146,4 +146,31 @@ fn the_throughput_model_stays_close_to_a_cycle_by_cycle_unit() {
             off * 100.0
         );
     }
+}
+
+#[test]
+fn a_visit_waits_once_for_all_its_lines_and_energy_pays_for_each() {
+    let config = SgrtConfig::default();
+    let narrow = Misses {
+        l1_visits: 10.0,
+        l1_lines: 10.0,
+        ..Misses::default()
+    };
+    let wide = Misses {
+        l1_lines: 40.0,
+        ..narrow
+    };
+    let work = batch(1, 10, 0);
+    let [a, b] = [narrow, wide].map(|misses| cycles(&work, &misses, &config).latency);
+    assert_eq!(a, b);
+    let energy = |misses| {
+        let run = crate::sgrt::hardware::Run {
+            work,
+            misses,
+            ..Default::default()
+        };
+        crate::sgrt::energy::energy(&run, &crate::sgrt::synthetic::bvh(), &config).caches_pj
+    };
+    let line_pj = config.cache.line_bytes as f64 * config.energy.l2_pj_per_byte;
+    assert!((energy(wide) - energy(narrow) - 30.0 * line_pj).abs() < 1e-6);
 }
