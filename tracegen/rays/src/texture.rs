@@ -2,7 +2,7 @@
 
 use formats::texture::{ColorSpace, Filter, Wrap};
 use glam::{Vec2, Vec4};
-use scene::{Image, TextureRef};
+use scene::{Image, TextureRef, srgb};
 
 /// An image with its smaller levels, RGBA8 in its own colour space.
 pub struct Pyramid {
@@ -28,7 +28,8 @@ impl Pyramid {
             size: image.size,
             rgba,
         }];
-        while let Some(next) = levels.last().and_then(Level::halved) {
+        let halved = |level: &Level| level.halved(image.color_space);
+        while let Some(next) = levels.last().and_then(halved) {
             levels.push(next);
         }
         Some(Self {
@@ -104,7 +105,8 @@ impl Pyramid {
 }
 
 impl Level {
-    fn halved(&self) -> Option<Self> {
+    /// The next level: means of two by two texels, of colours in linear light.
+    fn halved(&self, color_space: ColorSpace) -> Option<Self> {
         let [width, height] = self.size;
         if width <= 1 && height <= 1 {
             return None;
@@ -117,10 +119,16 @@ impl Level {
                     let at = |dx: u32, dy: u32| {
                         let x = (2 * x + dx).min(width - 1) as usize;
                         let y = (2 * y + dy).min(height - 1) as usize;
-                        u32::from(self.rgba[(y * width as usize + x) * 4 + channel])
+                        self.rgba[(y * width as usize + x) * 4 + channel]
                     };
-                    let sum = at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1);
-                    rgba.push(((sum + 2) / 4) as u8);
+                    let texels = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
+                    rgba.push(if color_space == ColorSpace::Srgb && channel < 3 {
+                        let light = texels.map(|byte| srgb::LINEAR[usize::from(byte)]);
+                        srgb::encode_byte(light.iter().sum::<f32>() / 4.0)
+                    } else {
+                        let sum: u32 = texels.into_iter().map(u32::from).sum();
+                        ((sum + 2) / 4) as u8
+                    });
                 }
             }
         }
@@ -152,4 +160,19 @@ pub fn fast_log2(x: f32) -> f32 {
     let exponent = (bits >> 23) as i32 - 127;
     let mantissa = f32::from_bits(bits & 0x007F_FFFF | 0x3F80_0000);
     exponent as f32 + (mantissa - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same averages as `textures::mipmap`, which `tracegen raster` samples.
+    #[test]
+    fn black_and_white_average_to_188_in_srgb_and_128_in_data() {
+        let rgba = [[0, 0, 0, 255], [255; 4], [255; 4], [0, 0, 0, 255]].concat();
+        let level = Level { size: [2, 2], rgba };
+        let average = |space| level.halved(space).unwrap().rgba;
+        assert_eq!(average(ColorSpace::Srgb), [188, 188, 188, 255]);
+        assert_eq!(average(ColorSpace::Linear), [128, 128, 128, 255]);
+    }
 }

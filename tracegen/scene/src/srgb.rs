@@ -37,6 +37,22 @@ pub fn encode(linear: f64) -> f64 {
     }
 }
 
+/// Steps of the inverse table: fine enough that the steepest part, near black, is off by at most
+/// 0.05 of a byte.
+const FROM_LINEAR_STEPS: usize = 1 << 16;
+
+static FROM_LINEAR: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    (0..=FROM_LINEAR_STEPS)
+        .map(|i| (encode(i as f64 / FROM_LINEAR_STEPS as f64) * 255.0).round() as u8)
+        .collect()
+});
+
+/// Encoded byte of a linear value from 0 to 1.
+#[must_use]
+pub fn encode_byte(linear: f32) -> u8 {
+    FROM_LINEAR[(linear.clamp(0.0, 1.0) * FROM_LINEAR_STEPS as f32 + 0.5) as usize]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,6 +62,7 @@ mod tests {
         for byte in 0..=255u8 {
             let linear = LINEAR[usize::from(byte)];
             assert_eq!((encode(linear.into()) * 255.0).round() as u8, byte);
+            assert_eq!(encode_byte(linear), byte);
         }
         assert_eq!([LINEAR[0], LINEAR[255]], [0.0, 1.0]);
     }

@@ -2,7 +2,6 @@
 
 use glam::{Vec3, Vec4};
 use scene::srgb;
-use std::sync::LazyLock;
 
 /// What the texels mean.
 #[derive(Clone, Copy, Debug)]
@@ -20,19 +19,6 @@ pub(super) struct Level {
     texels: Vec<Vec4>,
     premultiplied: bool,
 }
-
-/// Steps of the inverse table: fine enough that the steepest part, near black, is off by at most
-/// 0.05 of a byte.
-const FROM_LINEAR_STEPS: usize = 1 << 16;
-
-static FROM_LINEAR: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    (0..=FROM_LINEAR_STEPS)
-        .map(|i| {
-            let encoded = srgb::encode(i as f64 / FROM_LINEAR_STEPS as f64);
-            (encoded * 255.0).round() as u8
-        })
-        .collect()
-});
 
 fn decode_texel(texel: &[u8], kind: Kind, premultiply: bool) -> Vec4 {
     let alpha = f32::from(texel[3]) / 255.0;
@@ -125,7 +111,6 @@ impl Level {
     /// RGBA8.
     pub fn encode(&self, kind: Kind) -> Vec<u8> {
         let byte = |v: f32| (v * 255.0 + 0.5) as u8;
-        let from_linear = &*FROM_LINEAR;
         let mut rgba = Vec::with_capacity(self.texels.len() * 4);
         for texel in &self.texels {
             let alpha = texel.w;
@@ -136,8 +121,7 @@ impl Level {
             };
             let rgb = (texel.truncate() / weight).clamp(Vec3::ZERO, Vec3::ONE);
             let rgb = if kind.srgb {
-                rgb.to_array()
-                    .map(|c| from_linear[(c * FROM_LINEAR_STEPS as f32 + 0.5) as usize])
+                rgb.to_array().map(srgb::encode_byte)
             } else {
                 rgb.to_array().map(byte)
             };
