@@ -12,6 +12,7 @@ pub mod count;
 mod kernel;
 mod leaf;
 pub mod node;
+mod stacks;
 mod traverse;
 
 #[cfg(test)]
@@ -24,6 +25,7 @@ use glam::Vec3;
 use kernel::{Kernel, Scalar};
 pub use leaf::{AllOpaque, AlphaTest, RayHit};
 use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
+use stacks::Stacks;
 pub use traverse::TraversalStack;
 use traverse::{Eight, Two, Width, closest, occluded};
 
@@ -107,14 +109,17 @@ impl Bvh {
             .map(|p| (p, p))
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
             .unwrap_or_default();
-        let tree = build::build_binary(&kept);
+        let stacks = Stacks::find(&kept, &numbers);
+        let built: Vec<_> = stacks.built.iter().map(|at| kept[*at as usize]).collect();
+        let mut tree = build::build_binary(&built);
+        stacks.expand(&mut tree, &kept);
         let layout = build::lay_out(&tree, &kept, &numbers);
         Ok(Self {
             nodes2: layout.nodes2,
             nodes8: layout.nodes8,
             blocks: layout.blocks,
             bounds,
-            triangles: kept.len() as u64,
+            triangles: tree.primitive_indices.len() as u64,
             leaves: layout.leaves,
             depth2: layout.depth2,
             depth8: layout.depth8,
