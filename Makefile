@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques accuracy stress test fuzz faults bench lint build deps golden clean
+.PHONY: demo techniques accuracy stress test fuzz faults bench lint build deps golden figures clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -54,6 +54,10 @@ deps:
 # Rewrites the golden traces and results; review the diff.
 golden: deps build
 	scripts/golden.sh
+
+# Rewrites the tables of the documents from results/; review the diff.
+figures:
+	UPDATE_FIGURES=1 $(CARGO) test --release --locked -p parallax-tests --test figures
 
 clean:
 	$(CARGO) clean

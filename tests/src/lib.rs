@@ -1,6 +1,7 @@
 //! Helpers of the end-to-end tests: the built programs, the golden traces, the real scenes.
 
 pub mod exercise;
+pub mod figures;
 pub mod repair;
 pub mod traces;
 pub mod writers;

@@ -55,7 +55,7 @@ pub fn preset(name: &str) -> Result<Hmd, HmdError> {
         "symmetric-100" => (
             [960, 1080],
             symmetric(100.0, [960, 1080]),
-            "Z2 paper, section 5: 2 x 960x1080 and a 100 degree field of view; on-axis eyes with square pixels are this tool's reading".to_owned(),
+            "Z2 paper, section 4.2: 2 x 960x1080 and a 100 degree field of view; on-axis eyes with square pixels are this tool's reading".to_owned(),
         ),
         "dk2" => (
             [960, 1080],

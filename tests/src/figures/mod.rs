@@ -1,0 +1,81 @@
+//! Tables of documents, made from results files.
+//!
+//! A results file is `results/NAME.csv`: comment lines that begin with `# command:` say how it was made, then come
+//! a header and rows. A table in a document stands between `<!-- figures: NAME -->` and `<!-- end -->`. It is the
+//! results file as it stands, or what a row of [`VIEWS`] makes of it.
+
+mod paper_comparison;
+mod reprojection;
+mod shards;
+mod view;
+
+pub use view::{Results, Row, markdown};
+
+use std::path::{Path, PathBuf};
+
+/// Makes a table from a results file.
+type View = fn(&Results) -> String;
+
+/// Tables that show another form than their results file.
+const VIEWS: &[(&str, &str, View)] = &[
+    (
+        "calibration-ipd-bias",
+        "calibration-ipd-bias",
+        paper_comparison::calibration,
+    ),
+    (
+        "crytek-500mm",
+        "crytek-500mm",
+        paper_comparison::crytek_500mm,
+    ),
+    ("reprojection", "reprojection", reprojection::table),
+    (
+        "shadow-map-layout",
+        "shadow-map-layout",
+        paper_comparison::shadow_maps,
+    ),
+    ("sweep-shards", "sweep-shards", shards::table),
+];
+
+const BEGIN: &str = "<!-- figures: ";
+const END: &str = "<!-- end -->\n";
+
+/// The document with every marked table made anew from the results in `folder`, and the names of those tables.
+///
+/// # Errors
+/// A mark without its end, and a results file that cannot be read or lacks what the table shows.
+pub fn with_tables(document: &str, folder: &Path) -> Result<(String, Vec<String>), String> {
+    let (mut text, mut names, mut rest) = (String::new(), Vec::new(), document);
+    while let Some((before, after)) = rest.split_once(BEGIN) {
+        let (name, after) = after
+            .split_once(" -->\n")
+            .ok_or("a mark without its name")?;
+        let (_, after) = (after.split_once(END)).ok_or_else(|| format!("{name}: no {END}"))?;
+        let (results, view) = match VIEWS.iter().find(|(known, ..)| *known == name) {
+            Some((_, results, view)) => (*results, *view),
+            None => (name, Results::as_it_stands as View),
+        };
+        let results = Results::read(&folder.join(results).with_extension("csv"))?;
+        text += &format!("{before}{BEGIN}{name} -->\n{}{END}", view(&results));
+        names.push(name.to_owned());
+        rest = after;
+    }
+    Ok((text + rest, names))
+}
+
+/// Every Markdown file of the project's documents.
+///
+/// # Panics
+/// When a folder cannot be read.
+#[must_use]
+pub fn documents() -> Vec<PathBuf> {
+    let root = crate::root();
+    let mut files = vec![root.join("README.md"), root.join("ARCHITECTURE.md")];
+    for folder in ["docs", "benches", "traces"] {
+        let entries = std::fs::read_dir(root.join(folder)).expect("a folder");
+        let paths = entries.map(|entry| entry.expect("an entry").path());
+        files.extend(paths.filter(|path| path.extension().is_some_and(|e| e == "md")));
+    }
+    files.sort();
+    files
+}

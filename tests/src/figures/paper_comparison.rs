@@ -1,0 +1,155 @@
+//! Tables of docs/paper-comparison.md.
+
+use super::view::{Results, markdown};
+use replay::paper::z2;
+
+const CACHES_KIB: [[&str; 2]; 4] = [["8", "128"], ["16", "128"], ["8", "256"], ["16", "256"]];
+const ORDERS: [&str; 3] = ["morton", "z2-lrta", "z2-sta"];
+
+/// Crytek Sponza with eyes 500 mm apart beside the paper.
+pub fn crytek_500mm(results: &Results) -> String {
+    let headings = [
+        "caches",
+        "L1 %: Morton, LRTA, STA",
+        "paper",
+        "L2 %: Morton, LRTA, STA",
+        "paper",
+        "saved %: LRTA, STA",
+        "paper",
+    ];
+    let rows = CACHES_KIB.map(|[l1, l2]| {
+        let of = |column: &str, orders: &[&str]| {
+            let number = |order: &&str| {
+                let keys = [("l1_kib", l1), ("l2_kib", l2), ("order", *order)];
+                results.number(&keys, column, 1)
+            };
+            orders.iter().map(number).collect::<Vec<_>>().join(", ")
+        };
+        vec![
+            format!("{l1}/{l2}"),
+            of("l1_miss_pct", &ORDERS),
+            of("paper_l1_miss_pct", &ORDERS),
+            of("l2_miss_pct", &ORDERS),
+            of("paper_l2_miss_pct", &ORDERS),
+            of("saved_pct", &ORDERS[1..]),
+            of("paper_saved_pct", &ORDERS[1..]),
+        ]
+    });
+    markdown(&headings, rows)
+}
+
+/// Shadow-map layouts on Dabrovic Sponza, with the paper's rows for its scene with shadows.
+pub fn shadow_maps(results: &Results) -> String {
+    let headings = [
+        "maps",
+        "eyes",
+        "L2",
+        "L1 miss %, Morton",
+        "L2 miss %, Morton",
+        "LRTA saved %",
+        "STA saved %",
+    ];
+    let maps = [
+        ("128", "linear", "linear"),
+        ("128", "tiled", "tiles of 4x4 texels in rows"),
+        ("128", "morton", "Morton"),
+        ("256", "linear", "linear"),
+        ("256", "morton", "Morton"),
+    ];
+    let ours = maps.into_iter().flat_map(|(l2, order, title)| {
+        ["symmetric", "dk2"].map(|eyes| {
+            let number = |tile_order: &str, column: &str| {
+                let keys = [
+                    ("scene", "dabrovic-sponza+shadows"),
+                    ("eyes", eyes),
+                    ("shadow_map_order", order),
+                    ("l2_kib", l2),
+                    ("order", tile_order),
+                ];
+                results.number(&keys, column, 1)
+            };
+            vec![
+                title.to_owned(),
+                if eyes == "dk2" { "DK2" } else { eyes }.to_owned(),
+                format!("{l2} KB"),
+                number("morton", "l1_miss_pct"),
+                number("morton", "l2_miss_pct"),
+                number("z2-lrta", "saved_pct"),
+                number("z2-sta", "saved_pct"),
+            ]
+        })
+    });
+    let published = [128, 256].map(|l2| {
+        let [morton, lrta, sta] = z2::ORDERS
+            .map(|order| z2::row(z2::SCENES[3], 8, l2, order).expect("a row of the paper's table"));
+        let saved = |row: &z2::PublishedRow| format!("{:.1}", row.reduction_pct().unwrap_or(0.0));
+        vec![
+            "paper".to_owned(),
+            String::new(),
+            format!("{l2} KB"),
+            format!("{:.1}", morton.l1_miss_pct),
+            format!("{:.1}", morton.l2_miss_pct),
+            saved(lrta),
+            saved(sta),
+        ]
+    });
+    markdown(&headings, ours.chain(published))
+}
+
+/// Distance from the paper's table by eyes and bias, for the scene that chooses and those held out.
+pub fn calibration(results: &Results) -> String {
+    let headings = [
+        "eyes, mm",
+        "LOD bias",
+        "functional: Crytek",
+        "functional: held out",
+        "preset: Crytek",
+        "preset: held out",
+    ];
+    let models = results.values("model");
+    let columns: Vec<(String, &str)> = (models.iter())
+        .flat_map(|model| ["chooses", "held out"].map(|role| (model.clone(), role)))
+        .collect();
+    // Of several scenes held out: the root of the mean square, as the calibration pools them.
+    let distance = |ipd: &str, bias: &str, (model, role): &(String, &str)| {
+        let of = results.rows.iter().filter(|row| {
+            row["model"] == *model
+                && row["role"] == *role
+                && row["ipd_mm"] == ipd
+                && row["lod_bias"] == bias
+        });
+        let all: Vec<f64> = of
+            .map(|row| row["all_parts"].parse().expect("a number"))
+            .collect();
+        (all.iter().map(|d| d * d).sum::<f64>() / all.len() as f64).sqrt()
+    };
+    let mut settings = Vec::new();
+    for ipd in results.values("ipd_mm") {
+        for bias in results.values("lod_bias") {
+            settings.push((ipd.clone(), bias));
+        }
+    }
+    let least: Vec<f64> = (columns.iter())
+        .map(|column| {
+            let all = settings
+                .iter()
+                .map(|(ipd, bias)| distance(ipd, bias, column));
+            all.fold(f64::INFINITY, f64::min)
+        })
+        .collect();
+    let rows = settings.iter().map(|(ipd, bias)| {
+        let cells = columns.iter().zip(&least).map(|(column, least)| {
+            let found = distance(ipd, bias, column);
+            if found == *least {
+                format!("**{found:.3}**")
+            } else {
+                format!("{found:.3}")
+            }
+        });
+        [ipd.clone(), bias.clone()]
+            .into_iter()
+            .chain(cells)
+            .collect()
+    });
+    markdown(&headings, rows)
+}

@@ -1,0 +1,78 @@
+//! Figures in documents are those of the results files in `results/`. `make figures` writes the tables anew.
+
+use parallax_tests::figures::{Results, documents, with_tables};
+use parallax_tests::root;
+use std::collections::BTreeSet;
+use std::fs;
+
+#[test]
+fn every_marked_table_is_that_of_its_results_file() {
+    let writes = std::env::var_os("UPDATE_FIGURES").is_some();
+    let mut shown = BTreeSet::new();
+    for file in documents() {
+        let name = file.display();
+        let text = fs::read_to_string(&file).expect("a document");
+        let made = with_tables(&text, &root().join("results"));
+        let (made, names) = made.unwrap_or_else(|error| panic!("{name}: {error}"));
+        shown.extend(names);
+        if writes && made != text {
+            fs::write(&file, &made).expect("a document");
+        } else {
+            let lines = text.lines().zip(made.lines());
+            let first = (1..)
+                .zip(lines)
+                .find(|(_, (found, wanted))| found != wanted);
+            assert!(
+                made == text,
+                "{name}: a table differs from its results (`make figures` writes it anew): line, found and expected {first:?}"
+            );
+        }
+    }
+    assert!(!shown.is_empty(), "no document has a marked table");
+}
+
+#[test]
+fn every_results_file_says_how_it_was_made_and_a_document_refers_to_it() {
+    let texts: Vec<String> = (documents().iter())
+        .map(|file| fs::read_to_string(file).expect("a document"))
+        .collect();
+    for entry in fs::read_dir(root().join("results")).expect("a folder") {
+        let file = entry.expect("an entry").path();
+        let results = Results::read(&file).unwrap_or_else(|error| panic!("{error}"));
+        assert!(!results.rows.is_empty(), "{}: no rows", file.display());
+        let name = file.file_stem().expect("a name").to_string_lossy();
+        let marks = [
+            format!("results/{name}.csv"),
+            format!("figures: {name} -->"),
+        ];
+        let used = |text: &String| marks.iter().any(|mark| text.contains(mark));
+        assert!(
+            texts.iter().any(used),
+            "no document refers to {}",
+            file.display()
+        );
+    }
+}
+
+#[test]
+fn a_changed_digit_is_found_and_an_open_mark_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("a.csv"), "# command: none\nx,y\n1,2.5\n").expect("writable");
+    let table = "| x | y |\n| --- | --- |\n| 1 | 2.5 |\n";
+    let document = format!("Before.\n<!-- figures: a -->\n{table}<!-- end -->\nAfter.\n");
+    let made = |text: &str| with_tables(text, folder.path());
+    assert_eq!(
+        made(&document),
+        Ok((document.clone(), vec!["a".to_owned()]))
+    );
+    let (mended, _) = made(&document.replace("2.5", "2.6")).expect("a table");
+    assert_eq!(mended, document);
+    assert!(made("<!-- figures: a -->\nno end\n").is_err());
+    assert!(made(&document.replace("figures: a", "figures: b")).is_err());
+    fs::write(folder.path().join("a.csv"), "x,y\n1,2.5\n").expect("writable");
+    assert!(
+        made(&document)
+            .expect_err("no command")
+            .contains("# command:")
+    );
+}
