@@ -49,7 +49,8 @@ fn every_order_replays_all_quads_of_all_layers() {
         let info = json(&["info", "--json"], &trace);
         let passes = info["passes"].as_array().expect("passes");
         let layers = match kind {
-            "rings" => 10,
+            // Nothing of the lens lies beyond the last ring, so its rate has no layer.
+            "rings" => 8,
             "multi-resolution" => 18,
             _ => 2,
         };

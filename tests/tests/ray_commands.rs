@@ -59,7 +59,7 @@ fn info_tells_the_hierarchy_and_the_rays_by_kind() {
         kinds.values().filter_map(Value::as_u64).sum::<u64>()
     };
     assert_eq!(info["totals"]["left"]["samples"], 128 * 128);
-    assert_eq!(rays("left") + rays("right"), 112_631, "as validate counts");
+    assert_eq!(rays("left") + rays("right"), 112_637, "as validate counts");
 }
 
 #[test]
