@@ -445,3 +445,22 @@ fn validate_refuses_textures_that_run_cannot_address() {
         "{told}"
     );
 }
+
+#[cfg(unix)]
+#[test]
+fn settings_without_an_end_are_refused() {
+    let golden = root().join("traces/teapot-rays.raytrace");
+    let endless = "/dev/zero";
+    let expected = [endless, "at most 4MiB of TOML"];
+    let mut reproject = program("replay");
+    refuse(
+        reproject
+            .args(["reproject", "--config", endless])
+            .arg(golden),
+        &expected,
+    );
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut sweep = program("tracegen");
+    sweep.args(["sweep", endless, "-o"]).arg(folder.path());
+    refuse(&mut sweep, &expected);
+}

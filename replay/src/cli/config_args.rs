@@ -6,49 +6,16 @@ use crate::config::{
 };
 use crate::preset::Preset;
 use crate::size::{format_bytes, parse_bytes};
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use formats::texture::TexelFormat;
 use serde::de::value::Error as ValueError;
 use serde::de::{DeserializeOwned, IntoDeserializer};
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Reads an enum of the formats crate by its serialised name.
 fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     T::deserialize(text.into_deserializer()).map_err(|e: ValueError| e.to_string())
-}
-
-/// More than this is no file of settings.
-const LONGEST_TOML_BYTES: u64 = 4 << 20;
-
-/// Reads a file of settings.
-///
-/// # Errors
-/// The file cannot be read, is too long or is no text; the message names it.
-pub fn read_toml(path: &Path) -> Result<String> {
-    let mut bytes = Vec::new();
-    let file = File::open(path).with_context(|| path.display().to_string())?;
-    file.take(LONGEST_TOML_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .with_context(|| path.display().to_string())?;
-    ensure!(
-        bytes.len() as u64 <= LONGEST_TOML_BYTES,
-        "{}: expected at most {} of TOML, found more",
-        path.display(),
-        format_bytes(LONGEST_TOML_BYTES)
-    );
-    String::from_utf8(bytes).map_err(|error| {
-        let good = error.utf8_error().valid_up_to();
-        let bytes = error.as_bytes();
-        let line = 1 + bytes.iter().take(good).filter(|b| **b == b'\n').count();
-        let found = bytes.get(good).copied().unwrap_or_default();
-        anyhow!(
-            "{}: line {line}: expected TOML in UTF-8, found the byte {found:#04x}",
-            path.display()
-        )
-    })
 }
 
 /// Flags of the replay configuration.
@@ -108,7 +75,7 @@ pub struct ConfigArgs {
     /// Filter in place of the recorded one: trilinear, bilinear, nearest
     #[arg(long, value_parser = named::<FilterOverride>, help_heading = "Sampling")]
     filter: Option<FilterOverride>,
-    /// Level-of-detail formula: llvmpipe, softpipe, exact
+    /// Level-of-detail formula: llvmpipe, softpipe, exact, per-lane
     #[arg(long, value_parser = named::<LodFormula>, help_heading = "Sampling")]
     lod: Option<LodFormula>,
     /// Added to the level of detail
@@ -212,7 +179,7 @@ impl ConfigArgs {
     fn resolve_file_over(&self, defaults: RunConfig) -> Result<RunConfig> {
         let mut config = match &self.config {
             None => defaults,
-            Some(path) => toml::from_str(&read_toml(path)?)
+            Some(path) => toml::from_str(&shell::read_settings(path)?)
                 .map_err(|e| anyhow!("{}: {}", path.display(), e.to_string().trim()))?,
         };
         self.apply(&mut config)?;

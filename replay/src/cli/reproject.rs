@@ -142,8 +142,7 @@ fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
     let Some(path) = path else {
         return Ok(SgrtConfig::default());
     };
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("{}: cannot read the parameters", path.display()))?;
+    let text = shell::read_settings(path)?;
     SgrtConfig::from_overrides(&text).with_context(|| path.display().to_string())
 }
 

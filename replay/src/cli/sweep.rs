@@ -1,6 +1,5 @@
 //! `replay sweep`: the points of an experiment file, here or on many machines.
 
-use super::config_args::read_toml;
 use super::parquet_arg::ParquetArg;
 use super::subjects::Traces;
 use crate::experiment::{self, ExperimentFile, Outcome, Plan, Point, Split, Store, Subject};
@@ -85,7 +84,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.check()?;
     args.threads.start()?;
     let name = args.experiment.display();
-    let file = ExperimentFile::parse(&read_toml(&args.experiment)?);
+    let file = ExperimentFile::parse(&shell::read_settings(&args.experiment)?);
     let file = file.with_context(|| name.to_string())?;
     let plan = file.plan().with_context(|| name.to_string())?;
     if args.plan && !args.json {

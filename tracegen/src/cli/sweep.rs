@@ -25,9 +25,6 @@ const ABANDONED_AFTER: Duration = Duration::from_secs(24 * 3600);
 const PIXELS_PER_TRIANGLE: u64 = 8;
 const SAMPLES_PER_TRIANGLE: u64 = 10;
 
-/// A manifest is a page of settings.
-const LONGEST_MANIFEST_BYTES: u64 = 4 << 20;
-
 /// Arguments of `tracegen sweep`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
@@ -86,7 +83,7 @@ struct PlannedCapture<'a> {
 /// A bad manifest, a folder that cannot be written, captures that failed.
 pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     let name = || args.manifest.display().to_string();
-    let captures = captures::parse(&read(&args.manifest)?).with_context(name)?;
+    let captures = captures::parse(&shell::read_settings(&args.manifest)?).with_context(name)?;
     let mut scenes = SceneSizes::new(folder_of(&args.manifest));
     let planned = captures
         .into_iter()
@@ -103,17 +100,6 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         return shell::print(&plan_text(mine, args.json)?);
     }
     capture_all(args, mine)
-}
-
-fn read(path: &Path) -> anyhow::Result<String> {
-    let place = || path.display().to_string();
-    let length = std::fs::metadata(path).with_context(place)?.len();
-    ensure!(
-        length <= LONGEST_MANIFEST_BYTES,
-        "{}: expected at most {LONGEST_MANIFEST_BYTES} bytes, found {length}",
-        path.display()
-    );
-    std::fs::read_to_string(path).with_context(place)
 }
 
 /// The folder that paths in a manifest are relative to.
