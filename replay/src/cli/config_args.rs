@@ -5,8 +5,8 @@ use crate::config::{
     LodFormula, Mode, Order, Replacement, RunConfig, TextureOrder,
 };
 use crate::preset::Preset;
-use crate::size::{format_bytes, parse_bytes};
-use anyhow::{Context, Result, ensure};
+use crate::size::parse_bytes;
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use formats::texture::TexelFormat;
 use serde::de::value::Error as ValueError;
