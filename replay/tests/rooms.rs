@@ -5,7 +5,14 @@ use std::path::{Path, PathBuf};
 
 /// From the bottom up. A room may use rooms below it; those on one floor may use each other.
 const FLOORS: [&[&str]; 11] = [
-    &["files", "palette", "registry", "result", "size"],
+    &[
+        "files",
+        "model_version",
+        "palette",
+        "registry",
+        "result",
+        "size",
+    ],
     &["cache", "config", "order"],
     &["paper", "preset", "tmu"],
     &["addresses", "stream"],

@@ -451,7 +451,7 @@ fn validate_refuses_textures_that_run_cannot_address() {
 fn settings_without_an_end_are_refused() {
     let golden = root().join("traces/teapot-rays.raytrace");
     let endless = "/dev/zero";
-    let expected = [endless, "at most 4MiB of TOML"];
+    let expected = [endless, "at most 4 MiB of TOML"];
     let mut reproject = program("replay");
     refuse(
         reproject

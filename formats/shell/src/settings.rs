@@ -20,7 +20,7 @@ pub fn read_settings(path: &Path) -> Result<String> {
     (file.take(longest + 1).read_to_end(&mut bytes)).with_context(name)?;
     ensure!(
         bytes.len() as u64 <= longest,
-        "{}: expected at most {LONGEST_MIB}MiB of TOML, found more",
+        "{}: expected at most {LONGEST_MIB} MiB of TOML, found more",
         name()
     );
     String::from_utf8(bytes).map_err(|error| {
