@@ -3,7 +3,7 @@
 
 use crate::container::{CHUNK_ALIGNMENT_BYTES, DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 use crate::raytrace::RAY_INDEX_ENTRY_BYTES;
-use crate::textrace::{self, INDEX_ENTRY_BYTES, Textrace, TextraceWriter, tables};
+use crate::textrace::{self, INDEX_ENTRY_BYTES, Textrace, TextraceWriter, geometry, tables};
 use std::collections::HashMap;
 
 const FORMAT: &str = include_str!("../../FORMAT.md");
@@ -51,6 +51,8 @@ fn documented_sizes_are_the_codes() {
         ("sample", tables::SAMPLE_BYTES),
         ("pass", tables::PASS_BYTES),
         ("tile index entry", INDEX_ENTRY_BYTES),
+        ("mesh without indices", geometry::MESH_BYTES),
+        ("list index entry", geometry::LIST_INDEX_ENTRY_BYTES),
         ("raw run", textrace::RAW_RUN_BYTES),
         ("raw record", textrace::RAW_RECORD_BYTES),
         ("padding of bits", textrace::BITS_PADDING_BYTES),
@@ -76,11 +78,18 @@ fn documented_fields_add_up() {
     assert_eq!(size("### Draw"), tables::DRAW_BYTES);
     assert_eq!(size("### Pass"), tables::PASS_BYTES);
     assert_eq!(size("### Tile index entry"), INDEX_ENTRY_BYTES);
+    assert_eq!(
+        size("### List index entry"),
+        geometry::LIST_INDEX_ENTRY_BYTES
+    );
 }
 
 #[test]
 fn chunks_come_in_the_documented_order() {
-    let bytes = TextraceWriter::in_memory(&textrace::tests::tables())
+    let tables = textrace::tests::tables();
+    let bytes = TextraceWriter::in_memory(&tables)
+        .unwrap()
+        .with_geometry(geometry::tests::geometry(&tables))
         .unwrap()
         .into_bytes()
         .unwrap();

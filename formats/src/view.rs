@@ -27,6 +27,15 @@ pub enum Eye {
     Right,
 }
 
+impl std::fmt::Display for Eye {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        })
+    }
+}
+
 /// Tangents of the four half-angles of an eye's frustum, all positive for an on-axis eye.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FovTangents {

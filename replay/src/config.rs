@@ -1,5 +1,7 @@
 //! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
 
+use crate::memory::clients::FrameConfig;
+use crate::memory::dram::DramConfig;
 use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -257,6 +259,12 @@ pub struct RunConfig {
     /// The caches between frames; results name it where it is not the default.
     #[serde(skip_serializing_if = "BetweenFrames::is_default")]
     pub between_frames: BetweenFrames,
+    /// The DRAM below the caches; without it, lines that leave the chip are only counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dram: Option<DramConfig>,
+    /// The machine around the texture units; without it, texture traffic alone is counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame: Option<FrameConfig>,
 }
 
 impl Default for RunConfig {
@@ -276,6 +284,8 @@ impl Default for RunConfig {
             tile_maps: false,
             hsr: Hsr::EarlyZ,
             between_frames: BetweenFrames::Keep,
+            dram: None,
+            frame: None,
         }
     }
 }
@@ -394,6 +404,15 @@ impl RunConfig {
             "1 to 16",
             self.sampling.max_anisotropy.to_string(),
         )?;
+        let dram = self.dram.as_ref().map_or(Ok(()), DramConfig::check);
+        let dram = dram.map_err(|(key, expected, found)| (key, expected, u64::from(found)));
+        let frame = self.frame.as_ref().map_or(Ok(()), FrameConfig::check);
+        dram.and(frame)
+            .map_err(|(key, expected, found)| ConfigError::Range {
+                key,
+                expected,
+                found: found.to_string(),
+            })?;
         let tmu = &self.tmu;
         range(
             (1..=4096).contains(&tmu.threads),

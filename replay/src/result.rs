@@ -1,5 +1,7 @@
 //! What a replay yields: plain data that the models fill and the printers read.
 
+use crate::memory::clients::{ClientTraffic, GeometryCounts};
+use crate::memory::dram::DramResult;
 use formats::textrace::TraceMeta;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -146,6 +148,15 @@ pub struct RunResult {
     /// Rates as the Z2 paper very probably counts them; only where threads stop at their first miss.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_lookups: Option<FirstLookups>,
+    /// The DRAM below the caches, where the configuration has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dram: Option<DramResult>,
+    /// Traffic of the whole frame by client, where the configuration has a `[frame]`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub clients: Vec<ClientTraffic>,
+    /// What vertex processing did there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<GeometryCounts>,
     /// By view.
     pub by_view: Vec<Part>,
     /// By texture, in table order.

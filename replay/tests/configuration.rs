@@ -3,6 +3,8 @@
 
 use clap::ValueEnum;
 use replay::config::{Allocation, Assign, BetweenFrames, Hsr, Mode, Order, Replacement, RunConfig};
+use replay::memory::clients::{FrameConfig, FrameMachine};
+use replay::memory::dram::{DramConfig, DramPreset, Mapping, PagePolicy};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -107,6 +109,10 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
         "Assign" => of::<Assign>(),
         "Hsr" => of::<Hsr>(),
         "BetweenFrames" => of::<BetweenFrames>(),
+        "DramPreset" => of::<DramPreset>(),
+        "Mapping" => of::<Mapping>(),
+        "PagePolicy" => of::<PagePolicy>(),
+        "FrameMachine" => of::<FrameMachine>(),
         "FilterOverride" | "LodFormula" | "AnisotropyModel" | "BlockOrder" | "TextureOrder"
         | "TexelFormat" => {
             let name = |item: &Item| {
@@ -120,9 +126,19 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
     }
 }
 
+/// The default configuration, with a DRAM below the caches and all clients of memory.
+fn defaults() -> Table {
+    let config = RunConfig {
+        dram: Some(DramConfig::default()),
+        frame: Some(FrameConfig::default()),
+        ..RunConfig::default()
+    };
+    Table::try_from(config).unwrap()
+}
+
 /// A configuration with one key set.
 fn with(key: &str, value: Value) -> Result<RunConfig, String> {
-    let mut table = Table::try_from(RunConfig::default()).unwrap();
+    let mut table = defaults();
     let (mut inner, mut rest) = (&mut table, key);
     while let Some((first, last)) = rest.split_once('.') {
         inner = inner.get_mut(first).and_then(Value::as_table_mut).unwrap();
@@ -195,6 +211,10 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
 fn page() -> String {
     let sources: String = [
         "replay/src/config.rs",
+        "replay/src/memory/clients.rs",
+        "replay/src/memory/dram/mod.rs",
+        "replay/src/memory/dram/mapping.rs",
+        "replay/src/memory/dram/presets.rs",
         "formats/src/footprint/options.rs",
         "formats/src/footprint/aniso.rs",
         "formats/src/layout/mod.rs",
@@ -202,7 +222,7 @@ fn page() -> String {
     ]
     .map(|path| fs::read_to_string(root().join(path)).unwrap())
     .concat();
-    let defaults = Table::try_from(RunConfig::default()).unwrap();
+    let defaults = defaults();
     let mut page =
         format!("{INTRODUCTION}\n| key | default; values | what it is |\n| --- | --- | --- |\n");
     describe(&sources, "RunConfig", "", &defaults, &mut page);
@@ -235,7 +255,7 @@ fn every_key_has_a_line_that_says_what_it_is() {
         .filter(|line| line.starts_with("| `"))
         .collect();
     // One key has no default, and four are written where they are another.
-    let written = count(&Table::try_from(RunConfig::default()).unwrap());
+    let written = count(&defaults());
     assert_eq!(keys.len(), written + 5);
     for line in keys {
         let about = line.split(" | ").last().unwrap();

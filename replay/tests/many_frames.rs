@@ -76,7 +76,7 @@ fn watched(work: impl FnOnce()) -> (f64, u64) {
 }
 
 #[test]
-fn neither_memory_nor_the_time_of_a_frame_grows_with_the_number_of_frames() {
+fn memory_does_not_grow_with_the_number_of_frames() {
     let asked: Option<u32> = (std::env::var("FRAMES").ok()).map(|frames| frames.parse().unwrap());
     let frames = asked.unwrap_or(40);
     let given = std::env::var_os("TEXTRACE").map(|path| Textrace::open(Path::new(&path)).unwrap());
@@ -140,7 +140,18 @@ fn neither_memory_nor_the_time_of_a_frame_grows_with_the_number_of_frames() {
             long.0,
             long_bytes / 1_000_000
         );
-        assert!(long_bytes < 512_000_000, "{long_bytes} bytes");
+        // The line lists of one frame are about 250 kB: 36 of them kept would show.
+        let most = if asked.is_some() {
+            2 * short_bytes + 256_000_000
+        } else {
+            short_bytes + short_bytes / 4 + 4_000_000
+        };
+        assert!(
+            long_bytes <= most,
+            "{name}: {} frames take {short_bytes} bytes, {} take {long_bytes}",
+            short.0,
+            long.0
+        );
         // Time is for a machine on which nothing else runs.
         let grows = asked.is_some() && long_ms > 1.5 * short_ms;
         assert!(!grows, "{short_ms} ms, then {long_ms} ms");

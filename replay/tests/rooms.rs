@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the bottom up. A room may use rooms below it; those on one floor may use each other.
-const FLOORS: [&[&str]; 11] = [
+const FLOORS: [&[&str]; 12] = [
     &[
         "files",
+        "memory",
         "model_version",
         "palette",
         "registry",
@@ -16,6 +17,7 @@ const FLOORS: [&[&str]; 11] = [
     &["cache", "config", "order"],
     &["paper", "preset", "tmu"],
     &["addresses", "stream"],
+    &["whole_frame"],
     &["engine"],
     &["compare", "locality"],
     &["sgrt"],

@@ -1,7 +1,8 @@
 """Prints a .textrace: a line of JSON with the tables, then one for each record.
 
-    python3 textrace.py FILE
+    python3 textrace.py FILE [--lists]
 
+With --lists it prints a line for each tile of each view of the geometry instead.
 Written from FORMAT.md alone; see container.py.
 """
 
@@ -13,6 +14,7 @@ from planes import decode_planes, read_codes
 
 ENCODINGS = (0, 1, 3)
 TAGS = ["META", "TEXS", "SMPS", "DRAW", "PASS", "TILE", "TIDX"]
+GEOMETRY_TAGS = ["GEOM", "PLST", "PLIX"]
 FORMATS = {
     1: "bc1",
     3: "bc3",
@@ -248,7 +250,69 @@ def check_tile(heads, rows, draws):
     require(first == len(rows), "records of the runs")
 
 
-def main(path):
+def ascending(data):
+    """A list of ascending numbers."""
+    numbers, following = [], 0
+    for _ in range(data.number()):
+        numbers.append(following + data.number())
+        following = numbers[-1] + 1
+    require(following <= 1 << 32, "a number out of range")
+    return numbers
+
+
+def read_mesh(data):
+    vertices, vertex_bytes, index_bytes = data.fields("IHH")
+    require(vertex_bytes >= 1 and index_bytes in (2, 4), "a mesh")
+    indices, following = [], 0
+    for _ in range(data.count(1)):
+        indices.append(following - unzigzag(data.number(1 << 33)))
+        require(0 <= indices[-1] < vertices, "an index")
+        following = max(following, indices[-1] + 1)
+    require(len(indices) % 3 == 0, "a triangle of fewer indices")
+    return indices
+
+
+def read_geometry(chunks, minor, draws, passes, frames):
+    """Yields (view, tile, primitives) for each tile of each view."""
+    tags = [tag for tag in chunks if tag in GEOMETRY_TAGS]
+    if not tags:
+        return
+    require(tags == GEOMETRY_TAGS and minor >= 2, "geometry missing, out of order or too old")
+    require(list(chunks).index("GEOM") > list(chunks).index("TIDX"), "geometry before the tiles")
+    data = Bytes(chunks["GEOM"])
+    meshes = [read_mesh(data) for _ in range(data.count(12))]
+    of_draws = [data.field("I") for _ in range(data.count(4))]
+    data.end()
+    require(len(of_draws) == len(draws), "meshes of the draws")
+    for mesh, draw in zip(of_draws, draws):
+        require(mesh < len(meshes) and len(meshes[mesh]) == 3 * draw["primitives"], "a draw's mesh")
+    index = Bytes(chunks["PLIX"])
+    entries = [index.fields("IIIIIQII") for _ in range(index.left() // 36)]
+    index.end()
+    tile_spans([entry[5:] for entry in entries], chunks["PLST"])
+    for view, (frame, kind, number, width, height, offset, size, _) in enumerate(entries):
+        require(frame in frames and 1 <= width <= 16384 and 1 <= height <= 16384, "a view")
+        if kind == 0:
+            of = passes[number]
+            require((of["frame"], of["size_px"]) == (frame, [width, height]), "the pass of a view")
+        require(kind <= 1, "the kind of a view")
+        lists = Bytes(chunks["PLST"][offset : offset + size])
+        drawn = ascending(lists)
+        require(not drawn or drawn[-1] < len(draws), "draws of a view")
+        ranges = [draws[draw] for draw in drawn]
+        allowed = {
+            primitive
+            for draw in ranges
+            for primitive in range(draw["first_primitive"], draw["first_primitive"] + draw["primitives"])
+        }
+        for tile in range(-(-width // 16) * -(-height // 16)):
+            primitives = ascending(lists)
+            require(allowed.issuperset(primitives), "a primitive of another draw")
+            yield view, tile, primitives
+        lists.end()
+
+
+def main(path, *options):
     chunks, minor = read(path, 1)
     require([tag for tag in chunks if tag in TAGS] == TAGS, "chunks missing or out of order")
     meta = check_meta(shaped(parse_json(chunks["META"]), META))
@@ -266,6 +330,12 @@ def main(path):
             "passes": passes,
         }
     )
+    frames = {views["frame"] for views in meta["frames"]}
+    for view, tile, primitives in read_geometry(chunks, minor, draws, passes, frames):
+        if "--lists" in options:
+            print_line({"view": view, "tile": tile, "primitives": primitives})
+    if "--lists" in options:
+        return
     index = Bytes(chunks["TIDX"])
     places = [
         (number, tile)
@@ -312,4 +382,4 @@ def main(path):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

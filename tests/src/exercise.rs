@@ -8,7 +8,8 @@ use formats::layout::{Layout, LayoutConfig};
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
 use formats::view::Eye;
-use replay::config::{Mode, RunConfig};
+use replay::config::{Hsr, Mode, RunConfig};
+use replay::memory::clients::{FrameConfig, FrameMachine};
 use replay::sgrt::compose::Reuse;
 use replay::sgrt::config::SgrtConfig;
 use replay::sgrt::loaded::LoadedTrace;
@@ -28,9 +29,26 @@ pub fn exercise(bytes: Vec<u8>) -> bool {
     match trace {
         Trace::Texture(trace) => {
             expand(&trace);
-            for mode in [Mode::Functional, Mode::Timed] {
+            let machines = [
+                (Mode::Functional, Hsr::EarlyZ),
+                (Mode::Timed, Hsr::Deferred),
+                (Mode::FirstMiss, Hsr::None),
+            ];
+            let frames = [
+                FrameMachine::TileBased,
+                FrameMachine::TileBasedGBuffer,
+                FrameMachine::Immediate,
+            ];
+            for ((mode, hsr), machine) in machines.into_iter().zip(frames) {
+                let machine = FrameConfig {
+                    machine,
+                    multiview: mode == Mode::Functional,
+                    ..FrameConfig::default()
+                };
                 let config = RunConfig {
                     mode,
+                    hsr,
+                    frame: trace.geometry().map(|_| machine),
                     ..RunConfig::default()
                 };
                 // Textures may be too large for a layout, which is an error and no panic.

@@ -90,6 +90,17 @@ pub fn encodings(trace: &Path) -> Vec<String> {
         .collect()
 }
 
+/// Prints why a test is skipped. The line passes by libtest's capture, and `scripts/test.sh` lists it at the end.
+#[macro_export]
+macro_rules! skipped {
+    ($($reason:tt)*) => {
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("SKIPPED: {}\n", format_args!($($reason)*)),
+        );
+    };
+}
+
 /// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout),
 /// or `None`, with a line on stderr that says so.
 #[must_use]
@@ -100,10 +111,7 @@ pub fn real_scene(relative: &str) -> Option<PathBuf> {
     if path.exists() {
         Some(path)
     } else {
-        eprintln!(
-            "SKIPPED: {} is absent (set PARALLAX_SCENES)",
-            path.display()
-        );
+        skipped!("{} is absent (set PARALLAX_SCENES)", path.display());
         None
     }
 }

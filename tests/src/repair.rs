@@ -133,6 +133,30 @@ impl Parts {
                 entry[12..16].copy_from_slice(&crc32.to_le_bytes());
             }
         }
+        self.repair_lists();
+    }
+
+    /// Makes the sizes and checksums of primitive lists right, where there are any: the last list takes what the chunk has.
+    fn repair_lists(&mut self) {
+        let has = |tag: &[u8; 4]| self.chunks.iter().any(|(other, _)| other == tag);
+        if !has(b"PLST") || !has(b"PLIX") {
+            return;
+        }
+        let lists = self.chunk(b"PLST").clone();
+        let entries: Vec<&mut [u8]> = self.chunk(b"PLIX").chunks_exact_mut(36).collect();
+        let last = entries.len().wrapping_sub(1);
+        for (place, entry) in entries.into_iter().enumerate() {
+            let (start, size) = (number(entry, 20, 8), number(entry, 28, 4));
+            let start = start.min(lists.len());
+            let end = if place == last {
+                lists.len()
+            } else {
+                start.saturating_add(size).min(lists.len())
+            };
+            let list = &lists[start..end];
+            entry[28..32].copy_from_slice(&(list.len() as u32).to_le_bytes());
+            entry[32..36].copy_from_slice(&crc32(list).to_le_bytes());
+        }
     }
 
     /// The file, with the checksums of chunks, directory and header made anew. A chunk whose tag
@@ -210,6 +234,10 @@ pub fn validate(trace: &Trace) -> formats::Result<()> {
                 for index in 0..info.tile_count() as usize {
                     trace.decode_tile(pass, index, &mut tile)?;
                 }
+            }
+            let views = trace.geometry().map_or(0, |geometry| geometry.views.len());
+            for view in 0..views {
+                trace.tile_lists(view)?;
             }
         }
         Trace::Ray(trace) => {

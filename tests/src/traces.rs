@@ -7,6 +7,7 @@ use formats::raytrace::{
     RayRecord, RayTile, RayTriangle, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
     Visit, encode_ray_tile, half,
 };
+use formats::textrace::geometry::{Geometry, GeometryView, MeshGeometry, TileLists, ViewTarget};
 use formats::textrace::{
     Draw, Encoding, NO_GROUP, Pass, PassKind, PrimitiveRun, QuadRecord, Sample, Tables,
     TextraceWriter, Tile, TraceMeta, UvGroup, encode_tile_as, quad_morton,
@@ -72,6 +73,7 @@ fn meta(frames: u32) -> TraceMeta {
             .collect(),
         surfaces: None,
         origin_m: [0.0; 3],
+        techniques: None,
     }
 }
 
@@ -206,8 +208,63 @@ pub fn texture_trace(encoding: Encoding, seed: u64) -> Vec<u8> {
 /// A texture trace with these tables.
 #[must_use]
 pub fn texture_trace_of(tables: &Tables, encoding: Encoding, seed: u64) -> Vec<u8> {
+    let writer = TextraceWriter::in_memory(tables).expect("sound tables");
+    with_tiles(writer, tables, encoding, seed)
+}
+
+/// A texture trace with the geometry of its draws, its passes and a shadow map.
+#[must_use]
+pub fn geometry_trace(seed: u64) -> Vec<u8> {
+    let tables = &texture_tables();
     let mut random = Random(seed);
-    let mut writer = TextraceWriter::in_memory(tables).expect("sound tables");
+    let mut geometry = Geometry::default();
+    for (mesh, draw) in (0..).zip(&tables.draws) {
+        geometry.meshes.push(MeshGeometry {
+            vertices: 500,
+            vertex_bytes: 20 + 12 * mesh as u16,
+            index_bytes: 2 + 2 * (mesh as u16 % 2),
+            indices: (0..3 * draw.primitives)
+                .map(|_| random.below(500))
+                .collect(),
+        });
+        geometry.draw_meshes.push(mesh);
+    }
+    let writer = TextraceWriter::in_memory(tables).expect("sound tables");
+    let mut writer = writer.with_geometry(geometry).expect("sound geometry");
+    let shadow_map = GeometryView {
+        frame: 0,
+        target: ViewTarget::ShadowMap(3),
+        size_px: [33, 40],
+    };
+    let of_pass = |(number, pass): (u32, &Pass)| GeometryView {
+        frame: pass.frame,
+        target: ViewTarget::Pass(number),
+        size_px: pass.size_px,
+    };
+    let views = (0..).zip(&tables.passes).map(of_pass);
+    for view in std::iter::once(shadow_map).chain(views) {
+        let mut lists = TileLists {
+            draws: vec![0, 2],
+            starts: vec![0],
+            primitives: Vec::new(),
+        };
+        for _ in 0..view.tile_count() {
+            let of_tile = (0..3000_u32).filter(|p| p / 1000 != 1 && random.below(40) == 0);
+            lists.primitives.extend(of_tile);
+            lists.starts.push(lists.primitives.len() as u32);
+        }
+        writer.append_view(view, &lists).expect("sound lists");
+    }
+    with_tiles(writer, tables, Encoding::Delta, seed)
+}
+
+fn with_tiles(
+    mut writer: TextraceWriter<std::io::Cursor<Vec<u8>>>,
+    tables: &Tables,
+    encoding: Encoding,
+    seed: u64,
+) -> Vec<u8> {
+    let mut random = Random(seed);
     for (pass, info) in tables.passes.iter().enumerate() {
         for index in 0..info.tile_count() as usize {
             if random.below(3) > 0 {
@@ -406,5 +463,7 @@ pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
         let name = format!("{samples}-samples-visits-{visits}");
         (name, Kind::Raytrace, ray_trace(samples, visits, 7))
     });
-    textures.into_iter().chain(rays).collect()
+    let geometry = ("geometry".to_owned(), Kind::Textrace, geometry_trace(5));
+    let textures = textures.into_iter().chain([geometry]);
+    textures.chain(rays).collect()
 }

@@ -26,7 +26,7 @@ fn can_run(program: &str) -> bool {
         let found = Command::new("python3").args(["-c", line]).output();
         let found = found.is_ok_and(|output| output.status.success());
         if !found {
-            eprintln!("SKIPPED: python3 with `{line}` is absent");
+            parallax_tests::skipped!("python3 with `{line}` is absent");
         }
         found
     })

@@ -20,7 +20,7 @@ fn capture(folder: &Path, backend: &str, driver: &str, arguments: &[&str]) -> Op
         .expect("the program starts");
     let told = String::from_utf8_lossy(&output.stderr);
     if told.contains("apt-get install libosmesa6") {
-        eprintln!("SKIPPED: libOSMesa.so.8 is absent (apt-get install libosmesa6)");
+        parallax_tests::skipped!("libOSMesa.so.8 is absent (apt-get install libosmesa6)");
         return None;
     }
     assert!(output.status.success(), "{told}");

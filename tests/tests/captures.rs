@@ -70,13 +70,15 @@ fn shards_capture_what_the_command_line_does_and_only_once() {
     );
     let names: Vec<String> = ["chess-quest2", "chess-vive", "teapot-quest2", "teapot-vive"]
         .iter()
-        .flat_map(|name| ["raytrace", "recipe"].map(|kind| format!("{name}.{kind}")))
+        .flat_map(|name| ["raytrace", "raytrace.recipe"].map(|kind| format!("{name}.{kind}")))
         .collect();
     assert_eq!(captures.names("out"), names);
 
     // A trace is what its recipe makes by hand.
-    let recipe = fs::read_to_string(captures.path("out/chess-vive.recipe")).expect("a recipe");
-    assert_eq!(recipe, "rays chess --hmd vive --size 16x24\n");
+    let recipe = captures.path("out/chess-vive.raytrace.recipe");
+    let recipe = fs::read_to_string(recipe).expect("a recipe");
+    let (recipe, checksum) = recipe.split_once('\n').expect("two lines");
+    assert_eq!(recipe, "rays chess --hmd vive --size 16x24");
     let by_hand = captures.path("by-hand.raytrace");
     run_ok(
         program("tracegen")
@@ -84,15 +86,81 @@ fn shards_capture_what_the_command_line_does_and_only_once() {
             .arg("-o")
             .arg(&by_hand),
     );
-    let [a, b] =
-        [captures.path("out/chess-vive.raytrace"), by_hand].map(|p| fs::read(p).expect("a trace"));
+    let [a, b] = [&captures.path("out/chess-vive.raytrace"), &by_hand]
+        .map(|p| fs::read(p).expect("a trace"));
     assert!(a == b);
+    let info = run_ok(program("replay").args(["info", "--json"]).arg(&by_hand)).stdout;
+    let info: serde_json::Value = serde_json::from_slice(&info).expect("JSON");
+    let told = info["checksum"].as_str().expect("a checksum");
+    assert_eq!(checksum, format!("# content checksum {told}\n"));
 
     // Another recipe under the same name is captured again, and so is a trace that has none.
     fs::write(captures.path("m.toml"), MANIFEST.replace("16x24", "24x16")).expect("temporary file");
     assert!(captures.run("out", &[]).contains("4 made"));
-    fs::remove_file(captures.path("out/teapot-vive.recipe")).expect("removed");
+    fs::remove_file(captures.path("out/teapot-vive.raytrace.recipe")).expect("removed");
     assert!(captures.run("out", &[]).contains("1 made, 3 there"));
+}
+
+#[test]
+fn other_settings_of_the_rays_of_a_scene_recapture_the_rays_alone() {
+    let manifest = |raster: &str, rays: &str| {
+        format!(
+            "[[captures]]\nscene = \"teapot\"\nno-plain = true\nsize = \"{raster}\"\n\
+             [[captures]]\ncommand = \"rays\"\nscene = \"teapot\"\nsize = \"{rays}\"\n"
+        )
+    };
+    let captures = Captures::new(&manifest("16x24", "16x24"));
+    assert!(captures.run("out", &[]).contains("2 made"));
+    assert!(captures.run("out", &[]).contains("0 made, 2 there"));
+    let trace = |kind: &str| {
+        let path = captures.path(&format!("out/teapot.{kind}"));
+        fs::metadata(path)
+            .and_then(|m| m.modified())
+            .expect("a trace")
+    };
+    for (raster, rays, kept) in [
+        ("16x24", "24x16", "textrace"),
+        ("24x16", "24x16", "raytrace"),
+    ] {
+        let before = trace(kept);
+        fs::write(captures.path("m.toml"), manifest(raster, rays)).expect("temporary file");
+        let told = captures.run("out", &[]);
+        assert!(told.contains("1 made, 1 there"), "{told}");
+        assert_eq!(trace(kept), before);
+    }
+}
+
+#[test]
+fn a_truncated_or_a_foreign_trace_beside_its_recipe_is_captured_again() {
+    let captures = Captures::new(MANIFEST);
+    captures.run("out", &[]);
+    let path = |name: &str| captures.path(&format!("out/{name}.raytrace"));
+    let whole = fs::read(path("teapot-vive")).expect("a trace");
+    fs::write(path("teapot-vive"), &whole[..whole.len() - 64]).expect("a file");
+    fs::copy(path("chess-vive"), path("chess-quest2")).expect("a file");
+    let plan = run_ok(&mut captures.command("out", &["--plan", "--json"])).stdout;
+    let plan: serde_json::Value = serde_json::from_slice(&plan).expect("JSON");
+    let done = plan["captures"].as_array().expect("captures").iter();
+    let done: Vec<&serde_json::Value> = done.map(|c| &c["done"]).collect();
+    assert_eq!(done, [false, true, true, false]);
+    let told = captures.run("out", &[]);
+    assert!(told.contains("2 made, 2 there"), "{told}");
+    assert!(fs::read(path("teapot-vive")).expect("a trace") == whole);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_the_place_of_a_recipe_or_a_trace_is_refused() {
+    let captures =
+        Captures::new("[[captures]]\ncommand = \"rays\"\nscene = \"teapot\"\nsize = \"16x24\"\n");
+    for name in ["teapot.raytrace", "teapot.raytrace.recipe"] {
+        captures.run("out", &[]);
+        let path = captures.path("out").join(name);
+        fs::remove_file(&path).expect("removed");
+        run_ok(Command::new("mkfifo").arg(&path));
+        refuse(&mut captures.command("out", &[]), &[name, "a pipe"]);
+        fs::remove_file(&path).expect("removed");
+    }
 }
 
 #[test]
@@ -189,7 +257,7 @@ fn bad_captures_are_refused_before_the_first_and_failures_are_named_after_the_la
     );
     assert_eq!(
         captures.names("out"),
-        ["teapot-low.raytrace", "teapot-low.recipe"]
+        ["teapot-low.raytrace", "teapot-low.raytrace.recipe"]
     );
     refuse(&mut captures.command("out", &["--json"]), &["--plan"]);
     refuse(

@@ -117,7 +117,7 @@ fn quiet_prints_the_result_alone() {
 #[test]
 fn a_log_that_cannot_be_written_is_no_reason_to_fail_and_a_result_is() {
     let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else {
-        eprintln!("SKIPPED: there is no /dev/full");
+        parallax_tests::skipped!("there is no /dev/full");
         return;
     };
     let full = || full.try_clone().expect("a handle");

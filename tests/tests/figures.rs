@@ -1,6 +1,6 @@
 //! Figures in documents are those of the results files in `results/`. `make figures` writes the tables anew.
 
-use parallax_tests::figures::{Results, documents, with_tables};
+use parallax_tests::figures::{Results, documents, typed_tables, with_tables};
 use parallax_tests::root;
 use std::collections::BTreeSet;
 use std::fs;
@@ -52,6 +52,28 @@ fn every_results_file_says_how_it_was_made_and_a_document_refers_to_it() {
             file.display()
         );
     }
+}
+
+#[test]
+fn tables_of_figures_come_from_results_files() {
+    let mut typed = Vec::new();
+    for file in documents() {
+        let text = fs::read_to_string(&file).expect("a document");
+        let name = file.file_name().expect("a name").to_string_lossy();
+        let tables = typed_tables(&name, &text).into_iter();
+        typed.extend(tables.map(|table| format!("{}: {table}", file.display())));
+    }
+    assert!(
+        typed.is_empty(),
+        "expected tables between marks (`<!-- figures: NAME -->`), found typed ones:\n{}",
+        typed.join("\n")
+    );
+    let row = "| a | 1.5 | 2.5 | 3.5 | 4.5 | 5.5 | 6.5 | 7.5 |\n";
+    let table = format!("| x |\n| --- |\n{row}{row}");
+    assert_eq!(typed_tables("a.md", &table).len(), 1);
+    let marked = format!("<!-- figures: a -->\n{table}<!-- end -->\n");
+    assert!(typed_tables("a.md", &marked).is_empty());
+    assert_eq!(typed_tables("a.md", &format!("{marked}\n{table}")).len(), 1);
 }
 
 #[test]

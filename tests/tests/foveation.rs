@@ -162,3 +162,36 @@ fn coarser_rates_shade_less_and_err_more_on_crytek_sponza_and_the_black_forest()
         }
     }
 }
+
+#[test]
+fn the_middle_viewport_has_the_baselines_pixels_on_real_scenes() {
+    let scenes = [
+        "crytek-sponza/sponza.gltf",
+        "stk-black-forest/stk-black-forest.gltf",
+    ];
+    for scene in scenes {
+        let Some(scene) = real_scene(scene) else {
+            return;
+        };
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [plain, foveated] = [&[][..], &["--foveate", "multi-resolution"]].map(|options| {
+            let image = folder.path().join("picture.png");
+            let mut command = program("tracegen");
+            command.args(["raster", "--size", "480x540", "-o"]);
+            command.arg(folder.path().join("t.textrace")).arg(&scene);
+            run_ok(command.args(options).arg("--image").arg(&image));
+            image::open(&image).expect("a picture").to_rgb8()
+        });
+        // The middle viewport has 40 % of width and height; its edges are rounded to tiles.
+        let of_eye = |x: u32| (x % 480).abs_diff(240) < 80;
+        let mut compared = 0;
+        for (x, y, pixel) in plain.enumerate_pixels() {
+            if of_eye(x) && y.abs_diff(270) < 90 {
+                assert_eq!(pixel, foveated.get_pixel(x, y), "{x} {y}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 50_000);
+        assert!(plain != foveated);
+    }
+}

@@ -37,7 +37,7 @@ impl MemoryDisk {
         if status.is_ok_and(|status| status.success()) {
             return Some(Self { place });
         }
-        eprintln!("SKIPPED: a full disk in memory, since mount does not work here");
+        parallax_tests::skipped!("a full disk in memory, since mount does not work here");
         None
     }
 
@@ -192,7 +192,7 @@ fn a_folder_that_cannot_be_written_is_told() {
 #[test]
 fn a_result_that_is_printed_on_a_full_disk_is_an_error() {
     let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
-        eprintln!("SKIPPED: there is no /dev/full");
+        parallax_tests::skipped!("there is no /dev/full");
         return;
     };
     let inputs = tempfile::tempdir().expect("a temporary folder");

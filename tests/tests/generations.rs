@@ -19,7 +19,7 @@ struct Driver {
 /// The second driver; `None`, with a line on stderr that says so, where none is named.
 fn second() -> Option<Driver> {
     let Some(file) = std::env::var_os(VARIABLE).map(PathBuf::from) else {
-        eprintln!("SKIPPED: no second generation of Mesa: {VARIABLE} is not set");
+        parallax_tests::skipped!("no second generation of Mesa: {VARIABLE} is not set");
         return None;
     };
     let text = std::fs::read_to_string(&file)

@@ -38,6 +38,10 @@ const TEXTRACE_RUNS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "z2-sta-first-miss",
+        &["--order", "z2-sta", "--mode", "first-miss"],
+    ),
+    (
         "hilbert-functional",
         &["--order", "hilbert", "--mode", "functional"],
     ),

@@ -14,7 +14,7 @@ fn has_python() -> bool {
     let found = Command::new("python3").arg("--version").output();
     let found = found.is_ok_and(|output| output.status.success());
     if !found {
-        eprintln!("SKIPPED: python3 is absent");
+        parallax_tests::skipped!("python3 is absent");
     }
     found
 }
@@ -67,14 +67,25 @@ fn compare(place: &str, python: &Value, replay: &Value, exact: bool) {
 
 /// Reads a trace both ways; returns the number of records.
 fn check(path: &Path) -> u64 {
+    check_with(path, &[])
+}
+
+/// Reads a trace both ways, with more options for both readers; returns the number of lines.
+fn check_with(path: &Path, options: &[&str]) -> u64 {
     let name = path.display().to_string();
     let kind = path
         .extension()
         .and_then(|extension| extension.to_str())
         .expect("a trace has its kind as extension");
     let script = root().join("tests/independent").join(format!("{kind}.py"));
-    let (mut reader, python) = start(Command::new("python3").arg("-B").arg(script).arg(path));
-    let (mut dumper, replay) = start(program("replay").arg("dump").arg(path));
+    let (mut reader, python) = start(
+        Command::new("python3")
+            .arg("-B")
+            .arg(script)
+            .arg(path)
+            .args(options),
+    );
+    let (mut dumper, replay) = start(program("replay").arg("dump").arg(path).args(options));
     let (mut python, mut replay) = (python.lines(), replay.lines());
     let tables = parse(python.next()).unwrap_or_else(|| panic!("{name}: Python refuses it"));
     let info = run_ok(program("replay").args(["info", "--json"]).arg(path)).stdout;
@@ -162,6 +173,35 @@ fn python_reads_a_fresh_capture_in_every_encoding_as_replay_does() {
     let encoding = ["raster", "teapot", "--encoding", "planes"];
     run_ok(program("tracegen").args(encoding).args(size).arg(&captured));
     assert_eq!(check(&captured), records);
+}
+
+#[test]
+fn python_reads_the_primitive_lists_of_a_fresh_capture_as_replay_does() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let captured = folder.path().join("captured.textrace");
+    run_ok(
+        program("tracegen")
+            .args([
+                "raster",
+                "atrium",
+                "--shadows",
+                "--size",
+                "56x40",
+                "--geometry",
+                "--no-plain",
+            ])
+            .arg("-o")
+            .arg(&captured),
+    );
+    // Two pictures of 4x3 tiles and four shadow maps.
+    assert_eq!(check_with(&captured, &["--lists"]), 2 * 12 + 4 * 128 * 128);
+    let encoded = folder.path().join("encoded.textrace");
+    let encode = ["convert", "--to", "textrace", "--encoding", "planes", "-o"];
+    run_ok(program("replay").args(encode).arg(&encoded).arg(&captured));
+    assert_eq!(check_with(&encoded, &["--lists"]), 2 * 12 + 4 * 128 * 128);
 }
 
 #[test]

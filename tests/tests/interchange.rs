@@ -258,7 +258,7 @@ fn independently(form: &str, file: &Path) -> Option<Vec<(String, u64, u64)>> {
         .arg(file)
         .output()
     else {
-        eprintln!("SKIPPED: python3 is absent");
+        parallax_tests::skipped!("python3 is absent");
         return None;
     };
     let error = String::from_utf8_lossy(&output.stderr);
@@ -350,7 +350,7 @@ fn rays_become_addresses_of_every_form() {
 fn piped_through(tool: &str, options: &[&str], input: &Path) -> Option<Vec<u8>> {
     let file = fs::File::open(input).expect("it was written");
     let Ok(output) = Command::new(tool).args(options).stdin(file).output() else {
-        eprintln!("SKIPPED: {tool} is absent");
+        parallax_tests::skipped!("{tool} is absent");
         return None;
     };
     assert!(output.status.success(), "{tool}");

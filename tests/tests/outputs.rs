@@ -343,7 +343,7 @@ fn a_full_disk_is_told_and_leaves_nothing() {
 #[test]
 fn a_result_that_standard_output_does_not_take_is_an_error() {
     let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
-        eprintln!("SKIPPED: there is no /dev/full");
+        parallax_tests::skipped!("there is no /dev/full");
         return;
     };
     let to_full = |mut command: Command| {

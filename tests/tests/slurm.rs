@@ -273,7 +273,7 @@ l2.replacement = [\"lru\", \"fifo\"]
 #[test]
 fn a_job_array_on_two_nodes_gives_one_machines_bytes_also_after_a_task_was_killed() {
     if let Some(hindrance) = hindrance() {
-        eprintln!("SKIPPED: {hindrance}");
+        parallax_tests::skipped!("{hindrance}");
         return;
     }
     let cluster = Cluster::start();

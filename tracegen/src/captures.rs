@@ -40,11 +40,17 @@ impl Capture {
         words.join(" ")
     }
 
-    /// Name of the recipe's file.
+    /// Name of the recipe's file: the trace's with `.recipe` behind it, so that a texture trace and a ray
+    /// trace of one name have a recipe each.
     #[must_use]
     pub fn recipe_file(&self) -> String {
-        let file = Path::new(&self.file).with_extension("recipe");
-        file.to_string_lossy().into_owned()
+        format!("{}.recipe", self.file)
+    }
+
+    /// The recipe's file: the arguments, and what they made.
+    #[must_use]
+    pub fn recipe_text(&self, checksum: u32) -> String {
+        format!("{}\n# content checksum {checksum:08x}\n", self.recipe())
     }
 }
 

@@ -4,6 +4,7 @@
 pub mod captures;
 pub mod cli;
 mod doubtful;
+mod hidden_mesh;
 mod picture;
 pub mod stress;
 pub mod study;

@@ -1,5 +1,9 @@
 //! `tracegen`: scene to trace.
 
+/// Memory that ends is told with exit code 2.
+#[global_allocator]
+static ALLOCATOR: shell::Allocator = shell::Allocator;
+
 fn main() -> std::process::ExitCode {
     tracegen::cli::main()
 }

@@ -7,6 +7,7 @@ pub mod color;
 pub mod colormap;
 pub mod flicker;
 pub mod flip;
+pub mod motion;
 pub mod png;
 pub mod psnr;
 pub mod ssim;

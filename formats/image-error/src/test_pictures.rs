@@ -40,3 +40,22 @@ pub fn shifted(picture: &Picture, by_px: usize) -> Picture {
     }
     out
 }
+
+/// A window of a texture without end whose left upper corner lies at `pan`.
+pub fn panned(size_px: [u32; 2], pan: [f32; 2]) -> Picture {
+    let mut picture = Picture::filled(size_px, [0; 3]);
+    for (i, pixel) in picture.pixels.iter_mut().enumerate() {
+        let x = (i as u32 % size_px[0]) as f32 + pan[0];
+        let y = (i as u32 / size_px[0]) as f32 + pan[1];
+        // Long waves are high and short ones low, as in photographs; no two repeat together within a picture.
+        let wave = |a: f32, b: f32| 0.15 / a.hypot(b) * (a * x + b * y).sin();
+        let sum = wave(0.31, 0.17)
+            + wave(-0.23, 0.41)
+            + wave(0.071, 0.097)
+            + wave(0.57, -0.13)
+            + wave(-0.11, 0.05);
+        let code = |scale: f32| (127.5 + scale * 30.0 * sum).round().clamp(0.0, 255.0) as u8;
+        *pixel = [code(1.0), code(0.8), code(-0.6)];
+    }
+    picture
+}

@@ -1,6 +1,7 @@
 //! Arguments that both programs have, and those that a trace records.
 
 use anyhow::Context;
+use std::error::Error;
 use std::ffi::OsString;
 
 /// `--threads`.
@@ -12,18 +13,24 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Limits rayon to that many threads; called once, before anything runs in parallel.
+    /// Starts rayon's threads, that many or one a core; called once, before anything runs in parallel. Rayon
+    /// itself would start them at first use and panic where the system refuses.
     ///
     /// # Errors
     /// The threads cannot be started.
     pub fn start(self) -> anyhow::Result<()> {
-        let Some(count) = self.count else {
-            return Ok(());
-        };
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(count.into())
-            .build_global()
-            .context("--threads")
+        let count = self.count.map_or(0, usize::from);
+        let started = rayon::ThreadPoolBuilder::new()
+            .num_threads(count)
+            .build_global();
+        match started {
+            // They run already, and any number will do.
+            Err(error) if count == 0 && error.source().is_none() => Ok(()),
+            started => started.with_context(|| match self.count {
+                Some(count) => format!("--threads {count}: cannot start the threads"),
+                None => "cannot start a thread for each core (--threads starts fewer)".to_owned(),
+            }),
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 mod arguments;
 mod children;
 mod documents;
+mod memory;
 mod message;
 mod outputs;
 mod program;
@@ -17,6 +18,7 @@ pub use arguments::{Threads, lasting_arguments};
 pub use children::run_child;
 pub use documents::Documents;
 pub use formats::container::is_stdout;
+pub use memory::Allocator;
 pub use message::{error, note, print, stdout, warn};
 pub use outputs::{Output, check_folder, check_outputs};
 pub use program::{Common, VERSION, run};

@@ -1,6 +1,6 @@
 //! From arguments to exit code.
 
-use super::{message, signals};
+use super::{memory, message, signals};
 use clap::{CommandFactory, Parser};
 use formats::container::{VERSION_MAJOR, VERSION_MINOR};
 use formats::text::printable_lines;
@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 
 /// Exit code of wrong use or unreadable input; clap's own, too.
-const USAGE: u8 = 2;
+pub(crate) const USAGE: u8 = 2;
 
 /// Version of the programs with that of the traces that they read and write.
 pub static VERSION: LazyLock<String> = LazyLock::new(|| {
@@ -43,7 +43,9 @@ pub fn run<C: Parser>(
 ) -> ExitCode {
     let cli = parse::<C>();
     message::set_quiet(common(&cli).quiet);
-    let outcome = signals::discard_unfinished_on_exit().and_then(|()| command(cli));
+    let outcome = memory::explain_aborts()
+        .and_then(|()| signals::discard_unfinished_on_exit())
+        .and_then(|()| command(cli));
     match outcome {
         Ok(code) => code,
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,

@@ -57,8 +57,10 @@ impl Progress {
         let stage = Arc::new(Mutex::new(stage));
         let (stop, stopped) = channel();
         let shown = Arc::clone(&stage);
-        let thread = out.and_then(|mut out| {
+        let thread = out.filter(|_| memory_for_a_thread()).and_then(|mut out| {
+            let (start, started) = channel::<()>();
             let show = move || {
+                drop(start);
                 let mut pauses = Pauses::new(interval, as_bar);
                 // What cannot be shown is no reason to stop the work.
                 while stopped.recv_timeout(pauses.next()) == Err(RecvTimeoutError::Timeout) {
@@ -74,7 +76,10 @@ impl Progress {
                 }
             };
             let thread = std::thread::Builder::new().name("progress".to_owned());
-            thread.spawn(show).ok()
+            let thread = thread.spawn(show).ok();
+            // The work goes on only once the thread has its memory: a thread that finds none panics before its first line.
+            let _hung_up = thread.as_ref().map(|_| started.recv());
+            thread
         });
         Self {
             stage,
@@ -92,6 +97,12 @@ impl Progress {
     pub fn advance(&self, units: u64) {
         lock(&self.stage).done += units;
     }
+}
+
+/// Whether a thread's stack and signal stack can be had: without progress, a command needs less memory.
+fn memory_for_a_thread() -> bool {
+    const NEEDED_BYTES: usize = 4 << 20;
+    Vec::<u8>::new().try_reserve_exact(NEEDED_BYTES).is_ok()
 }
 
 /// How long to wait before what is shown next: a log of a long run stays short.

@@ -7,6 +7,7 @@
 mod atomic;
 mod header;
 mod reader;
+mod regular;
 mod scratch;
 mod writer;
 
@@ -15,6 +16,7 @@ pub use atomic::{
 };
 pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 pub use reader::Container;
+pub use regular::{check_regular, checksum, open_regular, read_regular};
 pub use scratch::ScratchFolder;
 pub use writer::ContainerWriter;
 

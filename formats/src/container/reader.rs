@@ -323,7 +323,14 @@ impl Container {
     /// description without what says how and by what it was captured (FORMAT.md, Content checksum).
     pub(crate) fn content_checksum(&self, description: ChunkTag) -> u32 {
         /// Keys of the description, or of its `trace`, that say nothing of what was captured.
-        const ANNOTATIONS: [&str; 5] = ["tool", "command_line", "scene", "backend", "driver"];
+        const ANNOTATIONS: [&str; 6] = [
+            "tool",
+            "command_line",
+            "scene",
+            "backend",
+            "driver",
+            "techniques",
+        ];
         let mut crc32 = crc32fast::Hasher::new();
         for entry in self
             .directory

@@ -223,8 +223,8 @@ impl RayAccess {
     /// # Errors
     /// Those of the writer below.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
-        let eye = format!("{:?}", self.eye).to_lowercase();
-        let kind = format!("{:?}", self.kind).to_lowercase();
+        let eye = self.eye.to_string();
+        let kind = self.kind.to_string();
         let entry = format!("{:?}", self.entry).to_lowercase();
         writeln!(
             out,

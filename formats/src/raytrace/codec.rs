@@ -144,7 +144,10 @@ fn check(tile: &RayTile, has_visits: bool) -> Result<(), Broken> {
                 Some(p) => ray.parent < own && Some(ray.depth) == p.depth.checked_add(1),
             };
             if !fits || (own == 0) != (ray.kind == RayKind::Primary) {
-                let found = format!("{ray:?}");
+                let found = format!(
+                    "parent {}, depth {}, kind {}",
+                    ray.parent, ray.depth, ray.kind
+                );
                 return broken(what(), "a parent before it and one level above", found);
             }
         }
@@ -328,7 +331,7 @@ fn decode_ray<'a>(
         return Err(at.fault("no other flags", format_args!("{head:#04x}")));
     }
     if (own == 0) != (kind == RayKind::Primary) {
-        let found = format_args!("{kind:?} as ray {own}").to_string();
+        let found = format_args!("kind {kind} as ray {own}").to_string();
         return Err(at.fault("a primary ray first, then the others", found));
     }
     let (parent, depth) = if own == 0 {
@@ -349,7 +352,7 @@ fn decode_ray<'a>(
         number.ok_or_else(|| {
             at.fault(
                 "an earlier ray as parent, below 255 others",
-                format_args!("{parent:?}"),
+                parent.map_or_else(|| "none".to_owned(), |p| p.to_string()),
             )
         })?
     };

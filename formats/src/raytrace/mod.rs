@@ -182,6 +182,17 @@ pub enum Visit {
     Triangle(u32),
 }
 
+impl std::fmt::Display for RayKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Primary => "primary",
+            Self::Shadow => "shadow",
+            Self::Reflection => "reflection",
+            Self::Refraction => "refraction",
+        })
+    }
+}
+
 /// Why a ray was cast.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -52,6 +52,7 @@ fn tables(has_visits: bool) -> RaytraceTables {
             }],
             surfaces: None,
             origin_m: [0.0; 3],
+            techniques: None,
         },
         origin: [0.1, 1e6 + 1.0 / 3.0, -7.0],
         eyes: [eye(-0.032), eye(0.032)],

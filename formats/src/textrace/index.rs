@@ -58,7 +58,10 @@ impl IndexEntry {
                 input,
                 (span, records, runs) == Default::default(),
                 || "an untouched tile's entry to be zero but for its encoding".to_owned(),
-                format_args!("{entry:?}"),
+                format_args!(
+                    "{} bytes at {}, {records} records, {runs} runs",
+                    span.bytes, span.offset
+                ),
             )?;
         }
         ensure(

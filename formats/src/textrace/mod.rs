@@ -7,6 +7,7 @@
 
 mod bits;
 mod delta;
+pub mod geometry;
 mod index;
 mod invariant;
 mod planes;
@@ -103,6 +104,32 @@ pub struct TraceMeta {
     /// whose coordinates would lose their digits in single precision.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub origin_m: [f64; 3],
+    /// What the frames were rendered with, where that was chosen or given by name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub techniques: Option<ChosenTechniques>,
+}
+
+/// The techniques of a path's frames, by name.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ChosenTechniques {
+    /// Of each frame, in the order of `frames`.
+    pub frames: Vec<String>,
+    /// The same as `tracegen raster --technique` takes it.
+    pub schedule: String,
+    /// Why they were chosen; absent where a user named them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub choice: Option<Choice>,
+}
+
+/// What a search was asked for and what it found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Choice {
+    /// As asked for: `flip=0.01`.
+    pub budget: String,
+    /// The cost that is as small as the budget allows: `time`, `fragments`, `bytes` or `energy`.
+    pub objective: String,
+    /// In words.
+    pub reason: String,
 }
 
 fn is_zero(origin_m: &[f64; 3]) -> bool {

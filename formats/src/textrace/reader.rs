@@ -1,6 +1,7 @@
 //! Reading a `.textrace`: tables at once, tiles one by one from any thread.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
+use super::geometry::{self, Geometry, TileLists};
 use super::index::IndexEntry;
 use super::{
     Encoding, INDEX_ENTRY_BYTES, Pass, TILE_INDEX, TILES, Tables, Tile, delta, invariant, planes,
@@ -35,6 +36,7 @@ pub struct Textrace {
     index: Vec<IndexEntry>,
     /// First index slot of each pass.
     pass_slots: Vec<usize>,
+    geometry: Option<Geometry>,
 }
 
 impl Textrace {
@@ -87,12 +89,39 @@ impl Textrace {
                 first
             })
             .collect();
+        let geometry = geometry::read(&container, &tables)?;
         Ok(Self {
             container,
             tables,
             index,
             pass_slots,
+            geometry,
         })
+    }
+
+    /// Meshes and views, in a trace that was captured with geometry.
+    #[must_use]
+    pub fn geometry(&self) -> Option<&Geometry> {
+        self.geometry.as_ref()
+    }
+
+    /// The primitive lists of a view of [`Self::geometry`].
+    ///
+    /// # Errors
+    /// When there is no such view, or its bytes are damaged.
+    pub fn tile_lists(&self, view: usize) -> Result<TileLists> {
+        let views = self.geometry.as_ref();
+        let found =
+            views.and_then(|geometry| geometry.views.get(view).zip(geometry.spans.get(view)));
+        let Some((view, span)) = found else {
+            return Err(FormatError::OutOfRange {
+                file: self.container.file().to_owned(),
+                what: "view",
+                index: view as u64,
+                count: views.map_or(0, |geometry| geometry.views.len() as u64),
+            });
+        };
+        geometry::lists_of(&self.container, &self.tables, view, span)
     }
 
     /// The tables.

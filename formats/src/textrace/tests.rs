@@ -71,6 +71,7 @@ pub(crate) fn tables() -> Tables {
                 eyes: [eye; 2],
             }],
             origin_m: [0.0; 3],
+            techniques: None,
             surfaces: Some(Surfaces {
                 depth_tested: true,
                 not_opaque: vec![[2, 1]],

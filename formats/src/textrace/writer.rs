@@ -1,5 +1,6 @@
 //! Writing a `.textrace`.
 
+use super::geometry::{Geometry, GeometryView, Spool, TileLists};
 use super::index::IndexEntry;
 use super::{Encoding, Pass, Tables, Tile, delta, invariant, planes, raw, tables};
 use crate::container::{AtomicFile, ContainerWriter, Kind};
@@ -79,6 +80,7 @@ pub struct TextraceWriter<W = AtomicFile> {
     next_slot: usize,
     tile_bytes: u64,
     encoding: Encoding,
+    geometry: Option<Spool>,
 }
 
 impl TextraceWriter<AtomicFile> {
@@ -134,7 +136,35 @@ impl<W: Write + Seek> TextraceWriter<W> {
             next_slot: 0,
             tile_bytes: 0,
             encoding: Encoding::default(),
+            geometry: None,
         })
+    }
+
+    /// Adds geometry: its meshes and draws now, its views by [`Self::append_view`].
+    ///
+    /// # Errors
+    /// When they break a rule of the format.
+    pub fn with_geometry(mut self, geometry: Geometry) -> Result<Self> {
+        self.geometry = Some(Spool::new(geometry, &self.tables)?);
+        Ok(self)
+    }
+
+    /// Whether the trace has geometry.
+    #[must_use]
+    pub fn has_geometry(&self) -> bool {
+        self.geometry.is_some()
+    }
+
+    /// Appends the primitive lists of a view, in the order in which views are rendered. Without geometry they are
+    /// left out.
+    ///
+    /// # Errors
+    /// When they break a rule of the format, or cannot be kept.
+    pub fn append_view(&mut self, view: GeometryView, lists: &TileLists) -> Result<()> {
+        match &mut self.geometry {
+            Some(spool) => spool.append(&self.tables, view, lists),
+            None => Ok(()),
+        }
     }
 
     /// Chooses how tiles are encoded.
@@ -203,6 +233,9 @@ impl<W: Write + Seek> TextraceWriter<W> {
             entry.write(&mut bytes);
         }
         self.container.chunk(super::TILE_INDEX, &bytes)?;
+        if let Some(spool) = self.geometry {
+            spool.write(&mut self.container)?;
+        }
         Ok(self.container)
     }
 }

@@ -13,21 +13,23 @@ mod lru;
 mod on_the_way;
 mod random;
 mod reserved;
+mod rrip;
 mod set_order;
+mod ship;
 mod tree_plru;
 
 pub use delayed::{Delay, DelayedFill, NOT_ASKED};
 pub use forest::Forest;
 pub use levels::Levels;
-#[cfg(test)]
-pub(crate) use lru::WaysOf;
-pub use lru::{AnyWays, FourWayLru, Lru};
+pub use lru::{AnyWays, FourWayLru, Lru, WaysOf};
 pub use reserved::AllocateOnMiss;
 
 use crate::config::{CacheConfig, ConfigError};
 use crate::registry::{Named, registry};
 use fifo::Fifo;
 use random::RandomReplacement;
+use rrip::{Insertion, Rrip};
+use ship::Ship;
 use tree_plru::TreePlru;
 
 registry! { PolicyRow:
@@ -36,6 +38,10 @@ registry! { PolicyRow:
     FIFO =      row("fifo",      "First in, first out", ANY_WAYS,                                      |g| boxed(Fifo::new(g.sets, g.ways)));
     TREE_PLRU = row("tree-plru", "Tree pseudo-LRU",     ("1, 2, 4 ... 64", tree_plru::accepts_ways),   |g| boxed(TreePlru::new(g.sets, g.ways)));
     RANDOM =    row("random",    "Seeded random",       ANY_WAYS,                                      |g| boxed(RandomReplacement::new(g.sets, g.ways, g.seed)));
+    SRRIP =     row("srrip",     "Static re-reference interval prediction",  ANY_WAYS,                 |g| boxed(Rrip::new(g.sets, g.ways, Insertion::Static)));
+    BRRIP =     row("brrip",     "Bimodal re-reference interval prediction", ANY_WAYS,                 |g| boxed(Rrip::new(g.sets, g.ways, Insertion::Bimodal)));
+    DRRIP =     row("drrip",     "SRRIP or BRRIP, by set dueling",           ANY_WAYS,                 |g| boxed(Rrip::new(g.sets, g.ways, Insertion::Dueling)));
+    SHIP =      row("ship",      "Signature-based hit prediction by memory region", ANY_WAYS,          |g| boxed(Ship::new(g.sets, g.ways)));
 }
 
 /// A replacement policy by name.

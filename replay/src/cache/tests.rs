@@ -65,8 +65,54 @@ fn trace() -> impl Strategy<Value = Vec<u32>> {
     prop::collection::vec(prop_oneof![4 => 0_u32..40, 1 => 0_u32..400], 1..600)
 }
 
+/// Brute-force twin of re-reference interval prediction: one set, a line with its prediction by way.
+#[derive(Default)]
+struct RripTwin {
+    ways: Vec<(u32, u32)>,
+    newest: u32,
+    fills: u32,
+}
+
+impl RripTwin {
+    fn access(&mut self, line: u32, ways: usize, is_bimodal: bool) -> bool {
+        if let Some(held) = self.ways.iter_mut().find(|held| held.0 == line) {
+            if line != self.newest {
+                held.1 = 0;
+            }
+            return true;
+        }
+        self.fills += 1;
+        let prediction = 2 + u32::from(is_bimodal && !self.fills.is_multiple_of(32));
+        self.newest = line;
+        if self.ways.len() < ways {
+            self.ways.push((line, prediction));
+            return false;
+        }
+        loop {
+            if let Some(victim) = self.ways.iter_mut().find(|held| held.1 == 3) {
+                *victim = (line, prediction);
+                return false;
+            }
+            self.ways.iter_mut().for_each(|held| held.1 += 1);
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn rrip_equals_its_brute_force_twin(trace in trace()) {
+        for (policy, is_bimodal) in [(Replacement::SRRIP, false), (Replacement::BRRIP, true)] {
+            for ways in [1, 3, 4, 16] {
+                let mut twin = RripTwin::default();
+                let mut cache = cache(u64::from(ways), ways, policy);
+                for &line in &trace {
+                    prop_assert_eq!(cache.access(line), twin.access(line, ways as usize, is_bimodal));
+                }
+            }
+        }
+    }
 
     #[test]
     fn lru_equals_its_brute_force_twin_at_every_associativity(trace in trace()) {
@@ -284,4 +330,39 @@ fn random_replacement_follows_its_seed() {
     };
     assert_eq!(run(1), run(1));
     assert!((1..20).any(|seed| run(seed) != run(0)));
+}
+
+#[test]
+fn dueling_follows_the_better_insertion() {
+    let run = |policy, trace: &[u32]| misses(&mut *cache(4096, 4, policy), trace);
+    // A loop over a little more than the cache: bimodal insertion keeps a part of it.
+    let thrashing: Vec<u32> = (0..60).flat_map(|_| 0..6144).collect();
+    let of = |policy| run(policy, &thrashing);
+    let (fixed, bimodal) = (of(Replacement::SRRIP), of(Replacement::BRRIP));
+    assert!(bimodal < fixed * 6 / 10, "{bimodal} {fixed}");
+    assert!(of(Replacement::DRRIP) < fixed * 7 / 10);
+    // A working set that moves on: lines are used again soon, so bimodal insertion loses them.
+    let moving: Vec<u32> = (0..4000)
+        .flat_map(|start| (0..64).map(move |i| start * 16 + i * 97 % 2048))
+        .collect();
+    let of = |policy| run(policy, &moving);
+    let (fixed, bimodal) = (of(Replacement::SRRIP), of(Replacement::BRRIP));
+    assert!(fixed < bimodal, "{fixed} {bimodal}");
+    assert!(of(Replacement::DRRIP) < (fixed + bimodal) / 2);
+}
+
+#[test]
+fn hit_prediction_keeps_a_working_set_from_a_scan() {
+    // A region that is used twice in turn with a stream that is not used again.
+    let scan_lines = 512;
+    let scan = |round: u32| (1 << 20) + round * scan_lines..(1 << 20) + (round + 1) * scan_lines;
+    let trace: Vec<u32> = (0..400_u32)
+        .flat_map(|round| (0..128).chain(0..128).chain(scan(round)))
+        .collect();
+    let of = |policy| misses(&mut *cache(256, 4, policy), &trace);
+    let (ship, lru) = (of(Replacement::SHIP), of(Replacement::LRU));
+    let scanned = 400 * scan_lines as usize;
+    assert_eq!(lru, scanned + 400 * 128);
+    // Half of the working set stays: the first lines of a region that is not known yet still evict the rest.
+    assert!(ship < scanned + 220 * 128, "{}", ship - scanned);
 }

@@ -70,6 +70,7 @@ pub struct Args {
 /// # Errors
 /// Wrong arguments, an unreadable trace, an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    shell::Threads::default().start()?;
     let config = args.machine.resolve()?;
     ensure!(
         config.mode == Mode::Timed && config.order == RunConfig::default().order,

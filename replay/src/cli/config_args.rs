@@ -4,6 +4,8 @@ use crate::config::{
     Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr,
     LodFormula, Mode, Order, Replacement, RunConfig, TextureOrder,
 };
+use crate::memory::clients::FrameMachine;
+use crate::memory::dram::DramPreset;
 use crate::preset::Preset;
 use crate::size::parse_bytes;
 use anyhow::{Context, Result, anyhow};
@@ -71,6 +73,13 @@ pub struct ConfigArgs {
     /// The caches between the frames of a trace
     #[arg(long)]
     between_frames: Option<BetweenFrames>,
+
+    /// DRAM below the caches, with two channels unless `[dram]` of --config says otherwise: lpddr4, lpddr5, ddr4, gddr6
+    #[arg(long, value_name = "DEVICE", value_parser = named::<DramPreset>)]
+    dram: Option<DramPreset>,
+    /// Traffic of the whole frame, on a machine with the defaults of `[frame]`; needs a trace with --geometry
+    #[arg(long, value_name = "MACHINE")]
+    frame: Option<FrameMachine>,
 
     /// Filter in place of the recorded one: trilinear, bilinear, nearest
     #[arg(long, value_parser = named::<FilterOverride>, help_heading = "Sampling")]
@@ -199,6 +208,8 @@ impl ConfigArgs {
             ("--assign", self.assign.is_some()),
             ("--between-frames", self.between_frames.is_some()),
             ("--hsr", self.hsr.is_some()),
+            ("--dram", self.dram.is_some()),
+            ("--frame", self.frame.is_some()),
             ("--filter", self.filter.is_some()),
             ("--lod", self.lod.is_some()),
             ("--lod-bias", self.lod_bias.is_some()),
@@ -251,6 +262,12 @@ impl ConfigArgs {
         set(&mut config.seed, self.seed);
         set(&mut config.hsr, self.hsr);
         set(&mut config.between_frames, self.between_frames);
+        if let Some(preset) = self.dram {
+            config.dram.get_or_insert_default().preset = preset;
+        }
+        if let Some(machine) = self.frame {
+            config.frame.get_or_insert_default().machine = machine;
+        }
         set(&mut config.sampling.filter, self.filter);
         set(&mut config.sampling.lod, self.lod);
         set(&mut config.sampling.lod_bias, self.lod_bias);

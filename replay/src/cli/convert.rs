@@ -346,6 +346,12 @@ fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
             };
             let tables = trace.tables();
             let mut writer = TextraceWriter::create(&args.output, tables)?;
+            if let Some(geometry) = trace.geometry() {
+                writer = writer.with_geometry(geometry.clone())?;
+                for (number, view) in geometry.views.iter().enumerate() {
+                    writer.append_view(*view, &trace.tile_lists(number)?)?;
+                }
+            }
             let mut tile = Tile::default();
             for (pass, index) in tiles(&tables.passes) {
                 trace.decode_tile(pass, index, &mut tile)?;

@@ -6,6 +6,7 @@ use anyhow::Result;
 use formats::Trace;
 use formats::interop::ray_samples;
 use formats::raytrace::{RayTile, Raytrace};
+use formats::textrace::geometry::GeometryView;
 use formats::textrace::{Textrace, Tile};
 use serde_json::Value;
 use std::path::PathBuf;
@@ -70,8 +71,41 @@ fn textures(left: &Textrace, right: &Textrace, ignore_meta: bool) -> Result<Vec<
     found.extend(passes);
     if same_tiles {
         found.extend(first_record(left, right)?);
+        found.extend(geometry(left, right));
     }
     Ok(found)
+}
+
+/// The first difference of what two traces say of geometry; checksums of lists are compared.
+fn geometry(left: &Textrace, right: &Textrace) -> Option<String> {
+    let (a, b) = (left.geometry(), right.geometry());
+    if a == b {
+        return None;
+    }
+    let (Some(a), Some(b)) = (a, b) else {
+        let there = |geometry: Option<_>| {
+            if geometry.is_some() {
+                "there"
+            } else {
+                "absent"
+            }
+        };
+        return Some(differ("geometry", there(a), there(b)));
+    };
+    if (&a.meshes, &a.draw_meshes) != (&b.meshes, &b.draw_meshes) {
+        return Some(differ("meshes", a.meshes.len(), b.meshes.len()));
+    }
+    let views = a.views.len().min(b.views.len());
+    let first = (0..views).find(|&view| {
+        a.views[view] != b.views[view] || left.tile_lists(view).ok() != right.tile_lists(view).ok()
+    });
+    let view = first.unwrap_or(views);
+    let of = |views: &[GeometryView]| format!("{:?}", views.get(view));
+    Some(differ(
+        &format!("primitive lists of view {view}"),
+        of(&a.views),
+        of(&b.views),
+    ))
 }
 
 /// The first different record of two traces with the same tiles.
@@ -121,7 +155,7 @@ fn first_sample(left: &Raytrace, right: &Raytrace) -> Result<Option<String>> {
                 .map(|s| s.to_json(&tables.bvh))
                 .collect::<Result<_, _>>()?)
         };
-        let place = format!("{eye:?} eye tile {index} sample").to_lowercase();
+        let place = format!("{eye} eye tile {index} sample");
         // Texture coordinates may be NaN, which differs from itself but not in print.
         let found = lines(&place, of(left, &a)?, of(right, &b)?);
         if found.is_some() {

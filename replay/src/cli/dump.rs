@@ -30,6 +30,9 @@ pub struct DumpArgs {
     /// Tiles of each pass, a number or a range such as 40..48
     #[arg(long, value_name = "RANGE")]
     pub tile: Option<NumberRange>,
+    /// Primitive lists in place of records: a line for each tile of each view that was captured with --geometry
+    #[arg(long, conflicts_with_all = ["pass", "tile"])]
+    pub lists: bool,
 }
 
 /// Runs the subcommand.
@@ -39,7 +42,14 @@ pub struct DumpArgs {
 pub fn run(args: &DumpArgs) -> Result<ExitCode> {
     let trace = Trace::open(&args.trace)?;
     let mut out = shell::stdout();
-    dump(&trace, args, &mut out)?;
+    match (&trace, args.lists) {
+        (Trace::Texture(trace), true) => primitive_lists(trace, &mut out)?,
+        (Trace::Ray(_), true) => bail!(
+            "--lists: expected a texture trace, found {}",
+            args.trace.display()
+        ),
+        (_, false) => dump(&trace, args, &mut out)?,
+    }
     out.flush()?;
     Ok(ExitCode::SUCCESS)
 }
@@ -106,6 +116,25 @@ pub fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Iterator<Ite
     })
 }
 
+/// Prints the primitives of each tile of each view.
+fn primitive_lists(trace: &Textrace, out: &mut impl Write) -> Result<()> {
+    let Some(geometry) = trace.geometry() else {
+        bail!(
+            "{}: expected a trace with primitive lists, which `tracegen raster --geometry` captures; found none",
+            trace.container().file()
+        );
+    };
+    for (number, view) in geometry.views.iter().enumerate() {
+        let lists = trace.tile_lists(number)?;
+        for tile in 0..view.tile_count() {
+            let line =
+                serde_json::json!({"view": number, "tile": tile, "primitives": lists.tile(tile)});
+            writeln!(out, "{line}")?;
+        }
+    }
+    Ok(())
+}
+
 /// Prints the samples of the chosen tiles; true if there is a chosen tile.
 fn samples(
     trace: &Raytrace,
@@ -140,6 +169,7 @@ mod tests {
             trace: file.path().to_owned(),
             pass: Some("1".parse().unwrap()),
             tile: Some("2..5".parse().unwrap()),
+            lists: false,
         };
         let mut text = Vec::new();
         dump(&trace, &args, &mut text).unwrap();
@@ -159,6 +189,7 @@ mod tests {
             trace: file.path().to_owned(),
             pass: Some("9".parse().unwrap()),
             tile: None,
+            lists: false,
         };
         let error = dump(&trace, &args, &mut Vec::new()).unwrap_err();
         assert!(error.to_string().contains("no pass 9"), "{error}");

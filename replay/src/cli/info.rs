@@ -7,7 +7,7 @@ use anyhow::Result;
 use formats::Trace;
 use formats::container::Container;
 use formats::raytrace::{RayKind, RayTile, Raytrace, RaytraceTables};
-use formats::textrace::{Encoding, Pass, PassKind, Textrace, TraceMeta};
+use formats::textrace::{ChosenTechniques, Encoding, Pass, PassKind, Textrace, TraceMeta};
 use formats::texture::Texture;
 use formats::view::Eye;
 use rayon::prelude::*;
@@ -196,6 +196,9 @@ fn texture_text(trace: &Textrace, value: &Value) -> String {
         &trace.tables().meta,
         trace.content_checksum(),
     );
+    if let Some(techniques) = &trace.tables().meta.techniques {
+        text += &techniques_text(techniques);
+    }
     text += &pass_table(trace);
     text += "\n";
     text += &texture_table(&trace.tables().textures);
@@ -208,6 +211,18 @@ fn texture_text(trace: &Textrace, value: &Value) -> String {
         totals["bytes_per_record"].as_f64().unwrap_or(0.0),
     );
     text
+}
+
+/// What the frames were rendered with, and why.
+fn techniques_text(techniques: &ChosenTechniques) -> String {
+    let schedule = &techniques.schedule;
+    match &techniques.choice {
+        Some(choice) => format!(
+            "techniques: {schedule}\nchosen by --auto {} --objective {}: {}\n\n",
+            choice.budget, choice.objective, choice.reason
+        ),
+        None => format!("techniques: {schedule}\n\n"),
+    }
 }
 
 /// A column of counts.

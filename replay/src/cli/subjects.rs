@@ -29,6 +29,11 @@ impl Traces {
         self.0.iter().map(|(trace, ..)| trace as &dyn TileSource)
     }
 
+    /// Scene and content checksum of each trace.
+    pub fn ids(&self) -> impl Iterator<Item = &TraceId> {
+        self.0.iter().map(|(_, id, _)| id)
+    }
+
     /// Quad records of each trace.
     #[must_use]
     pub fn records(&self) -> Vec<u64> {

@@ -220,8 +220,12 @@ impl FolderTraces {
                 }
             }
         }
+        let traces = Traces::open(&paths)?;
+        for (id, (folder, row)) in traces.ids().zip(&rows) {
+            folders[*folder].check_trace(*row, &id.checksum)?;
+        }
         Ok(Self {
-            traces: Traces::open(&paths)?,
+            traces,
             rows,
             counts: folders.iter().map(|f| f.manifest.rows.len()).collect(),
         })
@@ -295,6 +299,7 @@ fn measured<'a>(
     let timing = Timing::of(of_row);
     Ok(Measured {
         scene,
+        manifest,
         row: of_row,
         baseline: manifest.baseline_row().context("no baseline")?,
         timing: timing.with_context(|| format!("{}: no frame times", of_row.technique))?,
@@ -303,6 +308,7 @@ fn measured<'a>(
         caches: caches.clone(),
         sharing: *sharing,
         dominated: false,
+        dominated_in: Vec::new(),
     })
 }
 

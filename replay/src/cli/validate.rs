@@ -66,7 +66,12 @@ fn validate(path: &std::path::Path) -> formats::Result<String> {
                     trace.decode_tile(*pass, *index, tile)?;
                     Ok(tile.records.len() as u64)
                 });
-            (records.collect(), "records")
+            let counts = records.collect();
+            let views = trace.geometry().map_or(0, |geometry| geometry.views.len());
+            for view in 0..views {
+                trace.tile_lists(view)?;
+            }
+            (counts, "records")
         }
         Trace::Ray(trace) => {
             let tiles: Vec<_> = ray_tiles(trace.tables()).collect();

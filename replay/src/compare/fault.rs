@@ -1,6 +1,6 @@
 //! Why two captures cannot be held against each other.
 
-use std::fmt::Debug;
+use serde::Serialize;
 
 /// What the captures do not have in common.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -15,7 +15,7 @@ pub struct NotComparable {
 }
 
 /// Refuses what differs.
-pub fn same<T: PartialEq + Debug>(
+pub fn same<T: PartialEq + Serialize>(
     what: impl FnOnce() -> String,
     left: &T,
     right: &T,
@@ -25,7 +25,15 @@ pub fn same<T: PartialEq + Debug>(
     }
     Err(NotComparable {
         what: what(),
-        left: format!("{left:?}"),
-        right: format!("{right:?}"),
+        left: shown(left),
+        right: shown(right),
     })
+}
+
+/// A value as the tables' JSON has it.
+fn shown(value: &impl Serialize) -> String {
+    serde_json::to_string(value).map_or_else(
+        |_| "a value that JSON cannot hold".to_owned(),
+        |text| text.replace('"', "").replace(',', ", "),
+    )
 }

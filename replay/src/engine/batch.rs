@@ -14,9 +14,11 @@ use super::wave::Wave;
 use super::{Machine, ReplayError};
 use crate::cache::{Delay, Levels};
 use crate::config::{Allocation, CacheConfig, Mode, RunConfig, TmuConfig};
+use crate::memory::dram::{Dram, DramResult};
 use crate::result::{RunResult, TmuResult};
 use crate::stream::{Expander, LineMemory, TileSource};
 use crate::tmu::PipelineStats;
+use crate::whole_frame;
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -72,6 +74,8 @@ pub struct Outcome {
     pub tmu: Option<TmuResult>,
     /// Cycles until the last core was done; none in functional mode.
     pub cycles: Option<u64>,
+    /// The DRAM, where there is one.
+    pub dram: Option<DramResult>,
 }
 
 impl Outcome {
@@ -92,6 +96,7 @@ impl Outcome {
                 loops: sum.loops,
             }),
             cycles: Some(cycles),
+            dram: None,
         }
     }
 }
@@ -102,6 +107,7 @@ impl From<CacheCounts> for Outcome {
             counts,
             tmu: None,
             cycles: None,
+            dram: None,
         }
     }
 }
@@ -196,6 +202,9 @@ pub fn replay_jobs(
 fn checked(job: &Job<'_>) -> Result<Work, (usize, ReplayError)> {
     for (index, config) in job.configs.iter().enumerate() {
         config.validate().map_err(|error| (index, error.into()))?;
+        if config.frame.is_some() && job.trace.geometry().is_none() {
+            return Err((index, whole_frame::missing().into()));
+        }
     }
     Ok(Work {
         replays: job.configs.len(),
@@ -266,6 +275,7 @@ fn stream_key(config: &RunConfig) -> RunConfig {
         cores: usual.cores,
         assign: usual.assign,
         between_frames: usual.between_frames,
+        dram: None,
         ..pass_key(config)
     }
 }
@@ -278,6 +288,7 @@ fn pass_key(config: &RunConfig) -> RunConfig {
         l2: ANY,
         tmu: TmuConfig::default(),
         tile_maps: false,
+        frame: None,
         ..*config
     }
 }
@@ -294,7 +305,8 @@ pub(super) struct Pass<'a> {
 fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
     let shared = |index: &usize| {
         let config = &configs[*index];
-        config.mode == Mode::Functional && geometry(config).is_some()
+        // A shared pass does not see the misses of one cache in their order.
+        config.mode == Mode::Functional && config.dram.is_none() && geometry(config).is_some()
     };
     let (together, alone): (Vec<usize>, Vec<usize>) = stream.into_iter().partition(shared);
     let mut groups: Vec<Vec<usize>> = alone.into_iter().map(|index| vec![index]).collect();
@@ -337,7 +349,7 @@ impl Pass<'_> {
         let counts = || CacheCounts::new(bins, config.tile_maps);
         let geometries = self
             .geometries()
-            .filter(|_| config.mode == Mode::Functional);
+            .filter(|_| config.mode == Mode::Functional && config.dram.is_none());
         if let Some(geometries) = geometries {
             let maps = self.points.iter().any(|&p| self.configs[p].tile_maps);
             return Ok(Box::new(OnePass::new(
@@ -350,8 +362,8 @@ impl Pass<'_> {
         let levels = Levels::build(config)?;
         if config.mode == Mode::Functional {
             return Ok(match levels.all_four_way() {
-                Ok(levels) => Box::new(Functional::new(levels, counts())),
-                Err(levels) => Box::new(Functional::new(levels, counts())),
+                Ok(levels) => Box::new(Functional::new(levels, counts(), dram(config))),
+                Err(levels) => Box::new(Functional::new(levels, counts(), dram(config))),
             });
         }
         if config.tmu.allocation == Allocation::OnMiss {
@@ -364,6 +376,10 @@ impl Pass<'_> {
     }
 }
 
+fn dram(config: &RunConfig) -> Option<Dram> {
+    (config.dram.as_ref()).map(|dram| Dram::new(dram, config.line_bytes))
+}
+
 /// The machine of a configuration where time passes.
 fn with_latencies<C: Delay>(
     config: &RunConfig,
@@ -374,7 +390,7 @@ where
     C::Delayed: 'static,
 {
     match config.mode {
-        Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts)),
-        _ => Box::new(Timed::new(levels, config.tmu, counts)),
+        Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts, dram(config))),
+        _ => Box::new(Timed::new(levels, config.tmu, counts, dram(config))),
     }
 }

@@ -5,6 +5,7 @@ use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
 use crate::cache::{Cache, Levels};
 use crate::config::{Assign, RunConfig};
+use crate::memory::dram::Dram;
 use crate::order::Phase;
 use crate::stream::{Consumer, Cores, QuadLines, StreamError, interleave};
 
@@ -13,12 +14,17 @@ pub struct Functional<C> {
     levels: Levels<C>,
     /// What missed.
     pub counts: CacheCounts,
+    dram: Option<Dram>,
 }
 
 impl<C: Cache> Functional<C> {
     /// Empty caches.
-    pub fn new(levels: Levels<C>, counts: CacheCounts) -> Self {
-        Self { levels, counts }
+    pub fn new(levels: Levels<C>, counts: CacheCounts, dram: Option<Dram>) -> Self {
+        Self {
+            levels,
+            counts,
+            dram,
+        }
     }
 
     /// A footprint's lines that missed the L1 go to the L2.
@@ -29,7 +35,11 @@ impl<C: Cache> Functional<C> {
             ..FootprintMisses::default()
         };
         for &line in lines {
-            misses.l2_lines += u32::from(!self.levels.l2.access(line));
+            let is_miss = !self.levels.l2.access(line);
+            misses.l2_lines += u32::from(is_miss);
+            if is_miss && let Some(dram) = &mut self.dram {
+                dram.read(line, None);
+            }
         }
         self.counts.footprint(cell, tile, &misses);
     }
@@ -79,6 +89,9 @@ impl<C: Cache> Machine for Functional<C> {
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
-        self.counts.clone().into()
+        Outcome {
+            dram: self.dram.as_ref().map(Dram::result),
+            ..self.counts.clone().into()
+        }
     }
 }

@@ -57,6 +57,9 @@ pub fn summary(
         tmu: None,
         cycles: None,
         first_lookups: None,
+        dram: None,
+        clients: Vec::new(),
+        geometry: None,
         by_view,
         by_texture: sums(
             tables.textures.iter().map(|t| t.name.clone()).collect(),

@@ -3,7 +3,7 @@ use super::functional::Functional;
 use super::summary::summary;
 use super::*;
 use crate::cache::{AnyCache, Levels};
-use crate::config::{BetweenFrames, CacheConfig, Mode, Order};
+use crate::config::{BetweenFrames, CacheConfig, Mode, Order, Replacement};
 use crate::order::{self, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
@@ -392,7 +392,7 @@ fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
     };
     let bins = Bins::new(&trace.tables).unwrap();
     let counts = CacheCounts::new(&bins, config.tile_maps);
-    alone(trace, config, &mut Functional::new(levels, counts))
+    alone(trace, config, &mut Functional::new(levels, counts, None))
 }
 
 /// SplitMix64.
@@ -513,7 +513,7 @@ fn caches_take_lines_that_no_trace_sent() {
     let config = functional(Order::MORTON);
     let bins = Bins::new(&testing::tables(&[[64, 64]])).unwrap();
     let levels = Levels::build(&config).unwrap().all_four_way().ok().unwrap();
-    let mut caches = Functional::new(levels, CacheCounts::new(&bins, false));
+    let mut caches = Functional::new(levels, CacheCounts::new(&bins, false), None);
     let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
     let (mut l1_lines, mut l2_lines) = (0, 0);
     for step in 0..10_000_u64 {
@@ -549,7 +549,7 @@ fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
 #[test]
 fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
     let (one, three) = (small(), repeated(&small(), 3));
-    for policy in crate::config::Replacement::all() {
+    for policy in Replacement::all() {
         for mode in [Mode::Functional, Mode::Timed] {
             let mut config = RunConfig {
                 mode,
@@ -566,8 +566,12 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             let [kept, flushed] = [config, flush].map(|c| replay(&three, &c).unwrap());
             assert_eq!(flushed.footprints, 3 * single.footprints);
             // Whom random replacement hits differs from frame to frame.
-            if policy != crate::config::Replacement::RANDOM {
-                assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
+            if policy != Replacement::RANDOM {
+                assert_ne!(kept.l2.misses, flushed.l2.misses, "{policy:?} {mode:?}");
+                // Predictions of the frame before may mislead; lines of the frame before are hit.
+                if [Replacement::LRU, Replacement::FIFO, Replacement::TREE_PLRU].contains(&policy) {
+                    assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
+                }
                 assert_eq!(
                     flushed.l1.misses,
                     3 * single.l1.misses,

@@ -8,6 +8,7 @@ use crate::config::{BetweenFrames, Mode, Order, RunConfig};
 use crate::order::{self, Phase};
 use crate::result::RunResult;
 use crate::stream::{Cores, Expander, Frame, LineMemory, TraceCounts, shaded};
+use crate::whole_frame::traffic;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -71,8 +72,7 @@ impl Wave<'_> {
                 return all.try_for_each(|(pass, frame)| {
                     let machine = replay(pass, &frame)?;
                     drop(frame);
-                    self.finish(pass, &*machine, &expander, &counts);
-                    Ok(())
+                    self.finish(pass, &*machine, &expander, &counts)
                 });
             };
             let keep = || {
@@ -91,7 +91,7 @@ impl Wave<'_> {
         }
         // No frames at all.
         for pass in &passes {
-            self.finish(pass, &*pass.build(&expander)?, &expander, &counts);
+            self.finish(pass, &*pass.build(&expander)?, &expander, &counts)?;
         }
         Ok(())
     }
@@ -102,20 +102,26 @@ impl Wave<'_> {
         machine: &dyn Machine,
         expander: &Expander<'_>,
         counts: &TraceCounts,
-    ) {
+    ) -> Result<(), ReplayError> {
         let tables = self.job.trace.tables();
         for &index in &pass.points {
             let config = &self.job.configs[index];
             let outcome = machine.outcome(config);
             let (tmu, cycles) = (outcome.tmu, outcome.cycles);
-            let result = RunResult {
+            let mut result = RunResult {
                 tmu,
                 cycles,
+                dram: outcome.dram,
                 first_lookups: machine.first_lookups(),
                 ..summary(tables, expander.bins(), counts, &outcome.counts, config)
             };
+            if let Some(machine) = &config.frame {
+                let whole = traffic(self.job.trace, config, machine, result.external_bytes)?;
+                (result.clients, result.geometry) = (whole.clients, Some(whole.geometry));
+            }
             (self.job.finished)(index, result);
         }
+        Ok(())
     }
 }
 

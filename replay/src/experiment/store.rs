@@ -8,7 +8,7 @@ use crate::config::RunConfig;
 use crate::model_version::MODEL_VERSION;
 use crate::result::{RunResult, TOOL, TraceId};
 use anyhow::Context;
-use formats::container::kind_of;
+use formats::container::open_regular;
 use serde::{Deserialize, Serialize};
 use shell::Shard;
 use std::collections::{BTreeMap, HashMap};
@@ -85,8 +85,9 @@ pub struct Store {
 enum Added {
     Nothing,
     To(File, PathBuf),
-    /// Writing failed: the last row may be cut, and nothing may follow it.
-    Failed(PathBuf),
+    /// Writing failed for this reason: the last row may be cut, and nothing may follow it. Every thread names the first
+    /// failure's reason, as it is not settled whose error is shown.
+    Failed(PathBuf, String),
 }
 
 /// Key of a point: a 128-bit FNV-1a hash of the model version, the trace's checksum and the whole
@@ -174,12 +175,7 @@ impl Store {
     /// Notes every row of a file. What is no file is not opened: a pipe would be waited for.
     fn read_rows(&mut self, file: usize) -> io::Result<()> {
         let path = self.files[file].clone();
-        let found = std::fs::metadata(&path)?;
-        if !found.is_file() {
-            let found = kind_of(&found);
-            return Err(io::Error::other(format!("expected a file, found {found}")));
-        }
-        let mut reader = BufReader::with_capacity(1 << 16, File::open(&path)?);
+        let mut reader = BufReader::with_capacity(1 << 16, open_regular(&path)?);
         let mut line = Vec::new();
         let mut offset_bytes = 0;
         for number in 1.. {
@@ -257,7 +253,7 @@ impl Store {
     }
 
     fn read_row(&self, place: Place) -> io::Result<Vec<u8>> {
-        let mut file = File::open(&self.files[place.file])?;
+        let mut file = open_regular(&self.files[place.file])?;
         file.seek(SeekFrom::Start(place.offset_bytes))?;
         let mut line = Vec::new();
         file.take(place.length_bytes).read_to_end(&mut line)?;
@@ -301,11 +297,11 @@ impl Store {
         }
         let (written, path) = match &mut *added {
             Added::To(file, path) => (file.write_all(row), path.clone()),
-            Added::Failed(path) => (Err(io::Error::other("an earlier row failed")), path.clone()),
+            Added::Failed(path, reason) => (Err(io::Error::other(reason.clone())), path.clone()),
             Added::Nothing => return Ok(()),
         };
-        if written.is_err() {
-            *added = Added::Failed(path.clone());
+        if let Err(error) = &written {
+            *added = Added::Failed(path.clone(), error.to_string());
         }
         written.with_context(|| format!("{}: cannot write", path.display()))
     }
@@ -383,6 +379,23 @@ mod tests {
         for config in &configs {
             assert_eq!(store.find(&trace(), config), Ok(result(config.seed)));
         }
+    }
+
+    #[test]
+    fn every_row_after_a_failed_one_names_the_first_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = open(&folder);
+        let path = folder.path().join("rows");
+        std::fs::write(&path, "").unwrap();
+        // Opened for reading, so that writing fails.
+        *store.added.lock().unwrap() = Added::To(File::open(&path).unwrap(), path);
+        let failed = || {
+            let error = store.append(b"row\n").unwrap_err();
+            format!("{error:#}")
+        };
+        let first = failed();
+        assert!(first.contains("Bad file descriptor"), "{first}");
+        assert_eq!(failed(), first);
     }
 
     #[test]
@@ -470,11 +483,11 @@ mod tests {
         let path = folder.path().join("points/all.1.rows");
         std::fs::create_dir_all(&path).unwrap();
         let found = || open(&folder).damages()[0].clone();
-        assert!(found().ends_with("expected a file, found a folder"));
+        assert!(found().ends_with("expected a regular file, found a folder"));
         std::fs::remove_dir(&path).unwrap();
         let made = std::process::Command::new("mkfifo").arg(&path).status();
         assert!(made.unwrap().success());
-        assert!(found().ends_with("expected a file, found a pipe"));
+        assert!(found().ends_with("expected a regular file, found a pipe"));
         std::fs::remove_file(&path).unwrap();
         let large = File::create(&path).unwrap();
         large.set_len(LARGEST_ROW_BYTES + 1).unwrap();

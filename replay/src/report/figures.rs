@@ -3,6 +3,7 @@
 use super::columns::{Column, Row, Show, pick};
 use super::config_columns;
 use crate::experiment::ResultRow;
+use crate::memory::clients::ClientTraffic;
 use crate::result::{Part, RunResult};
 use crate::tmu::closed_form;
 
@@ -54,9 +55,46 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.result))
             .about("simulated utilisation less the one that the Z2 paper's table implies for the rates of first look-ups"),
+        Figure::real("dram_row_hit_pct", "row hits", "%", 2, |r| Some(100.0 * r.result.dram.as_ref()?.row_hit_rate))
+            .about("reads of DRAM whose row was open"),
+        Figure::real("dram_activates", "activates", "", 0, |r| Some(r.result.dram.as_ref()?.activates))
+            .about("rows of DRAM opened"),
+        Figure::real("dram_read_bytes", "DRAM reads", "bytes", 0, |r| Some(r.result.dram.as_ref()?.read_bytes))
+            .about("whole bursts: more than the lines where these are smaller"),
+        Figure::real("dram_bandwidth_gb_per_s", "bandwidth", "GB/s", 2, |r| Some(r.result.dram.as_ref()?.bandwidth_gb_per_s))
+            .about("bytes read over the time of the replay; functional mode: as fast as the DRAM can"),
+        Figure::real("dram_peak_gb_per_s", "peak", "GB/s", 1, |r| Some(r.result.dram.as_ref()?.peak_gb_per_s))
+            .about("what the data buses carry at most"),
+        Figure::real("dram_latency_mean_ns", "latency", "ns", 1, |r| Some(r.result.dram.as_ref()?.latency_mean_ns))
+            .about("of a read of DRAM, from its arrival to its last data"),
+        Figure::real("dram_latency_p99_ns", "latency, 99 %", "ns", 1, |r| Some(r.result.dram.as_ref()?.latency_p99_ns))
+            .about("99 of 100 reads take no longer"),
+        Figure::real("dram_energy_mj", "DRAM energy", "mJ", 4, |r| Some(r.result.dram.as_ref()?.energy_mj))
+            .about("activates, reads, refreshes and standing by"),
+        Figure::real("frame_read_bytes", "all reads", "bytes", 0, |r| whole(r.result, |c| c.read_bytes))
+            .about("bytes that all clients of memory read, all frames"),
+        Figure::real("frame_write_bytes", "all writes", "bytes", 0, |r| whole(r.result, |c| c.write_bytes))
+            .about("bytes that all clients of memory write, all frames"),
+        Figure::real("frame_mb_per_frame", "all traffic", "MB/frame", 2, |r| Some(r.mb_per_frame(whole(r.result, ClientTraffic::bytes)?)))
+            .about("traffic of all clients of memory"),
+        Figure::real("texture_share_pct", "texture", "% of all", 1, |r| Some(100.0 * r.result.external_bytes as f64 / whole(r.result, ClientTraffic::bytes)? as f64))
+            .about("texture reads over the traffic of all clients"),
+        Figure::real("frame_reduction_pct", "saved of all", "% of Morton", 1, |r| whole_saved_pct(r))
+            .about("traffic of all clients saved against Morton order, everything else the same"),
         Figure::real("cycles", "cycles", "", 0, |r| r.result.cycles)
             .about("cycles until the last core is done"),
     ]
+}
+
+/// A sum over the clients of memory, where the whole frame was counted.
+fn whole(result: &RunResult, of: impl Fn(&ClientTraffic) -> u64) -> Option<u64> {
+    let clients = &result.clients;
+    (!clients.is_empty()).then(|| clients.iter().map(of).sum())
+}
+
+fn whole_saved_pct(row: &ResultRow) -> Option<f64> {
+    let [own, morton] = [row.result, row.morton?].map(|result| whole(result, ClientTraffic::bytes));
+    Some(100.0 * (1.0 - own? as f64 / morton? as f64))
 }
 
 /// The paper's figures for the same point; its saving follows from its two miss rates.
@@ -221,6 +259,7 @@ mod tests {
                 "sampling",
                 "layout",
                 "tmu",
+                "dram",
                 "paper",
                 "functional",
                 "z2_paper"

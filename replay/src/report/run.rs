@@ -6,6 +6,7 @@ use super::figures::figures;
 use super::table::Table;
 use crate::config::{Mode, RunConfig};
 use crate::experiment::ResultRow;
+use crate::memory::clients::ClientTraffic;
 use crate::model_version::MODEL_VERSION;
 use crate::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TOOL, TraceId};
 use crate::size::format_bytes;
@@ -87,10 +88,52 @@ pub fn text(row: &ResultRow) -> String {
         "quads {}, covered pixels {}, access hash {}\n",
         result.quads, result.lanes, result.access_hash,
     );
+    if let Some(dram) = &result.dram {
+        text += &dram.to_string();
+    }
+    if !result.clients.is_empty() {
+        text += &clients(row).text();
+    }
+    if let Some(counts) = &result.geometry {
+        text += &format!(
+            "{} triangles submitted, {} in any tile's list, {} entries of lists; {} vertices shaded\n",
+            counts.triangles_submitted,
+            counts.triangles_binned,
+            counts.list_entries,
+            counts.vertices_shaded
+        );
+    }
     if let Some(tmu) = &result.tmu {
         text += &format!("{} loops of threads that missed\n", tmu.loops);
     }
     text + &errors::text(Of::Textures)
+}
+
+/// Traffic by client of memory, and all of it.
+fn clients(row: &ResultRow) -> Table {
+    type Line = (&'static str, [u64; 2], f64);
+    let clients = &row.result.clients;
+    let sum: u64 = clients.iter().map(ClientTraffic::bytes).sum();
+    let share = |bytes: u64| 100.0 * bytes as f64 / sum.max(1) as f64;
+    let mut lines: Vec<Line> = (clients.iter())
+        .map(|c| {
+            (
+                c.client.name(),
+                [c.read_bytes, c.write_bytes],
+                share(c.bytes()),
+            )
+        })
+        .collect();
+    let all = [0, 1].map(|kind: usize| lines.iter().map(|line| line.1[kind]).sum());
+    lines.push(("all", all, share(sum)));
+    let frames = |kind: usize| move |l: &Line| row.mb_per_frame(l.1[kind]);
+    let columns = [
+        Column::text("client", "", |l: &Line| l.0),
+        Column::real("read_mb_per_frame", "read", "MB/frame", 3, frames(0)),
+        Column::real("write_mb_per_frame", "written", "MB/frame", 3, frames(1)),
+        Column::real("share_pct", "of all", "%", 1, |l: &Line| l.2),
+    ];
+    Table::new(&columns, &lines)
 }
 
 type Level<'a> = (&'a str, &'a LevelResult);

@@ -46,7 +46,7 @@ impl RaySource for Raytrace {
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
     /// The source could not give a tile.
-    #[error("{eye:?} eye, tile {tile}: {source}")]
+    #[error("{eye} eye, tile {tile}: {source}")]
     Tile {
         /// Eye asked for.
         eye: Eye,
@@ -56,7 +56,7 @@ pub enum FrameError {
         source: Box<dyn Error + Send + Sync>,
     },
     /// A tile has another number of pixel records than its size asks for.
-    #[error("{eye:?} eye, tile {tile}: expected {expected} pixel records, found {found}")]
+    #[error("{eye} eye, tile {tile}: expected {expected} pixel records, found {found}")]
     Pixels {
         /// Eye asked for.
         eye: Eye,
@@ -78,7 +78,7 @@ pub enum FrameError {
         found: u32,
     },
     /// Sizes that reprojection cannot work with.
-    #[error("eyes: expected two images of one size above 0, found {left:?} and {right:?}")]
+    #[error("eyes: expected two images of one size above 0, found {}x{} and {}x{} px", left[0], left[1], right[0], right[1])]
     Size {
         /// Left image.
         left: [u32; 2],

@@ -186,6 +186,7 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
                 frames: vec![FrameViews::default()],
                 surfaces: None,
                 origin_m: [0.0; 3],
+                techniques: None,
             },
             origin: [0.0; 3],
             eyes,

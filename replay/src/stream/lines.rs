@@ -153,7 +153,7 @@ impl TileLines {
 
 /// The order in which two tiles' primitives are rendered together: which tile, which run. The
 /// lists are the runs' primitives.
-pub(super) fn interleaved(
+pub fn interleaved(
     interleave: Interleave,
     lists: [&mut dyn Iterator<Item = u32>; 2],
     out: &mut Vec<(u8, u32)>,

@@ -32,5 +32,5 @@ pub use feed::{Quad, for_quads};
 pub use hsr::{Shaded, shaded};
 pub use interleave::{Consumer, furthest_behind, interleave};
 pub use line_set::LineSet;
-pub use lines::{Footprint, QuadLines, Tag, TileLines};
+pub use lines::{Footprint, QuadLines, Tag, TileLines, interleaved};
 pub use source::{MemoryTrace, TileSource};

@@ -1,6 +1,7 @@
 //! Where tiles come from: a file, or memory (tests, benchmarks, generated traces).
 
 use super::StreamError;
+use formats::textrace::geometry::{Geometry, TileLists};
 use formats::textrace::{Tables, Textrace, Tile};
 
 /// A trace that can be read tile by tile.
@@ -16,6 +17,21 @@ pub trait TileSource: Sync {
     /// # Errors
     /// The tile does not exist or is damaged.
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError>;
+
+    /// Meshes and views, in a trace with geometry.
+    fn geometry(&self) -> Option<&Geometry> {
+        None
+    }
+
+    /// The primitive lists of a view of [`Self::geometry`].
+    ///
+    /// # Errors
+    /// There is no such view, or it is damaged.
+    fn tile_lists(&self, view: usize) -> Result<TileLists, StreamError> {
+        Err(StreamError::Tables(format!(
+            "view {view} has no primitive lists"
+        )))
+    }
 }
 
 /// A trace in memory.
@@ -64,5 +80,13 @@ impl TileSource for Textrace {
 
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         Ok(self.decode_tile(pass as usize, index as usize, tile)?)
+    }
+
+    fn geometry(&self) -> Option<&Geometry> {
+        self.geometry()
+    }
+
+    fn tile_lists(&self, view: usize) -> Result<TileLists, StreamError> {
+        Ok(self.tile_lists(view)?)
     }
 }

@@ -143,6 +143,7 @@ impl Synthetic {
                 frames: vec![FrameViews::default()],
                 surfaces: None,
                 origin_m: [0.0; 3],
+                techniques: None,
             },
             textures: (0..self.materials * self.textures)
                 .map(|i| {

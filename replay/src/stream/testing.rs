@@ -47,6 +47,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
             frames: vec![formats::view::FrameViews::default()],
             surfaces: None,
             origin_m: [0.0; 3],
+            techniques: None,
         },
         textures: sizes
             .iter()

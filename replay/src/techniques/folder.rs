@@ -2,10 +2,10 @@
 
 use super::check::{Fault, check};
 use super::manifest::Manifest;
+use formats::container::{check_regular, checksum, open_regular, read_regular};
 use formats::view::Eye;
 use image::{ImageFormat, ImageReader, Limits};
 use image_error::{Mask, Picture};
-use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -34,6 +34,10 @@ enum Problem {
     Picture(#[from] image::ImageError),
     #[error("expected {}x{} pixels, found {}x{}", expected[0], expected[1], found[0], found[1])]
     Size { expected: [u32; 2], found: [u32; 2] },
+    #[error(
+        "expected the checksum {expected} of the manifest, found {found}: another file than the study wrote"
+    )]
+    Checksum { expected: String, found: String },
     #[error("expected a file inside {0}, found a link to {1}")]
     Outside(String, String),
 }
@@ -95,16 +99,17 @@ impl Folder {
     /// A file that the manifest names.
     ///
     /// # Errors
-    /// It does not exist, or is a link that leads out of the folder.
+    /// It does not exist, is no regular file, or is a link that leads out of the folder.
     pub fn file(&self, relative: &str) -> Result<PathBuf, FolderError> {
         let path = self.path.join(relative);
         let resolve = || -> Result<(), Problem> {
             let (whole, folder) = (path.canonicalize()?, self.path.canonicalize()?);
-            if whole.starts_with(&folder) {
-                return Ok(());
+            if !whole.starts_with(&folder) {
+                let text = |path: &Path| path.display().to_string();
+                return Err(Problem::Outside(text(&folder), text(&whole)));
             }
-            let text = |path: &Path| path.display().to_string();
-            Err(Problem::Outside(text(&folder), text(&whole)))
+            check_regular(&whole)?;
+            Ok(())
         };
         match resolve() {
             Ok(()) => Ok(path),
@@ -115,26 +120,42 @@ impl Folder {
     /// The bytes of an eye's picture in a frame of a row, both by index.
     ///
     /// # Errors
-    /// The file cannot be read.
+    /// The file cannot be read, or is another than the study wrote.
     pub fn picture_file(
         &self,
         row: usize,
         frame: usize,
         eye: Eye,
     ) -> Result<PictureFile<'_>, FolderError> {
-        let relative = &self.manifest.rows[row].frames[frame].images[eye as usize];
-        let path = self.file(relative)?;
-        match std::fs::read(&path) {
+        let frame = &self.manifest.rows[row].frames[frame];
+        let path = self.file(&frame.images[eye as usize])?;
+        let expected = frame.image_checksums.as_ref().map(|of| &of[eye as usize]);
+        let read = || -> Result<Vec<u8>, Problem> {
+            let bytes = read_regular(&path)?;
+            matches_checksum(expected, || checksum(&bytes))?;
+            Ok(bytes)
+        };
+        match read() {
             Ok(bytes) => Ok(PictureFile {
                 folder: self,
                 path,
                 bytes,
             }),
-            Err(error) => Err(FolderError {
-                path,
-                problem: error.into(),
-            }),
+            Err(problem) => Err(FolderError { path, problem }),
         }
+    }
+
+    /// Checks that a row's trace is the one that the study wrote.
+    ///
+    /// # Errors
+    /// Another content checksum than the manifest's.
+    pub fn check_trace(&self, row: usize, found: &str) -> Result<(), FolderError> {
+        let row = &self.manifest.rows[row];
+        let expected = row.trace_checksum.as_ref();
+        matches_checksum(expected, || found.to_owned()).map_err(|problem| FolderError {
+            path: self.path.join(row.trace.as_deref().unwrap_or_default()),
+            problem,
+        })
     }
 }
 
@@ -145,6 +166,24 @@ pub struct PictureFile<'a> {
     path: PathBuf,
     /// The file as it is.
     pub bytes: Vec<u8>,
+}
+
+/// Compares with the manifest's checksum, which folders of earlier versions lack.
+fn matches_checksum(
+    expected: Option<&String>,
+    found: impl FnOnce() -> String,
+) -> Result<(), Problem> {
+    let Some(expected) = expected else {
+        return Ok(());
+    };
+    let found = found();
+    if found == *expected {
+        return Ok(());
+    }
+    Err(Problem::Checksum {
+        expected: expected.clone(),
+        found,
+    })
 }
 
 impl PictureFile<'_> {
@@ -182,7 +221,7 @@ fn decode(bytes: &[u8], expected: [u32; 2]) -> Result<Picture, Problem> {
 
 fn read(path: &Path) -> Result<Manifest, Problem> {
     let mut text = Vec::new();
-    BufReader::new(File::open(path)?)
+    BufReader::new(open_regular(path)?)
         .take(LONGEST_MANIFEST_BYTES + 1)
         .read_to_end(&mut text)?;
     if text.len() as u64 > LONGEST_MANIFEST_BYTES {

@@ -77,9 +77,15 @@ pub struct ManifestRow {
     /// Most memory that the capture held.
     #[serde(default)]
     pub peak_memory_bytes: Option<u64>,
+    /// Texels of the scene.
+    #[serde(default)]
+    pub texture_bytes: Option<u64>,
     /// Texture trace, relative to the folder.
     #[serde(default)]
     pub trace: Option<String>,
+    /// Content checksum of the trace; none in folders of earlier versions.
+    #[serde(default)]
+    pub trace_checksum: Option<String>,
     /// Frames of the trace.
     #[serde(default)]
     pub trace_frames: Vec<u32>,
@@ -118,6 +124,21 @@ pub struct Frame {
     pub fragments: Option<u64>,
     /// Bytes sent to the device.
     pub bytes_uploaded: u64,
+    /// Memory traffic by counts.
+    #[serde(default)]
+    pub memory_bytes: Option<u64>,
+    /// Energy of the counted work.
+    #[serde(default)]
+    pub energy_mj: Option<f64>,
+    /// Bytes of pictures read and written where the frame was made of the one before.
+    #[serde(default)]
+    pub bytes_reprojected: u64,
+    /// Bytes of the colour that the frame is rendered into.
+    #[serde(default)]
+    pub target_color_bytes: Option<u64>,
+    /// Bytes of its depth buffers that have to be there at a time.
+    #[serde(default)]
+    pub target_depth_bytes: Option<u64>,
     /// Times of the frame, one a repeat.
     pub frame_s: Vec<f64>,
     /// Times of the baseline's same frame, each measured right beside the repeat.
@@ -134,6 +155,9 @@ pub struct Frame {
     pub stages_s: Map<String, Value>,
     /// Left and right picture, relative to the folder.
     pub images: [String; 2],
+    /// CRC-32 of the pictures' files in 8 hexadecimal digits; none in folders of earlier versions.
+    #[serde(default)]
+    pub image_checksums: Option<[String; 2]>,
     /// What the technique says of itself beforehand.
     #[serde(default)]
     pub predicted: Map<String, Value>,

@@ -1,7 +1,7 @@
 //! All figures of one technique on one scene, and of the orders on its trace.
 
-use super::manifest::{Frame, ManifestRow};
-use super::{PictureFigures, Sharing, Timing, dominated};
+use super::manifest::{Frame, Manifest, ManifestRow};
+use super::{PictureFigures, Sharing, Spread, Timing, dominated, dominated_in_time};
 use crate::config::Order;
 
 /// What the caches say of a technique's trace, in one order.
@@ -38,6 +38,8 @@ pub type Count = fn(&Frame) -> Option<u64>;
 pub struct Measured<'a> {
     /// Short name of the scene.
     pub scene: &'a str,
+    /// The folder's manifest.
+    pub manifest: &'a Manifest,
     /// The manifest's row.
     pub row: &'a ManifestRow,
     /// The baseline's row.
@@ -52,9 +54,22 @@ pub struct Measured<'a> {
     pub caches: Vec<CacheFigures>,
     /// What the eyes share; none without a trace.
     pub sharing: Option<Sharing>,
-    /// Another row takes no more time, errs no more, and is better at one of both.
+    /// Another row errs no more in the mean and takes less time, with the quartiles apart.
     pub dominated: bool,
+    /// Counts of which another row needs no more, with no more error in the worst picture, and is better at one of
+    /// both: names of [`OBJECTIVES`].
+    pub dominated_in: Vec<&'static str>,
 }
+
+/// A cost of a frame; none where it was not counted.
+pub type Cost = fn(&Frame) -> Option<f64>;
+
+/// The counts that techniques are ranked by, which any two runs have in common.
+pub const OBJECTIVES: [(&str, Cost); 3] = [
+    ("fragments", |frame| Some(frame.fragments? as f64)),
+    ("bytes", |frame| Some(frame.memory_bytes? as f64)),
+    ("energy", |frame| frame.energy_mj),
+];
 
 impl Measured<'_> {
     /// True for the technique that the others are held against.
@@ -69,11 +84,26 @@ impl Measured<'_> {
         self.row.frames.iter().map(of).sum()
     }
 
+    /// The largest of a count over the frames; none where a frame has none.
+    #[must_use]
+    pub fn most(&self, of: Count) -> Option<u64> {
+        let counts: Option<Vec<u64>> = self.row.frames.iter().map(of).collect();
+        counts?.into_iter().max()
+    }
+
     /// A count over the baseline's; none where that has none.
     #[must_use]
     pub fn over_baseline(&self, of: Count) -> Option<f64> {
         let whole: u64 = self.baseline.frames.iter().map(of).sum::<Option<u64>>()?;
         (whole > 0).then_some(self.total(of)? as f64 / whole as f64)
+    }
+
+    /// Energy of the counted work over the baseline's; none where that has none.
+    #[must_use]
+    pub fn energy_ratio(&self) -> Option<f64> {
+        let whole = |row: &ManifestRow| row.frames.iter().map(|f| f.energy_mj).sum::<Option<f64>>();
+        let baseline = whole(self.baseline)?;
+        (baseline > 0.0).then_some(whole(self.row)? / baseline)
     }
 
     /// Mean of a figure that the technique predicts of itself.
@@ -102,15 +132,23 @@ pub struct Measures<'a> {
 }
 
 impl Measures<'_> {
-    /// Marks what is dominated in frame time and mean error.
+    /// Marks what is dominated in frame time and mean error, and in each count and the worst picture's error.
     pub fn mark_dominated(&mut self) {
-        let costs: Vec<(f64, f64)> = self
-            .rows
-            .iter()
-            .map(|m| (m.timing.ratio.median, m.pictures.flip_mean))
+        let times: Vec<(Spread, f64)> = (self.rows.iter())
+            .map(|m| (m.timing.ratio, m.pictures.flip_mean))
             .collect();
-        for (row, dominated) in self.rows.iter_mut().zip(dominated(&costs)) {
+        for (row, dominated) in self.rows.iter_mut().zip(dominated_in_time(&times)) {
             row.dominated = dominated;
+        }
+        for (name, of) in OBJECTIVES {
+            let cost = |m: &Measured| m.row.frames.iter().map(of).sum::<Option<f64>>();
+            let costs: Option<Vec<(f64, f64)>> = (self.rows.iter())
+                .map(|m| Some((cost(m)?, m.pictures.flip_worst)))
+                .collect();
+            let Some(costs) = costs else { continue };
+            for (row, dominated) in self.rows.iter_mut().zip(dominated(&costs)) {
+                row.dominated_in.extend(dominated.then_some(name));
+            }
         }
     }
 

@@ -7,6 +7,7 @@ mod check;
 mod folder;
 pub mod manifest;
 mod measured;
+mod pacing;
 mod pareto;
 mod pictures;
 mod sharing;
@@ -20,7 +21,8 @@ mod tests;
 
 pub use folder::{Folder, FolderError};
 pub use measured::{CacheFigures, Count, Gain, Measured, Measures, OrderGain};
-pub use pareto::dominated;
+pub use pacing::{Pacing, RATES_HZ};
+pub use pareto::{dominated, dominated_in_time};
 pub use pictures::{PictureFigures, picture_figures};
 pub use sharing::{Sharing, sharing};
 pub use skipped::{Difference, DifferenceError, differences};

@@ -3,9 +3,11 @@
 use super::{Folder, FolderError};
 use formats::view::Eye;
 use image_error::flicker::flicker;
+use image_error::motion::Motion;
 use image_error::psnr::pooled_db;
 use image_error::{Picture, PictureError, Reference};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Image errors of a technique over all its pictures.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +30,7 @@ pub struct PictureFigures {
     pub ssim: f64,
     /// The lowest of any picture.
     pub ssim_worst: f64,
-    /// Mean flicker over pairs of frames with numbers in a row; none without such a pair.
+    /// Mean flicker, along the baseline's motion, over pairs of frames with numbers in a row; none without such a pair.
     pub flicker: Option<f64>,
     /// Percent of the pictures that show the user the very same pixels.
     pub identical_pct: f64,
@@ -89,6 +91,8 @@ fn compare(folder: &Folder, frame: usize, eye: Eye) -> Result<Vec<Compared>, Fol
         .map(|before| folder.picture_file(baseline, before, eye))
         .transpose()?;
     let picture_before = expected_before.as_ref().map(|f| f.decode()).transpose()?;
+    // Found once for all techniques, and only if one differs from the baseline.
+    let motion = OnceLock::new();
     let one = |row: usize| {
         let file = folder.picture_file(row, frame, eye)?;
         let same = file.bytes == expected.bytes;
@@ -108,7 +112,8 @@ fn compare(folder: &Folder, frame: usize, eye: Eye) -> Result<Vec<Compared>, Fol
                 0.0
             } else {
                 let now = [reference.picture(), picture];
-                flicker([[was, &file.decode()?], now], reference.mask())
+                let motion = motion.get_or_init(|| Motion::between(was, now[0]));
+                flicker([[was, &file.decode()?], now], motion, reference.mask())
             });
         }
         Ok(Compared {

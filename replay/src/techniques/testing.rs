@@ -21,7 +21,9 @@ pub(crate) fn row(technique: &str, frames: u32) -> ManifestRow {
         lossless: true,
         frames: (0..frames).map(|number| frame(technique, number)).collect(),
         peak_memory_bytes: None,
+        texture_bytes: None,
         trace: None,
+        trace_checksum: None,
         trace_frames: Vec::new(),
     }
 }

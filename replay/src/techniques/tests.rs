@@ -128,6 +128,85 @@ fn a_link_that_leads_out_of_the_folder_is_refused() {
     );
 }
 
+/// Writes the checksums of a folder's files into its manifest, as `tracegen techniques` does.
+fn add_checksums(root: &std::path::Path) {
+    let mut text = manifest();
+    for row in text["rows"].as_array_mut().unwrap() {
+        let path = root.join(row["trace"].as_str().unwrap());
+        let trace = formats::Trace::open(&path).unwrap();
+        row["trace_checksum"] = json!(format!("{:08x}", trace.content_checksum()));
+        for frame in row["frames"].as_array_mut().unwrap() {
+            let sum = |image: &Value| {
+                let bytes = fs::read(root.join(image.as_str().unwrap())).unwrap();
+                formats::container::checksum(&bytes)
+            };
+            let images = frame["images"].as_array().unwrap();
+            frame["image_checksums"] = images.iter().map(sum).collect();
+        }
+    }
+    fs::write(root.join("manifest.json"), text.to_string()).unwrap();
+}
+
+#[test]
+fn a_picture_or_a_trace_of_another_row_is_refused() {
+    let root = tempfile::tempdir().unwrap();
+    folder(root.path());
+    add_checksums(root.path());
+    let open = || Folder::open(root.path()).unwrap();
+    picture_figures(&open(), &|_| ()).unwrap();
+    let of_row = open().manifest.rows[1].trace_checksum.clone().unwrap();
+    open().check_trace(1, &of_row).unwrap();
+    let error = open().check_trace(1, "0badcafe").unwrap_err().to_string();
+    let expected = format!("expected the checksum {of_row} of the manifest, found 0badcafe");
+    assert!(
+        error.contains(&expected) && error.contains("superfrustum.textrace: "),
+        "{error}"
+    );
+
+    let picture = |name: &str| root.path().join("images/superfrustum").join(name);
+    fs::copy(picture("0000-left.png"), picture("0001-left.png")).unwrap();
+    let error = picture_figures(&open(), &|_| ()).unwrap_err().to_string();
+    assert!(
+        error.contains("superfrustum/0001-left.png: expected the checksum "),
+        "{error}"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_in_a_folder_are_refused_instead_of_read() {
+    let pipe = |path: &std::path::Path| {
+        fs::remove_file(path).unwrap();
+        let made = std::process::Command::new("mkfifo").arg(path).status();
+        assert!(made.unwrap().success());
+    };
+    let root = tempfile::tempdir().unwrap();
+    folder(root.path());
+    let image = root.path().join("images/grey/0001-left.png");
+    pipe(&image);
+    pipe(&root.path().join("traces/grey.textrace"));
+    let opened = Folder::open(root.path()).unwrap();
+    for error in [
+        picture_figures(&opened, &|_| ()).unwrap_err(),
+        opened.file("traces/grey.textrace").unwrap_err(),
+    ] {
+        let error = error.to_string();
+        let expected = "expected a regular file, found a pipe";
+        assert!(
+            error.contains("grey") && error.ends_with(expected),
+            "{error}"
+        );
+    }
+    let path = root.path().join("manifest.json");
+    pipe(&path);
+    let error = Folder::open(root.path()).unwrap_err().to_string();
+    assert!(error.ends_with("found a pipe"), "{error}");
+    fs::remove_file(&path).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", &path).unwrap();
+    let error = Folder::open(root.path()).unwrap_err().to_string();
+    assert!(error.ends_with("found a device"), "{error}");
+}
+
 #[test]
 fn a_manifest_cut_anywhere_is_refused_without_a_panic() {
     let root = tempfile::tempdir().unwrap();

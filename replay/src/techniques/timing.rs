@@ -1,6 +1,7 @@
 //! Frame times, held against the baseline's that were measured right beside them.
 
 use super::manifest::{ManifestRow, numbers};
+use super::pacing::{Pacing, RATES_HZ};
 
 /// Refresh rates of displays: frames are due every 11.1 and every 13.9 ms.
 pub const REFRESH_HZ: [f64; 2] = [90.0, 72.0];
@@ -18,6 +19,8 @@ pub struct Spread {
     pub q3: f64,
     /// 99th percentile.
     pub p99: f64,
+    /// Number of measurements.
+    pub samples: usize,
 }
 
 impl Spread {
@@ -37,6 +40,7 @@ impl Spread {
             median: at(0.5),
             q3: at(0.75),
             p99: at(0.99),
+            samples: sorted.len(),
         })
     }
 }
@@ -56,6 +60,8 @@ pub struct Timing {
     /// Percent of all measurements beyond the period of each of [`REFRESH_HZ`], where times are
     /// scaled so that the median of the baseline beside them takes the first period.
     pub beyond_pct: [f64; 2],
+    /// Every measurement against each of [`RATES_HZ`], as it is.
+    pub pacing: Vec<Pacing>,
     /// Median of each frame's repeats in ms.
     pub frames_ms: Vec<f64>,
     /// Median of each stage over the frames in ms, in the manifest's order.
@@ -96,6 +102,7 @@ impl Timing {
                 None => stages.push((name.to_owned(), vec![ms(seconds)])),
             }
         }
+        let measured_ms: Vec<f64> = times().map(ms).collect();
         let median = |values: Vec<f64>| Spread::of(values).map_or(0.0, |s| s.median);
         let of_frame =
             |f: &super::manifest::Frame| median(f.frame_s.iter().map(|s| ms(*s)).collect());
@@ -110,6 +117,9 @@ impl Timing {
             ratio: Spread::of(times().zip(beside()).map(|(own, base)| own / base))?,
             frame_ms: Spread::of(times().map(ms))?,
             beyond_pct: REFRESH_HZ.map(beyond),
+            pacing: (RATES_HZ.iter())
+                .filter_map(|hz| Pacing::of(*hz, &measured_ms))
+                .collect(),
             frames_ms: row.frames.iter().map(of_frame).collect(),
             stages_ms: stages.into_iter().map(|(n, v)| (n, median(v))).collect(),
             cull_ms: median(row.frames.iter().map(|f| ms(f.cull_s)).collect()),

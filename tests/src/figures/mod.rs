@@ -79,3 +79,39 @@ pub fn documents() -> Vec<PathBuf> {
     files.sort();
     files
 }
+
+/// Tables that are typed though most of their cells are numbers: file's name and start of the heading.
+const TYPED: [(&str, &str); 1] = [
+    // Published tangents, each with its source.
+    ("techniques.md", "| `--hmd` |"),
+];
+
+/// Headings of tables outside of marks in which more than 12 cells are numbers.
+#[must_use]
+pub fn typed_tables(name: &str, document: &str) -> Vec<String> {
+    let (mut found, mut marked) = (Vec::new(), false);
+    let mut lines = document.lines().peekable();
+    while let Some(line) = lines.next() {
+        marked = line.starts_with(BEGIN) || (marked && !line.starts_with(END.trim_end()));
+        if !line.starts_with('|') {
+            continue;
+        }
+        let mut numbers = 0;
+        while let Some(row) = lines.next_if(|row| row.starts_with('|')) {
+            numbers += row.split('|').filter(|cell| is_measured(cell)).count();
+        }
+        let exempt = |(file, heading): &(&str, &str)| name == *file && line.starts_with(heading);
+        if numbers > 12 && !marked && !TYPED.iter().any(exempt) {
+            found.push(format!("{line} ({numbers} figures)"));
+        }
+    }
+    found
+}
+
+/// A cell that begins with a decimal fraction or a count, whatever follows it.
+fn is_measured(cell: &str) -> bool {
+    let number: String = (cell.trim().chars())
+        .take_while(|c| c.is_ascii_digit() || matches!(c, '.' | ',' | '+' | '-'))
+        .collect();
+    number.bytes().filter(u8::is_ascii_digit).count() > 1
+}

@@ -5,10 +5,11 @@ use super::cascades;
 use super::draws::{DrawCall, DrawList, DrawMode};
 use super::error::RasterError;
 use super::frame::Frame;
+use super::geometry;
 use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
-use record::{CaptureCounts, Captured, Capturer, Recorder, Region, Sink};
+use record::{CaptureCounts, Captured, Capturer, RecordError, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
@@ -95,6 +96,7 @@ impl CaptureJob<'_> {
     /// Eyes that the culling technique is not made for.
     pub fn frame(&self, views: &FrameViews) -> Result<Frame, RasterError> {
         let mut frame = self.boxes_seen(views)?;
+        self.cull_distant(&mut frame, views);
         self.skip(&mut frame);
         Ok(frame)
     }
@@ -192,9 +194,7 @@ impl CaptureJob<'_> {
         frame: &Frame,
     ) -> Result<(), RasterError> {
         let views: Vec<View<'_>> = frame.views().collect();
-        if let ([left, right], true) = (&views[..], self.planner.settings().multiview)
-            && [left, right].iter().all(|view| view.layer.is_plain())
-        {
+        if let ([left, right], true) = (&views[..], self.draws_both_at_once(frame)) {
             return backend.render_both(self.draws, [left, right]);
         }
         for view in &views {
@@ -205,6 +205,15 @@ impl CaptureJob<'_> {
             backend.render(self.draws, view, whole, None)?;
         }
         Ok(())
+    }
+
+    /// One draw makes both eyes' pictures: multiview, where these are plain layers.
+    #[must_use]
+    pub fn draws_both_at_once(&self, frame: &Frame) -> bool {
+        let layers = &frame.plan.layers;
+        self.planner.settings().multiview
+            && layers.len() == 2
+            && layers.iter().all(techniques::Layer::is_plain)
     }
 
     /// Renders a frame without capture: every layer, pictures composed and read back. The frame's
@@ -238,6 +247,18 @@ impl CaptureJob<'_> {
     ) -> Result<CapturedFrame, RasterError> {
         let mut counts = CaptureCounts::default();
         let mut sorting = Duration::ZERO;
+        self.check_passes(frame, &recorder.tables().passes, first_pass)?;
+        if writer.has_geometry()
+            && let Some(pass) = recorder.tables().passes.get(first_pass)
+        {
+            for (view, lists) in
+                geometry::views(self.scene, self.draws, frame, pass.frame, first_pass)
+            {
+                writer
+                    .append_view(view, &lists)
+                    .map_err(RecordError::from)?;
+            }
+        }
         for (pass, view) in (first_pass..).zip(frame.views()) {
             let mut capturer = ViewCapturer {
                 backend: &mut *backend,
@@ -257,6 +278,26 @@ impl CaptureJob<'_> {
             counts,
             sorting,
         })
+    }
+
+    /// Refuses a frame whose layers are not those that its passes were written for.
+    fn check_passes(
+        &self,
+        frame: &Frame,
+        passes: &[Pass],
+        first_pass: usize,
+    ) -> Result<(), RasterError> {
+        let number = passes.get(first_pass).map_or(0, |pass| pass.frame);
+        let layers = (0..frame.plan.layers.len()).map(|layer| pass(number, &frame.plan, layer));
+        let planned = passes.iter().skip(first_pass);
+        let planned = planned.take_while(|pass| pass.frame == number);
+        if layers.eq(planned.cloned()) {
+            return Ok(());
+        }
+        Err(RasterError::Scene(format!(
+            "frame {number}: expected the layers that were planned for it, found {}",
+            frame.plan.layers.len()
+        )))
     }
 
     /// Depth of the frame's layers as they were rendered last.

@@ -43,11 +43,15 @@ impl Driver {
             let lavapipe = Lavapipe::on(gpu, scene, draws, textures, view_size_px, budget)?;
             Ok(Box::new(lavapipe))
         };
-        match self {
-            Self::Lavapipe => Opened::first(lavapipe()),
-            Self::Osmesa => Opened::first(osmesa()),
-            Self::Auto => Opened::either(lavapipe(), osmesa),
-        }
+        let (backend, instead_of) = match self {
+            Self::Lavapipe => (lavapipe()?, None),
+            Self::Osmesa => (osmesa()?, None),
+            Self::Auto => either(lavapipe(), osmesa)?,
+        };
+        Ok(Opened {
+            backend,
+            instead_of,
+        })
     }
 }
 
@@ -59,29 +63,17 @@ pub struct Opened {
     pub instead_of: Option<RasterError>,
 }
 
-impl Opened {
-    fn first(backend: Result<Box<dyn CaptureBackend>, RasterError>) -> Result<Self, RasterError> {
-        Ok(Self {
-            backend: backend?,
-            instead_of: None,
-        })
-    }
-
-    /// The first, or the second where the first one's driver is missing or lacks something.
-    fn either(
-        first: Result<Box<dyn CaptureBackend>, RasterError>,
-        second: impl FnOnce() -> Result<Box<dyn CaptureBackend>, RasterError>,
-    ) -> Result<Self, RasterError> {
-        match first {
-            Err(error) if error.is_of_the_driver() => match second() {
-                Ok(backend) => Ok(Self {
-                    backend,
-                    instead_of: Some(error),
-                }),
-                Err(other) => Err(RasterError::NoBackend(Box::new(error), Box::new(other))),
-            },
-            first => Self::first(first),
-        }
+/// The first, or the second and why, where the first one's driver is missing or lacks something.
+fn either<B>(
+    first: Result<B, RasterError>,
+    second: impl FnOnce() -> Result<B, RasterError>,
+) -> Result<(B, Option<RasterError>), RasterError> {
+    match first {
+        Err(error) if error.is_of_the_driver() => match second() {
+            Ok(backend) => Ok((backend, Some(error))),
+            Err(other) => Err(RasterError::NoBackend(Box::new(error), Box::new(other))),
+        },
+        first => Ok((first?, None)),
     }
 }
 
@@ -98,18 +90,23 @@ mod tests {
 
     #[test]
     fn a_driver_that_lacks_a_feature_gives_way_to_the_next_and_both_reasons_are_named() {
-        let both = Opened::either(Err(lacking()), || {
+        let both = either::<()>(Err(lacking()), || {
             Err(RasterError::NoLibrary("libOSMesa.so.8", "absent".into()))
         });
-        let error = both.err().expect("no driver at all").to_string();
+        let error = both.expect_err("no driver at all").to_string();
         assert!(error.contains("PRIMITIVE_INDEX"), "{error}");
         assert!(error.contains("libOSMesa.so.8"), "{error}");
         let mut tried = false;
         let other = RasterError::Scene("inconsistent".into());
-        let error = Opened::either(Err(other), || {
+        let error = either::<()>(Err(other), || {
             tried = true;
             Err(lacking())
         });
         assert!(error.is_err() && !tried, "another driver helps no scene");
+        let (backend, instead_of) = either(Err(lacking()), || Ok("osmesa")).unwrap();
+        assert_eq!(backend, "osmesa");
+        assert!(instead_of.is_some_and(|error| error.to_string().contains("PRIMITIVE_INDEX")));
+        let (backend, instead_of) = either(Ok("lavapipe"), || Ok("osmesa")).unwrap();
+        assert!(backend == "lavapipe" && instead_of.is_none());
     }
 }

@@ -8,7 +8,10 @@ impl RasterError {
     /// Whether another backend may do what this one cannot.
     #[must_use]
     pub fn is_of_the_driver(&self) -> bool {
-        matches!(self, Self::NoDriver(_) | Self::Unsupported { .. })
+        matches!(
+            self,
+            Self::NoDriver(_) | Self::NotLoaded(_) | Self::Unsupported { .. }
+        )
     }
 }
 
@@ -20,6 +23,9 @@ pub enum RasterError {
         "no lavapipe (Mesa's CPU Vulkan driver) found{0}; install it with: apt-get install mesa-vulkan-drivers libvulkan1"
     )]
     NoDriver(String),
+    /// A driver that is installed and does not start: why.
+    #[error("lavapipe (Mesa's CPU Vulkan driver) is installed and does not start: {0}")]
+    NotLoaded(String),
     /// No OSMesa: the file that was looked for, and what the loader says.
     #[error(
         "{0} (OSMesa, Mesa without a window) cannot be loaded: {1}; install it with: apt-get install libosmesa6 (Mesa 25.1 and later have none)"

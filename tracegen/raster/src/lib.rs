@@ -12,10 +12,12 @@ pub mod backend;
 mod batches;
 pub mod capture;
 mod cascades;
+mod distant;
 pub mod draws;
 pub mod drivers;
 pub mod error;
 pub mod frame;
+pub mod geometry;
 mod groups;
 pub mod lavapipe;
 pub mod lighting;
@@ -28,3 +30,5 @@ pub mod skips;
 pub mod truth;
 mod uniforms;
 mod vertices;
+
+pub use vertices::VERTEX_STRIDE;

@@ -7,7 +7,6 @@ use super::frame::Frame;
 use glam::Mat4;
 use std::ops::AddAssign;
 use visibility::receivers::{Receivers, Volume};
-use visibility::{frustum, triangles};
 
 /// Texels of a cascade's edge that its lookup leaves free, and by which it moves a point off its surface,
 /// as in the shader; rounded up.
@@ -16,15 +15,12 @@ const LOOKUP_TEXELS: f32 = 2.0 + 1.6 + 0.4;
 /// What the skips have left out of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Skipped {
-    /// Draws of layers.
-    pub draws: u64,
     /// Shadow cascades.
     pub cascades: u64,
 }
 
 impl AddAssign for Skipped {
     fn add_assign(&mut self, other: Self) {
-        self.draws += other.draws;
         self.cascades += other.cascades;
     }
 }
@@ -32,32 +28,9 @@ impl AddAssign for Skipped {
 impl CaptureJob<'_> {
     /// Takes from a frame what nobody sees of it.
     pub(crate) fn skip(&self, frame: &mut Frame) {
-        if self.skips.draws {
-            for number in 0..frame.plan.layers.len() {
-                self.skip_draws(frame, number);
-            }
-        }
         if self.skips.cascades {
             self.skip_cascades(frame);
         }
-    }
-
-    /// Leaves out draws of a layer that have no triangle in its frustum. Only a box across the frustum's
-    /// surface is looked into.
-    fn skip_draws(&self, frame: &mut Frame, number: usize) {
-        let layer = &frame.plan.layers[number];
-        let clip_from_world = layer.clip_from_world();
-        let before = frame.visible[number].len();
-        frame.visible[number].retain(|&draw| {
-            let call = &self.draws.calls[draw as usize];
-            let mesh = &self.scene.meshes[call.mesh];
-            let inside = || {
-                let (positions, indices) = (&mesh.positions, &mesh.indices);
-                triangles::any_inside(positions, indices, &call.transform, clip_from_world)
-            };
-            frustum::holds(clip_from_world, call.bounds) || inside()
-        });
-        frame.skipped.draws += (before - frame.visible[number].len()) as u64;
     }
 
     /// Finds the shadow cascades that no visible triangle looks up.

@@ -15,7 +15,7 @@ pub(crate) struct VertexData {
 }
 
 /// Bytes between two vertices.
-pub(crate) const VERTEX_STRIDE: u64 = size_of::<VertexData>() as u64;
+pub const VERTEX_STRIDE: u64 = size_of::<VertexData>() as u64;
 
 /// The shader's `Instance`.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]

@@ -155,6 +155,7 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
                 frames,
                 surfaces: None,
                 origin_m: [0.0; 3],
+                techniques: None,
             },
             origin,
             eyes,

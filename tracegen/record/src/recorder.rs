@@ -29,6 +29,12 @@ pub struct Recorded {
 }
 
 impl<'a> Recorder<'a> {
+    /// The trace's tables.
+    #[must_use]
+    pub const fn tables(&self) -> &'a Tables {
+        self.tables
+    }
+
     /// For a trace with these tables; `masked` tells of each draw whether the capturer hands over
     /// depths for it (see [`crate::RawDepth`]).
     #[must_use]

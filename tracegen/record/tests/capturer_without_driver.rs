@@ -77,6 +77,7 @@ fn tables() -> Tables {
             }],
             surfaces: None,
             origin_m: [0.0; 3],
+            techniques: None,
         },
         textures: vec![Texture {
             name: "grid".into(),
@@ -119,6 +120,8 @@ struct Analytic {
     capacity: u64,
     /// Hands the last quad over first.
     backwards: bool,
+    /// Primitive whose coordinates are no numbers.
+    not_finite: Option<u32>,
     asked: Vec<Region>,
     empty: usize,
     overflowed: usize,
@@ -129,6 +132,7 @@ impl Analytic {
         Self {
             capacity,
             backwards,
+            not_finite: None,
             asked: Vec::new(),
             empty: 0,
             overflowed: 0,
@@ -158,12 +162,16 @@ impl Capturer for Analytic {
                     1 => (0.5, 0b0101),
                     _ => (0.7, 0b1111),
                 };
+                let is_not_finite = self.not_finite == Some(primitive);
                 let record = RawRecord {
                     header: RawRecord::pack(x, y, mask, 0),
                     primitive,
                     draw,
                     passing,
-                    uv: [x, y].map(|q| (2.0 * q as f32 + 0.5) * texel),
+                    uv: match is_not_finite {
+                        true => [f32::NAN, 0.5],
+                        false => [x, y].map(|q| (2.0 * q as f32 + 0.5) * texel),
+                    },
                     dx: [texel, 0.0],
                     dy: [0.0, texel],
                     cross: [0.0; 2],
@@ -235,6 +243,35 @@ fn a_capturer_without_a_driver_writes_a_valid_trace_of_the_records_that_it_compu
         }
     }
     assert!(expected.is_empty(), "missing: {expected:?}");
+}
+
+#[test]
+fn fragments_whose_coordinates_are_no_numbers_are_not_counted() {
+    let counts = |not_finite: Option<u32>| {
+        let tables = tables();
+        let mut writer = TextraceWriter::in_memory(&tables).unwrap();
+        let mut recorder = Recorder::new(&tables, vec![false, true]);
+        let mut capturer = Analytic {
+            not_finite,
+            ..Analytic::new(1 << 20, false)
+        };
+        let recorded = recorder.record_pass(&mut capturer, 0, &mut writer);
+        let counts = recorded.unwrap().counts;
+        let trace = Textrace::from_bytes(writer.into_bytes().unwrap()).unwrap();
+        (counts, trace.records())
+    };
+    let (all, _) = counts(None);
+    // Primitive 0 alone: its quads and lanes.
+    let of_first = (0..48).flat_map(|y| (0..32).flat_map(move |x| covered(x, y)));
+    let of_first: Vec<u8> = (of_first.filter(|(primitive, ..)| *primitive == 0))
+        .map(|(.., mask)| mask)
+        .collect();
+    let lanes: u32 = of_first.iter().map(|mask| mask.count_ones()).sum();
+    let (rest, records) = counts(Some(0));
+    assert_eq!(rest.not_finite, of_first.len() as u64);
+    assert_eq!(all.quads - rest.quads, of_first.len() as u64);
+    assert_eq!(all.fragments - rest.fragments, u64::from(lanes));
+    assert_eq!((rest.records, rest.quads), (records, records));
 }
 
 #[test]

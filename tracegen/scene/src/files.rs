@@ -1,8 +1,9 @@
 //! The files of a scene: reading them, and naming them in errors.
 
 use crate::error::SceneError;
+use formats::container::{kind_of, open_regular};
 use formats::text::printable;
-use std::fs::{File, Metadata};
+use std::fs::Metadata;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -88,30 +89,8 @@ pub(crate) fn check_regular(file: &Path, place: &str) -> Result<Metadata, SceneE
     Err(Origin::new(file).invalid(
         place,
         "a regular file (the files of a scene name each other by folder, so none can be a pipe)",
-        kind(&metadata),
+        kind_of(&metadata),
     ))
-}
-
-fn kind(metadata: &Metadata) -> &'static str {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::FileTypeExt;
-        let kind = metadata.file_type();
-        if kind.is_fifo() {
-            return "a pipe";
-        }
-        if kind.is_char_device() || kind.is_block_device() {
-            return "a device";
-        }
-        if kind.is_socket() {
-            return "a socket";
-        }
-    }
-    if metadata.is_dir() {
-        "a folder"
-    } else {
-        "something else"
-    }
 }
 
 fn read(file: &Path, place: &str, length: u64) -> Result<Vec<u8>, SceneError> {
@@ -120,7 +99,7 @@ fn read(file: &Path, place: &str, length: u64) -> Result<Vec<u8>, SceneError> {
     bytes
         .try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))
         .map_err(|e| failed(std::io::Error::other(e)))?;
-    let opened = File::open(file).map_err(failed)?;
+    let opened = open_regular(file).map_err(failed)?;
     opened
         .take(length)
         .read_to_end(&mut bytes)

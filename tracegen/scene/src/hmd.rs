@@ -1,6 +1,9 @@
 //! Head-mounted displays: presets, and the frusta that flags ask for.
 
+mod presets;
+
 use formats::view::{FovTangents, Hmd, MAX_IPD_M};
+use presets::{Fov, ROWS};
 
 /// Default distance between the eyes, metres.
 pub const DEFAULT_IPD_M: f32 = 0.064;
@@ -31,61 +34,49 @@ pub enum HmdError {
     },
 }
 
-const UNVERIFIED: &str = "unverified";
-
 /// Preset names, the default first.
-pub const PRESETS: [&str; 4] = ["symmetric-100", "dk2", "vive", "quest2"];
+pub const PRESETS: [&str; ROWS.len()] = {
+    let mut names = [""; ROWS.len()];
+    let mut row = 0;
+    while row < ROWS.len() {
+        names[row] = ROWS[row].name;
+        row += 1;
+    }
+    names
+};
 
 /// A preset by name.
 ///
 /// # Errors
 /// [`HmdError::Unknown`] lists the names.
 pub fn preset(name: &str) -> Result<Hmd, HmdError> {
-    let tangents = |left, right, up, down| FovTangents {
-        left,
-        right,
-        up,
-        down,
+    let Some(row) = ROWS.iter().find(|row| row.name == name) else {
+        return Err(HmdError::Unknown {
+            name: name.to_owned(),
+            known: PRESETS.join(", "),
+        });
     };
-    let degrees = |left: f32, right: f32, up: f32, down: f32| {
-        let [left, right, up, down] = [left, right, up, down].map(|a| a.to_radians().tan());
-        tangents(left, right, up, down)
-    };
-    let (eye_size_px, left_eye, source) = match name {
-        "symmetric-100" => (
-            [960, 1080],
-            symmetric(100.0, [960, 1080]),
-            "Z2 paper, section 4.2: 2 x 960x1080 and a 100 degree field of view; on-axis eyes with square pixels are this tool's reading".to_owned(),
-        ),
-        "dk2" => (
-            [960, 1080],
-            tangents(1.06, 1.09, 1.33, 1.33),
-            format!("{UNVERIFIED}: Oculus Rift DK2 panel; tangents as the Oculus library's defaults are quoted"),
-        ),
-        "vive" => (
-            [1080, 1200],
-            tangents(1.397, 1.246, 1.473, 1.466),
-            format!("{UNVERIFIED}: HTC Vive panel; OpenVR raw projection of one headset as quoted"),
-        ),
-        "quest2" => (
-            [1832, 1920],
-            degrees(52.0, 42.0, 44.0, 49.0),
-            format!("{UNVERIFIED}: Meta Quest 2 panel; approximate OpenXR half-angles"),
-        ),
-        _ => {
-            return Err(HmdError::Unknown {
-                name: name.to_owned(),
-                known: PRESETS.join(", "),
-            });
-        }
-    };
+    let both = |left: FovTangents| [left, mirrored(&left)];
     Ok(Hmd {
         name: name.to_owned(),
-        source,
-        eye_size_px,
-        fov: [left_eye, mirrored(&left_eye)],
+        source: row.source.to_owned(),
+        eye_size_px: row.eye_size_px,
+        fov: match &row.fov {
+            Fov::SymmetricDeg(degrees) => both(symmetric(*degrees, row.eye_size_px)),
+            Fov::LeftDeg(degrees) => {
+                let [left, right, up, down] = degrees.map(|angle| angle.to_radians().tan());
+                both(FovTangents {
+                    left,
+                    right,
+                    up,
+                    down,
+                })
+            }
+            Fov::Left(left) => both(*left),
+            Fov::Both(eyes) => *eyes,
+        },
         ipd_m: DEFAULT_IPD_M,
-        cant_deg: 0.0,
+        cant_deg: row.cant_deg,
     })
 }
 
@@ -193,6 +184,48 @@ mod tests {
         }
         let error = preset("rift").unwrap_err().to_string();
         assert!(error.contains("'rift'") && error.contains("dk2"), "{error}");
+    }
+
+    /// The half-angles that the sources print beside the tangents, those to the sides in the head's
+    /// coordinates, after the cant: a mistyped tangent shows. None where they are those of the lens's mesh.
+    #[test]
+    fn headsets_see_as_far_as_their_sources_say() {
+        let published = [
+            (
+                "rift-s",
+                [Some(44.00), Some(46.00), Some(45.00), Some(49.00)],
+            ),
+            ("index", [None, None, Some(54.73), Some(54.63)]),
+            (
+                "pimax-5k-plus",
+                [Some(70.14), Some(43.39), Some(51.78), Some(51.78)],
+            ),
+            (
+                "pimax-8k",
+                [Some(70.14), Some(43.39), Some(52.56), Some(52.56)],
+            ),
+            ("quest3", [Some(54.00), Some(40.00), None, None]),
+        ];
+        for (name, published) in published {
+            let hmd = preset(name).unwrap();
+            let fov = hmd.fov[0];
+            let degrees = |tangent: f32| tangent.atan().to_degrees();
+            let found = [
+                degrees(fov.left) + hmd.cant_deg,
+                degrees(fov.right) - hmd.cant_deg,
+                degrees(fov.up),
+                degrees(fov.down),
+            ];
+            for (found, published) in found.into_iter().zip(published) {
+                let off = published.map_or(0.0, |published: f32| found - published);
+                assert!(off.abs() < 0.01, "{name}: {found} {published:?}");
+            }
+            let outer = degrees(hmd.fov[1].right) - degrees(fov.left);
+            assert!(
+                outer.abs() < 0.1,
+                "{name}: the right eye is no mirror image"
+            );
+        }
     }
 
     #[test]

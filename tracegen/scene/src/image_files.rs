@@ -29,6 +29,13 @@ const MAX_EXPANSION: u64 = 2048;
 /// Bytes of texels that any image may have.
 const SMALL_IMAGE_BYTES: u64 = 1 << 20;
 
+/// Bytes of RGBA8 texels that the images of any scene may have together.
+const SMALL_SCENE_BYTES: u64 = 512 << 20;
+
+/// Most bytes of RGBA8 texels that a byte of a scene's images stands for, beyond
+/// [`SMALL_SCENE_BYTES`]. Scenes that people made reach 25.
+const MAX_SCENE_EXPANSION: u64 = 128;
+
 /// Encoded bytes of an image, or where they are.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Source {
@@ -115,9 +122,11 @@ impl Requests {
     }
 
     /// The images, their sizes read from the files' headers on all cores, in order.
+    ///
+    /// All of them together must stay within the bound on a scene's texels: a renderer may keep
+    /// every one decoded, and no image alone tells that there are thousands.
     pub fn images(&self, origin: &Origin) -> Result<Vec<Image>, SceneError> {
-        self.list
-            .par_iter()
+        let encoded: Vec<(Encoded, Header)> = (self.list.par_iter())
             .map(|request| {
                 let encoded = Encoded {
                     request: request.clone(),
@@ -127,19 +136,68 @@ impl Requests {
                     },
                     scene_file: origin.file.clone(),
                 };
-                Ok(Image {
-                    name: request.name.clone(),
-                    size: encoded.size()?,
-                    color_space: match request.usage {
-                        Usage::Color | Usage::Masked(_) => ColorSpace::Srgb,
-                        Usage::Data | Usage::AlphaFactor => ColorSpace::Linear,
-                    },
-                    source: Arc::new(encoded),
-                    part: 0,
-                })
+                let header = encoded.header()?;
+                Ok((encoded, header))
             })
-            .collect()
+            .collect::<Result<_, SceneError>>()?;
+        check_total(&encoded)?;
+        let image = |(encoded, header): (Encoded, Header)| Image {
+            name: encoded.request.name.clone(),
+            size: header.size,
+            color_space: match encoded.request.usage {
+                Usage::Color | Usage::Masked(_) => ColorSpace::Srgb,
+                Usage::Data | Usage::AlphaFactor => ColorSpace::Linear,
+            },
+            source: Arc::new(encoded),
+            part: 0,
+        };
+        Ok(encoded.into_iter().map(image).collect())
     }
+}
+
+/// What the headers of an image and of its opacity map tell.
+struct Header {
+    /// Of the image.
+    size: [u32; 2],
+    /// Bytes of RGBA8 that both decode to.
+    texel_bytes: u64,
+    /// Encoded bytes of the image, and of the opacity map.
+    encoded_bytes: (u64, u64),
+}
+
+/// Refuses the image with which the texels of a scene exceed their bound.
+fn check_total(images: &[(Encoded, Header)]) -> Result<(), SceneError> {
+    // A file that several images are made from counts once.
+    let mut files: HashMap<&Source, u64> = HashMap::new();
+    for (encoded, header) in images {
+        let (image, mask) = header.encoded_bytes;
+        files.insert(&encoded.request.source, image);
+        if let Some(request) = &encoded.mask {
+            files.insert(&request.source, mask);
+        }
+    }
+    let encoded_bytes = files.values().fold(0, |sum: u64, &n| sum.saturating_add(n));
+    let most = SMALL_SCENE_BYTES.max(encoded_bytes.saturating_mul(MAX_SCENE_EXPANSION));
+    let mut sum = 0_u64;
+    for (number, (encoded, header)) in images.iter().enumerate() {
+        sum = sum.saturating_add(header.texel_bytes);
+        if sum > most {
+            let [width, height] = header.size;
+            return Err(encoded.invalid(
+                &encoded.request,
+                &format!(
+                    "at most {most} bytes of texels in all images of a scene whose image files have \
+                     {encoded_bytes} bytes"
+                ),
+                format!(
+                    "{sum} bytes with this image of {width}x{height}, number {} of {}",
+                    number + 1,
+                    images.len()
+                ),
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// An image and its opacity map as files hold them.
@@ -165,13 +223,21 @@ impl Encoded {
         }
     }
 
-    /// Width and height from the headers; the opacity map's is checked as well.
-    fn size(&self) -> Result<[u32; 2], SceneError> {
-        if let Some(mask) = &self.mask {
-            self.decoder(mask, &self.read(mask)?)?;
-        }
-        let (_, size) = self.decoder(&self.request, &self.read(&self.request)?)?;
-        Ok(size)
+    /// Sizes from the headers, of the image and of its opacity map.
+    fn header(&self) -> Result<Header, SceneError> {
+        let of = |request: &Request| -> Result<([u32; 2], u64), SceneError> {
+            let bytes = self.read(request)?;
+            let (_, size) = self.decoder(request, &bytes)?;
+            Ok((size, bytes.len() as u64))
+        };
+        let (mask_size, mask_bytes) = self.mask.as_ref().map_or(Ok(([0; 2], 0)), of)?;
+        let (size, bytes) = of(&self.request)?;
+        let rgba_bytes = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height) * 4;
+        Ok(Header {
+            size,
+            texel_bytes: rgba_bytes(size) + rgba_bytes(mask_size),
+            encoded_bytes: (bytes, mask_bytes),
+        })
     }
 
     /// Size and RGBA8 texels.

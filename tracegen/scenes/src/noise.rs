@@ -3,9 +3,10 @@
 //! Textures of a scene share a handful of precomputed fields: looking one up costs a few
 //! nanoseconds where evaluating six octaves would cost fifty, and a scene has some 70 M texels.
 
+use std::io;
 use std::panic::resume_unwind;
 use std::sync::OnceLock;
-use std::thread::ScopedJoinHandle;
+use std::thread::{Builder, ScopedJoinHandle};
 
 /// Edge of the shared noise fields in samples; a power of two, so that wrapping is a mask.
 pub const FIELD_SIZE: usize = 1024;
@@ -201,12 +202,17 @@ pub fn bank() -> &'static NoiseBank {
         // On threads of their own: a worker of the pool that waits for others' shares takes up
         // other work meanwhile, which may ask for this bank and would wait for itself.
         std::thread::scope(|scope| {
-            let mottle = scope.spawn(|| Field::fbm(16, 5, 0.6, 23));
-            let grain = scope.spawn(|| Field::fbm(128, 3, 0.7, 37));
-            let pebble = scope.spawn(|| Field::cells(24, 53));
+            let start = |field: fn() -> Field| (field, Builder::new().spawn_scoped(scope, field));
+            let mottle = start(|| Field::fbm(16, 5, 0.6, 23));
+            let grain = start(|| Field::fbm(128, 3, 0.7, 37));
+            let pebble = start(|| Field::cells(24, 53));
             let cloud = Field::fbm(4, 7, 0.55, 11);
-            let join = |field: ScopedJoinHandle<'_, Field>| {
-                field.join().unwrap_or_else(|panic| resume_unwind(panic))
+            let join = |(field, thread): (fn() -> Field, io::Result<ScopedJoinHandle<'_, _>>)| {
+                match thread {
+                    Ok(thread) => thread.join().unwrap_or_else(|panic| resume_unwind(panic)),
+                    // Little memory is left, too little for one more thread.
+                    Err(_) => field(),
+                }
             };
             NoiseBank {
                 cloud,

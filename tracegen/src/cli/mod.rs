@@ -2,6 +2,7 @@
 
 mod cache_args;
 pub mod lens_args;
+mod objective_args;
 mod path_args;
 pub mod precision;
 mod prepared;

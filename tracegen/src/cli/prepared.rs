@@ -62,6 +62,8 @@ pub fn prepare(
         hmd: setup.hmd,
         views: setup.frames,
         scene: setup.scene,
+        texture_bytes: uploads.bytes() as u64,
+        shown: None,
     };
     Ok(Prepared { world, backend })
 }

@@ -1,13 +1,15 @@
 //! `tracegen raster`.
 
 use super::cache_args::CacheArgs;
+use super::objective_args::ObjectiveArgs;
 use super::path_args::{PathArgs, frame_count};
+use super::raster_auto::Techniques;
 use super::raster_summary::{Summary, worked_since};
 use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
 use super::technique_args::TechniqueArgs;
 use crate::doubtful::Doubtful;
 use crate::picture;
-use crate::study::auto::Budget;
+use crate::study::auto::{Budget, Schedule};
 use crate::study::processor;
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
@@ -17,6 +19,7 @@ use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
 use raster::drivers::Driver;
+use raster::geometry::geometry;
 use raster::lighting::Lighting;
 use scene::{LoadOptions, Scene};
 use shell::{Progress, Threads, lasting_arguments, note};
@@ -71,17 +74,29 @@ pub struct RasterArgs {
     /// How the trace's tiles are packed.
     #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
     pub(super) encoding: TileEncoding,
-    /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, draws, regions or all of
+    /// Add what vertex processing reads and the primitives that enter each tile, for `replay run --frame`.
+    #[arg(long)]
+    pub(super) geometry: bool,
+    /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, regions or all of
     /// them. Pictures and trace stay the same.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     no_skip: Vec<Skip>,
     /// Choose the techniques under a budget, for each frame: `flip=ERROR` (mean FLIP inside the
-    /// lens, 0 for lossless ones alone) or `pixels=PX` for the cheapest inside it, `budget-ms=MS` for the least error whose
-    /// median frame takes no longer.
+    /// lens, 0 for lossless ones alone) or `pixels=PX` for those of least cost inside it, `budget-ms=MS` for the least
+    /// error whose median frame takes no longer.
     #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
-          conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "far_field", "foveate",
+          conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "hidden_area_mesh",
+                                "cull_distance", "cull_px", "far_field", "foveate",
                                 "views", "no_plain", "shade", "no_skip"])]
     auto: Option<Budget>,
+    #[command(flatten)]
+    objective: ObjectiveArgs,
+    /// Render with techniques by name: `TECHNIQUE`, those of `tracegen techniques --only`, joined by `+`, then those of
+    /// single frames, `,FRAME:TECHNIQUE` or `,FIRST-LAST:TECHNIQUE`. What `--auto` chose can be captured again so.
+    #[arg(long, value_name = "TECHNIQUE", help_heading = "Techniques",
+          conflicts_with_all = ["auto", "cull", "occlusion", "multiview", "hidden_area_mask", "far_field", "foveate",
+                                "views", "no_plain", "shade", "no_skip"])]
+    technique: Option<Schedule>,
     #[command(flatten)]
     pub(super) techniques: TechniqueArgs,
     #[command(flatten)]
@@ -196,7 +211,11 @@ impl RasterArgs {
     /// Refuses what the OSMesa backend does not do.
     fn check_plain_frames(&self) -> anyhow::Result<()> {
         let auto = self.auto.map(|_| "--auto");
-        if let Some(flag) = auto.or_else(|| self.techniques.beyond_plain_frames()) {
+        let named = self.technique.as_ref().map(|_| "--technique");
+        if let Some(flag) = auto
+            .or(named)
+            .or_else(|| self.techniques.beyond_plain_frames())
+        {
             bail!(
                 "{flag}: expected with --backend lavapipe, found with osmesa, which captures plain frames alone"
             );
@@ -212,7 +231,11 @@ impl RasterArgs {
         );
         ensure!(
             self.auto.is_none(),
-            "--hsr none: expected techniques by name, found --auto, which measures frames with the depth test"
+            "--hsr none: expected techniques by their own options, found --auto, which measures frames with the depth test"
+        );
+        ensure!(
+            self.technique.is_none(),
+            "--hsr none: expected techniques by their own options, found --technique, which captures with the depth test"
         );
         Ok(())
     }
@@ -227,14 +250,26 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     args.threads.start()?;
     let outputs = capture_outputs(&args.output, args.image.as_deref());
     args.scene.check_outputs(&args.path, &outputs)?;
+    shell::check_outputs(
+        &outputs,
+        args.techniques.inputs().iter().map(PathBuf::as_path),
+    )?;
     if args.hsr == Hsr::None {
         args.check_without_depth_test()?;
     }
     if args.backend == Backend::Osmesa {
         args.check_plain_frames()?;
     }
-    if let Some(budget) = args.auto {
-        return super::raster_auto::run(args, budget, &outputs);
+    let objective = args.objective.of(args.auto)?;
+    let chosen = args
+        .auto
+        .map(|budget| Techniques::Chosen(budget, objective));
+    let named = args
+        .technique
+        .clone()
+        .map(|named| Techniques::Named(Box::new(named)));
+    if let Some(techniques) = chosen.or(named) {
+        return super::raster_auto::run(args, &techniques, &outputs);
     }
     let started = Instant::now();
     let cache = args.cache.open()?;
@@ -310,7 +345,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     drop(uploads);
     let mut summary = Summary::default();
     let first = summary.look(&job, backend, &setup.frames[0])?;
-    summary.shadows += job.light(backend, &first)?;
+    summary.light(&job, backend, &first)?;
     if !args.no_plain {
         job.warm_up(backend, &first)?;
     }
@@ -335,6 +370,9 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
 
     let writer = TextraceWriter::create(&args.output, &tables)?;
     let mut writer = writer.with_encoding(args.encoding.encoding());
+    if args.geometry {
+        writer = writer.with_geometry(geometry(&setup.scene, &draws))?;
+    }
     let mut first_pictures: Option<Pictures> = None;
     let mut first_pass = 0;
     for views in &setup.frames {
@@ -352,7 +390,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
             Some(first) => first,
             None => {
                 let frame = summary.look(&job, backend, views)?;
-                summary.shadows += job.light(backend, &frame)?;
+                summary.light(&job, backend, &frame)?;
                 frame
             }
         };
@@ -360,16 +398,18 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         let compares_depth = !job.shaded && job.fragments == Fragments::DepthTested;
         let mut plain = None;
         if !args.no_plain {
-            let worked = processor::time();
+            let (worked, before) = (processor::time(), backend.work());
             let (pictures, time) = job.plain_frame(backend, &frame)?;
             summary.plain += time;
+            summary.plain_draws.add(before, backend.work());
             summary.plain_work += worked_since(worked);
             let depths = compares_depth.then(|| job.depths(backend, &frame));
             plain = Some((pictures, depths.transpose()?));
         }
-        let (start, worked) = (Instant::now(), processor::time());
+        let (start, worked, before) = (Instant::now(), processor::time(), backend.work());
         let captured =
             job.capture_frame(backend, &frame, first_pass, &mut recorder, &mut writer)?;
+        summary.capture_draws.add(before, backend.work());
         first_pass += frame.plan.layers.len();
         summary.sorting += captured.sorting;
         summary.captured += start.elapsed();
@@ -494,6 +534,7 @@ pub(super) fn tables(
             frames: setup.frames.clone(),
             surfaces: Some(draws.surfaces(fragments)),
             origin_m: setup.scene.origin.to_array(),
+            techniques: None,
         },
         textures,
         samplers,
@@ -513,13 +554,12 @@ pub(super) fn prepare_environment(threads: Option<u16>) {
     unsafe {
         // Mesa's device selection asks a display server, in vain and aloud where there is none.
         std::env::set_var("NODEVICE_SELECT", "1");
-        // At narrow vectors the gathers of AVX2 corrupt memory (Mesa 22.3); a processor that has none of
-        // it needs nothing.
+        // At narrow vectors Mesa 22.3 corrupts memory where the processor has AVX2, and on some that have AVX.
         let set = |name: &str| std::env::var_os(name);
         if set("LP_NATIVE_VECTOR_WIDTH").is_some_and(|bits| bits == "128")
             && set("GALLIUM_OVERRIDE_CPU_CAPS").is_none()
         {
-            std::env::set_var("GALLIUM_OVERRIDE_CPU_CAPS", "avx");
+            std::env::set_var("GALLIUM_OVERRIDE_CPU_CAPS", "sse4.1");
         }
         // softpipe has all that the capture needs of OpenGL 4.5, as extensions of 3.3.
         if set("GALLIUM_DRIVER").is_some_and(|driver| driver == "softpipe") {

@@ -14,9 +14,37 @@ use std::time::{Duration, Instant};
 use techniques::layer::Predicted;
 use visibility::Occlusion;
 
+/// What a stage of all frames submitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Submitted {
+    draws: u64,
+    calls: u64,
+    regions: u64,
+}
+
+impl Submitted {
+    /// Adds what a backend did between two readings of its work.
+    pub fn add(&mut self, before: Work, after: Work) {
+        let work = after - before;
+        self.draws += work.draws;
+        self.calls += work.calls;
+        self.regions += work.regions;
+    }
+}
+
+impl std::fmt::Display for Submitted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} draws in {} calls", self.draws, self.calls)
+    }
+}
+
 /// Sums over the frames.
 #[derive(Default)]
 pub struct Summary {
+    /// By stage; what warms the driver up or compares depths is in none.
+    pub shadow_draws: Submitted,
+    pub plain_draws: Submitted,
+    pub capture_draws: Submitted,
     pub shadows: Duration,
     pub plain: Duration,
     pub captured: Duration,
@@ -40,6 +68,19 @@ pub struct Summary {
 }
 
 impl Summary {
+    /// Renders the shadow maps of a frame.
+    pub fn light(
+        &mut self,
+        job: &CaptureJob<'_>,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+    ) -> Result<(), RasterError> {
+        let before = backend.work();
+        self.shadows += job.light(backend, frame)?;
+        self.shadow_draws.add(before, backend.work());
+        Ok(())
+    }
+
     /// Finds what a frame draws.
     pub fn look(
         &mut self,
@@ -113,14 +154,14 @@ impl Summary {
             record::RECORD_BYTES
         ));
         note(&format!(
-            "{} draws in {} draw calls, {} regions, {} shadow maps in {:.3} s, {} pipelines, {} samplers",
-            work.draws,
-            work.calls,
-            work.regions,
+            "shadow maps    {} in {:.3} s: {}",
             work.shadow_maps,
             self.shadows.as_secs_f64(),
-            work.pipelines,
-            work.samplers
+            self.shadow_draws
+        ));
+        note(&format!(
+            "driver         {} pipelines, {} samplers",
+            work.pipelines, work.samplers
         ));
         note(&format!(
             "culling        {} boxes tested, {} more against depth that hides {} draws, in {:.3} ms a frame",
@@ -130,8 +171,7 @@ impl Summary {
             self.culling.as_secs_f64() * 1e3 / frames as f64
         ));
         note(&format!(
-            "never drawn    {empty_tiles} empty tiles, {} draws without a triangle in view, {} shadow cascades that nobody sees (draws found in {:.3} s)",
-            self.skipped.draws,
+            "never drawn    {empty_tiles} empty tiles, {} shadow cascades that nobody sees (draws found in {:.3} s)",
             self.skipped.cascades,
             self.looking.as_secs_f64()
         ));
@@ -140,12 +180,15 @@ impl Summary {
         if !self.plain.is_zero() {
             let plain = self.plain.as_secs_f64();
             note(&format!(
-                "plain render   {plain:.3} s ({includes}, reading the pictures back)"
+                "plain render   {plain:.3} s ({includes}, reading the pictures back): {}",
+                self.plain_draws
             ));
             note(&format!(
-                "with capture   {captured:.3} s ({includes}, draining, and {:.3} s of sorting, encoding and writing the trace): {:.2} x plain",
+                "with capture   {captured:.3} s ({includes}, draining, and {:.3} s of sorting, encoding and writing the trace): {:.2} x plain; {}, {} regions",
                 self.sorting.as_secs_f64(),
-                captured / plain
+                captured / plain,
+                self.capture_draws,
+                self.capture_draws.regions
             ));
             let (plain, captured) = (
                 self.plain_work.as_secs_f64(),
@@ -162,7 +205,8 @@ impl Summary {
             }
         } else {
             note(&format!(
-                "with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace)"
+                "with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace): {}, {} regions",
+                self.capture_draws, self.capture_draws.regions
             ));
         }
         if let Some(bytes) = memory::peak_bytes() {

@@ -163,6 +163,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
             frames,
             surfaces: None,
             origin_m: scene_origin.to_array(),
+            techniques: None,
         },
         origin: (scene_origin + scene.soup.origin).to_array(),
         eyes,

@@ -15,6 +15,9 @@ use std::path::{Path, PathBuf};
 #[derive(Args, Clone, Debug)]
 pub struct SceneArgs {
     /// A built-in scene (see `tracegen scenes`) or a .gltf, .glb or .obj file.
+    ///
+    /// A file's images may together decode to 512 MiB of RGBA8 texels, or to 128 bytes a byte of
+    /// their files where that is more.
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// Camera flags.
@@ -226,7 +229,7 @@ impl CameraArgs {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Display")]
 pub struct HmdArgs {
-    /// Preset: symmetric-100, dk2, vive or quest2.
+    /// Preset: symmetric-100, dk2, vive, quest2, rift-cv1, rift-s, index, pimax-5k-plus, pimax-8k or quest3.
     #[arg(long, value_name = "NAME", default_value = hmd::PRESETS[0])]
     pub hmd: String,
     /// Pixels per eye [default: the preset's].

@@ -81,6 +81,7 @@ struct CameraEntry {
 /// # Errors
 /// An unreadable scene, or a closed output.
 pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
+    shell::Threads::default().start()?;
     let text = match args.scene {
         None => list(args.json)?,
         Some(spec) => {

@@ -32,6 +32,7 @@ fn names() -> clap::builder::PossibleValuesParser {
 /// A folder that cannot be written.
 pub fn run(args: &StressArgs) -> anyhow::Result<ExitCode> {
     super::raster::prepare_environment(None);
+    shell::Threads::default().start()?;
     shell::check_folder("--output", &args.output)?;
     let [json_file, markdown_file] = ["stress.json", "stress.md"].map(|f| args.output.join(f));
     let outputs = [&json_file, &markdown_file].map(|file| Output::text("--output", file));

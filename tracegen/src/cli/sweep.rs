@@ -5,7 +5,8 @@ use crate::captures::{self, Capture};
 use ::scenes::load_with;
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Parser};
-use formats::container::{AtomicFile, remove_abandoned};
+use formats::Trace;
+use formats::container::{AtomicFile, check_regular, read_regular, remove_abandoned};
 use scene::LoadOptions;
 use serde::Serialize;
 use shell::{Output, Piece, Progress, Shard, ShardArgs, SlurmArray, Threads, balanced};
@@ -33,8 +34,8 @@ const SAMPLES_PER_TRIANGLE: u64 = 10;
   tracegen sweep captures.toml -o traces --emit-slurm 8 > captures.sh && sh captures.sh
   replay sweep caches.toml traces/*.textrace
 
-Each capture is a trace and its recipe, a line of arguments. What stands there with the same recipe is
-not captured again. Paths in the manifest are relative to it.")]
+Each capture is a trace and its recipe: a line of arguments, and the checksum of what they made. A whole trace
+that stands there with the same recipe is not captured again. Paths in the manifest are relative to it.")]
 pub struct SweepArgs {
     /// Manifest: [base] and [[captures]] with options of `raster` and `rays`
     manifest: PathBuf,
@@ -82,20 +83,27 @@ struct PlannedCapture<'a> {
 /// # Errors
 /// A bad manifest, a folder that cannot be written, captures that failed.
 pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
+    args.threads.start()?;
     let name = || args.manifest.display().to_string();
     let captures = captures::parse(&shell::read_settings(&args.manifest)?).with_context(name)?;
     let mut scenes = SceneSizes::new(folder_of(&args.manifest));
     let planned = captures
         .into_iter()
         .map(|capture| plan(capture, &args.output, &mut scenes));
-    let planned: Vec<Planned> = planned.collect::<Result<_, _>>().with_context(name)?;
+    let mut planned: Vec<Planned> = planned.collect::<Result<_, _>>().with_context(name)?;
     if let Some(shards) = args.shards.emit_slurm {
         return shell::print(&slurm_script(args, shards)?);
     }
     let mine = match args.shards.shard {
-        None => &planned[..],
-        Some(shard) => &planned[of_shard(&planned, shard)],
+        None => 0..planned.len(),
+        Some(shard) => of_shard(&planned, shard),
     };
+    let mine = &mut planned[mine];
+    // Reads every trace to its end, so only those of this shard.
+    for p in &mut *mine {
+        p.done = is_done(&p.capture, &args.output);
+    }
+    let mine = &*mine;
     if args.plan {
         return shell::print(&plan_text(mine, args.json)?);
     }
@@ -144,7 +152,24 @@ impl<'a> SceneSizes<'a> {
     }
 }
 
-/// Checks a capture's arguments and its scene, and looks whether it is there.
+/// True where the capture's trace is there, whole, and the one that its recipe made.
+fn is_done(capture: &Capture, folder: &Path) -> bool {
+    let Ok(recipe) = read_regular(&folder.join(capture.recipe_file())) else {
+        return false;
+    };
+    // Traces take a while to read: most that are not done differ in the arguments already.
+    let first = recipe.split(|byte| *byte == b'\n').next();
+    let same = first == Some(capture.recipe().as_bytes());
+    let checksum = || content_checksum(&folder.join(&capture.file));
+    same && checksum().is_ok_and(|sum| capture.recipe_text(sum).as_bytes() == recipe)
+}
+
+fn content_checksum(trace: &Path) -> anyhow::Result<u32> {
+    check_regular(trace).with_context(|| trace.display().to_string())?;
+    Ok(Trace::open(trace)?.content_checksum())
+}
+
+/// Checks a capture's arguments and its scene.
 fn plan(capture: Capture, folder: &Path, scenes: &mut SceneSizes) -> anyhow::Result<Planned> {
     let trace = folder.join(&capture.file);
     let place = || format!("[[captures]] {}: {}", capture.table, capture.recipe());
@@ -167,9 +192,8 @@ fn plan(capture: Capture, folder: &Path, scenes: &mut SceneSizes) -> anyhow::Res
     };
     let triangles = scenes.triangles(&scene).with_context(place)?;
     let cost = pixels.with_context(place)? + per_triangle * triangles;
-    let recipe = std::fs::read_to_string(folder.join(capture.recipe_file()));
     Ok(Planned {
-        done: trace.is_file() && recipe.is_ok_and(|found| found.trim_end() == capture.recipe()),
+        done: false,
         cost,
         trace,
         capture,
@@ -237,8 +261,8 @@ fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
         process.current_dir(folder).stdin(Stdio::null());
         let status = shell::run_child(&mut process);
         if status.context("the program itself")?.success() {
-            let line = p.capture.recipe() + "\n";
-            AtomicFile::write_whole(&recipe, line.as_bytes())
+            let text = p.capture.recipe_text(content_checksum(&p.trace)?);
+            AtomicFile::write_whole(&recipe, text.as_bytes())
                 .with_context(|| format!("cannot write {}", recipe.display()))?;
         } else {
             failed.push(p.capture.file.as_str());

@@ -1,15 +1,17 @@
 //! Flags that say what a capture may leave out or do more coarsely.
 
 use super::lens_args::LensArgs;
+use crate::hidden_mesh;
 use anyhow::ensure;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use formats::view::Hmd;
 use scene::paths::read_gazes;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use techniques::Gaze;
 use techniques::Settings;
+use techniques::distance::DistanceCull;
 use techniques::gaze::GazeSample;
 use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
 use visibility::Culling;
@@ -30,6 +32,21 @@ pub struct TechniqueArgs {
     /// Draw nothing that the lens does not show.
     #[arg(long)]
     hidden_area_mask: bool,
+    /// Draw nothing that the headset's own mesh hides: a JSON file of triangles (docs/foveation.md) or a
+    /// recording of hmdq.
+    #[arg(long, value_name = "FILE", conflicts_with = "hidden_area_mask")]
+    hidden_area_mesh: Option<PathBuf>,
+    /// Leave out draws of which every point is farther than this from the head.
+    #[arg(
+        long,
+        value_name = "METRES",
+        conflicts_with = "cull_px",
+        allow_hyphen_values = true
+    )]
+    cull_distance: Option<f32>,
+    /// Leave out draws whose bounding sphere spans fewer pixels.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    cull_px: Option<f32>,
     /// Submit both eyes at once where the driver can be trusted with that (the capture goes eye by eye).
     #[arg(long)]
     multiview: bool,
@@ -102,6 +119,8 @@ enum Foveate {
     MultiResolution,
     /// Every other 2x2 quad of the periphery, filled from its neighbours.
     RadialDensity,
+    /// 2x2 viewports, coarser towards the edges by a projective map.
+    LensMatched,
 }
 
 /// `--rates`.
@@ -130,11 +149,21 @@ impl TechniqueArgs {
         self.far_field.is_some()
     }
 
+    /// Files that the flags name.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        let gaze = self.gaze.as_ref().map(PathBuf::from);
+        let gaze = gaze.filter(|path| path.extension().is_some());
+        gaze.into_iter()
+            .chain(self.hidden_area_mesh.clone())
+            .collect()
+    }
+
     /// The first flag that needs more than each eye's own picture, drawn once from its list of draws.
     pub fn beyond_plain_frames(&self) -> Option<&'static str> {
         let flags = [
             (self.occlusion, "--occlusion"),
             (self.hidden_area_mask, "--hidden-area-mask"),
+            (self.hidden_area_mesh.is_some(), "--hidden-area-mesh"),
             (self.multiview, "--multiview"),
             (self.far_field.is_some(), "--far-field"),
             (self.foveate.is_some(), "--foveate"),
@@ -152,6 +181,11 @@ impl TechniqueArgs {
             occlusion: self.occlusion,
             multiview: self.multiview,
             hidden_area_mask: self.hidden_area_mask,
+            hidden_area_mesh: (self.hidden_area_mesh.as_deref().map(hidden_mesh::read))
+                .transpose()?,
+            distance_cull: (self.cull_distance.map(DistanceCull::Metres))
+                .or(self.cull_px.map(DistanceCull::Pixels)),
+            half_rate: None,
             far_field: self.far_field.map(|SplitFlag(split)| FarField {
                 split,
                 variant: match self.far_field_variant {
@@ -174,7 +208,12 @@ impl TechniqueArgs {
             Foveate::Rings => FoveationKind::Rings,
             Foveate::MultiResolution => FoveationKind::MultiResolution,
             Foveate::RadialDensity => FoveationKind::RadialDensity,
+            Foveate::LensMatched => FoveationKind::LensMatched,
         };
+        ensure!(
+            kind != FoveationKind::LensMatched || self.rates.is_none() && self.gaze.is_none(),
+            "--rates, --gaze: expected with another --foveate, found with lens-matched, whose rates are those of its projection around straight ahead"
+        );
         ensure!(
             kind != FoveationKind::MultiResolution || self.rates.is_none(),
             "--rates: expected with --foveate rings or radial-density, found with multi-resolution, whose rates are those of its viewports"

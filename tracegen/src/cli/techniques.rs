@@ -2,11 +2,12 @@
 
 use super::cache_args::CacheArgs;
 use super::lens_args::LensArgs;
+use super::objective_args::ObjectiveArgs;
 use super::path_args::PathArgs;
 use super::prepared::{Prepared, prepare};
 use super::raster::{self, TileEncoding};
 use super::scene_args::SceneArgs;
-use crate::study::auto::{AutoRecord, Budget, choose};
+use crate::study::auto::{AutoRecord, Budget, Objective, choose};
 use crate::study::folder::{self, Folder, RowRecord, Subject};
 use crate::study::frames;
 use crate::study::measure::{Bench, Extent};
@@ -26,6 +27,9 @@ use xxhash_rust::xxh3::xxh3_64;
 const SIZE_PX: [u32; 2] = [480, 540];
 /// Memory for raw records.
 const RECORD_BUDGET: u64 = 128 << 20;
+
+/// Name that errors and counts of searches are kept under.
+const SEEN: &str = "seen-by-searches";
 
 /// Arguments of `tracegen techniques`.
 #[derive(Args, Debug)]
@@ -68,11 +72,13 @@ pub struct TechniquesArgs {
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Also search for the best combination under a budget, and measure it: `flip=ERROR` (mean FLIP
-    /// inside the lens) or `pixels=PX` for the cheapest whose error stays inside in every frame of
+    /// inside the lens) or `pixels=PX` for the least cost whose error stays inside in every frame of
     /// the path, `budget-ms=MS` for the least error whose median frame takes no longer on this
     /// device.
     #[arg(long, value_name = "BUDGET")]
     auto: Option<Budget>,
+    #[command(flatten)]
+    objective: ObjectiveArgs,
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
@@ -91,6 +97,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         None => Row::all(),
     };
     folder::check(&args.output, &args.inputs())?;
+    let objective = args.objective.of(args.auto)?;
     ensure!(
         args.frames <= args.path_frames,
         "--frames: expected at most {}, the frames of the path, found {}",
@@ -190,7 +197,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     let mut records = measure(&mut bench, &rows)?;
     let auto = args
         .auto
-        .map(|budget| measure_auto(&mut bench, budget))
+        .map(|budget| measure_auto(&mut bench, budget, objective))
         .transpose()?;
     drop(progress);
     let auto = auto.map(|(record, row)| {
@@ -215,7 +222,12 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     }
     let mut text = format!("{}: {} rows", manifest.display(), records.len());
     if let Some(auto) = &auto {
-        text += &format!("\n--auto {}: {}", auto.budget, auto.reason);
+        text += &format!(
+            "\n--auto {} --objective {}: {}",
+            auto.budget,
+            objective.name(),
+            auto.reason
+        );
     }
     shell::print(&text)
 }
@@ -250,16 +262,34 @@ fn measure(bench: &mut Bench<'_>, rows: &[Row]) -> anyhow::Result<Vec<RowRecord>
 }
 
 /// Chooses under a budget and measures what was chosen, unless that is there already.
-fn measure_auto(bench: &mut Bench<'_>, budget: Budget) -> anyhow::Result<(AutoRecord, RowRecord)> {
-    let name = format!("auto-{}", budget.to_string().replace('=', "-"));
-    if let Some(kept) = bench.folder.kept(&name, &budget) {
+fn measure_auto(
+    bench: &mut Bench<'_>,
+    budget: Budget,
+    objective: Objective,
+) -> anyhow::Result<(AutoRecord, RowRecord)> {
+    let budget_name = budget.to_string().replace('=', "-");
+    let name = format!("auto-{budget_name}-{}", objective.name());
+    let question = (budget, objective);
+    let kept: Option<(AutoRecord, RowRecord)> = bench.folder.kept(&name, &question);
+    if let Some(kept) = kept.filter(|(_, row)| bench.folder.is_whole(row)) {
         return Ok(kept);
     }
-    let choice = choose(bench.world, bench.backend, budget, bench.progress)?;
+    // On the frames that the table shows.
+    let runs = bench.extent.runs.clone();
+    let choice = choose(
+        bench.world,
+        bench.backend,
+        runs,
+        budget,
+        objective,
+        bench.folder.kept(SEEN, &"frames").unwrap_or_default(),
+        bench.progress,
+    )?;
+    bench.folder.write_kept(SEEN, &"frames", &choice.known)?;
     let (held, planners) = (&choice.held, choice.planners(bench.world)?);
     let chosen = &held.chain[0];
     let row = Row {
-        title: format!("Chosen for {budget}: {}", chosen.title),
+        title: format!("Least {} for {budget}: {}", objective.name(), chosen.title),
         name: name.clone(),
         ..chosen.clone()
     };
@@ -269,7 +299,7 @@ fn measure_auto(bench: &mut Bench<'_>, budget: Budget) -> anyhow::Result<(AutoRe
         .stage("measuring what was chosen", steps, "frames");
     let measured = bench.measure(&row, |frame| &planners[held.of_frame[frame as usize]])?;
     let kept = (choice.record, measured);
-    bench.folder.write_kept(&name, &budget, &kept)?;
+    bench.folder.write_kept(&name, &question, &kept)?;
     Ok(kept)
 }
 

@@ -3,8 +3,10 @@
 //! A row that is complete is a file of its own, so a study that was ended goes on where it was.
 
 use super::auto::AutoRecord;
+use super::counted::Counted;
 use anyhow::{Context, ensure};
-use formats::container::AtomicFile;
+use formats::Trace;
+use formats::container::{AtomicFile, check_regular, checksum, read_regular};
 use formats::textrace::Encoding;
 use formats::view::{Hmd, Lens};
 use serde::{Deserialize, Serialize};
@@ -83,8 +85,13 @@ pub struct RowRecord {
     pub frames: Vec<FrameRecord>,
     /// Most memory that the process held meanwhile, where the system tells.
     pub peak_memory_bytes: Option<u64>,
+    /// Texels of the scene, there once whatever is drawn.
+    #[serde(default)]
+    pub texture_bytes: u64,
     /// Texture trace, relative to the folder.
     pub trace: Option<String>,
+    /// Its content checksum.
+    pub trace_checksum: Option<String>,
     /// Frames of the trace.
     pub trace_frames: Vec<u32>,
 }
@@ -118,6 +125,24 @@ pub struct FrameRecord {
     pub fragments: Option<u64>,
     /// Bytes written to the device for views and lists of draws.
     pub bytes_uploaded: u64,
+    /// What it takes of memory by counts; none where the device cannot capture.
+    #[serde(default)]
+    pub counted: Option<Counted>,
+    /// All of these bytes together.
+    #[serde(default)]
+    pub memory_bytes: Option<u64>,
+    /// Energy of the counts.
+    #[serde(default)]
+    pub energy_mj: Option<f64>,
+    /// Bytes of pictures read and written where the frame was made of the one before.
+    #[serde(default)]
+    pub bytes_reprojected: u64,
+    /// Bytes of the colour that the frame is rendered into.
+    #[serde(default)]
+    pub target_color_bytes: u64,
+    /// Bytes of its depth buffers that have to be there at a time.
+    #[serde(default)]
+    pub target_depth_bytes: u64,
     /// Times of the frame without capture, one a repeat.
     pub frame_s: Vec<f64>,
     /// Times of the baseline's frame, each measured beside the repeat.
@@ -132,6 +157,8 @@ pub struct FrameRecord {
     pub stages_s: BTreeMap<String, f64>,
     /// Left and right picture, relative to the folder.
     pub images: [String; 2],
+    /// CRC-32 of their files.
+    pub image_checksums: [String; 2],
     /// What the techniques promise.
     pub predicted: Predicted,
 }
@@ -197,6 +224,20 @@ pub fn check(root: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
         "{}: expected an empty folder or that of an earlier study, found other files",
         named()
     );
+    let own = ["manifest.json", "rows", "images", "traces"].map(|name| root.join(name));
+    own.iter().try_for_each(|path| check_regular_below(path))
+}
+
+/// Refuses pipes and devices where the study reads and writes files: they would be found only when
+/// minutes have gone into a row.
+fn check_regular_below(path: &Path) -> anyhow::Result<()> {
+    if path.is_dir() {
+        for entry in fs::read_dir(path).with_context(|| path.display().to_string())? {
+            check_regular_below(&entry?.path())?;
+        }
+    } else if path.exists() {
+        check_regular(path).with_context(|| path.display().to_string())?;
+    }
     Ok(())
 }
 
@@ -241,7 +282,8 @@ impl Folder {
         (name, path)
     }
 
-    /// Writes both eyes' pictures of a frame (sRGB RGBA8); tells their paths in the folder.
+    /// Writes both eyes' pictures of a frame (sRGB RGBA8); tells their paths in the folder and the
+    /// checksums of the files.
     ///
     /// # Errors
     /// They cannot be written.
@@ -251,28 +293,40 @@ impl Folder {
         frame: u32,
         pictures: &[Vec<u8>],
         size_px: [u32; 2],
-    ) -> anyhow::Result<[String; 2]> {
+    ) -> anyhow::Result<[[String; 2]; 2]> {
         let folder = self.root.join("images").join(row);
         fs::create_dir_all(&folder).with_context(|| cannot_write(&folder))?;
         let names = ["left", "right"].map(|eye| format!("images/{row}/{frame:04}-{eye}.png"));
-        for (name, picture) in names.iter().zip(pictures) {
+        let mut checksums = [String::new(), String::new()];
+        for ((name, picture), sum) in names.iter().zip(pictures).zip(&mut checksums) {
             let path = self.root.join(name);
             crate::picture::prepare_side_by_side(&path, std::slice::from_ref(picture), size_px)
                 .and_then(|file| Ok(file.persist()?))
                 .with_context(|| cannot_write(&path))?;
+            *sum = checksum(&read_regular(&path).with_context(|| path.display().to_string())?);
         }
-        Ok(names)
+        Ok([names, checksums])
     }
 
-    /// A finished row of this study, if it is there with all its files.
+    /// A finished row of this study, if it is there with all its files as they were written.
     #[must_use]
     pub fn finished(&self, name: &str, settings: &Settings) -> Option<RowRecord> {
         let row: RowRecord = self.kept(name, settings)?;
-        let images = row.frames.iter().flat_map(|frame| &frame.images);
-        let mut files = images.chain(&row.trace);
-        files
-            .all(|file| self.root.join(file).is_file())
-            .then_some(row)
+        self.is_whole(&row).then_some(row)
+    }
+
+    /// True where the row's pictures and its trace have the checksums that the row tells.
+    #[must_use]
+    pub fn is_whole(&self, row: &RowRecord) -> bool {
+        let picture = |(file, sum): (&String, &String)| {
+            read_regular(&self.root.join(file)).is_ok_and(|bytes| checksum(&bytes) == *sum)
+        };
+        let trace = match &row.trace {
+            Some(file) => trace_checksum(&self.root.join(file)).ok() == row.trace_checksum,
+            None => true,
+        };
+        let mut frames = row.frames.iter();
+        trace && frames.all(|f| f.images.iter().zip(&f.image_checksums).all(picture))
     }
 
     /// Keeps a finished row.
@@ -290,7 +344,7 @@ impl Folder {
         name: &str,
         question: &impl Serialize,
     ) -> Option<T> {
-        let bytes = fs::read(self.row_path(name)).ok()?;
+        let bytes = read_regular(&self.row_path(name)).ok()?;
         let kept: Kept<T> = serde_json::from_slice(&bytes).ok()?;
         (kept.key == self.row_key(question)).then_some(kept.row)
     }
@@ -353,6 +407,15 @@ impl Folder {
     }
 }
 
+/// Content checksum of a trace, read to its end; a damaged one has none.
+///
+/// # Errors
+/// It cannot be read, or is no whole trace.
+pub fn trace_checksum(path: &Path) -> anyhow::Result<String> {
+    check_regular(path).with_context(|| path.display().to_string())?;
+    Ok(format!("{:08x}", Trace::open(path)?.content_checksum()))
+}
+
 fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(value)? + "\n";
     AtomicFile::write_whole(path, text.as_bytes()).with_context(|| cannot_write(path))
@@ -405,7 +468,9 @@ mod tests {
             lossless: true,
             frames: Vec::new(),
             peak_memory_bytes: None,
+            texture_bytes: 0,
             trace: trace.map(str::to_owned),
+            trace_checksum: trace.map(|_| "0badcafe".to_owned()),
             trace_frames: Vec::new(),
         }
     }
@@ -429,8 +494,17 @@ mod tests {
         let (name, path) = folder.trace("conical");
         folder.keep(&row(Some(&name))).unwrap();
         assert_eq!(folder.finished("conical", &settings), None);
-        fs::write(path, "").unwrap();
-        assert!(folder.finished("conical", &settings).is_some());
+        let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../traces/atrium.textrace");
+        let whole = fs::read(golden).unwrap();
+        fs::write(&path, &whole).unwrap();
+        // Another trace than the row's.
+        assert_eq!(folder.finished("conical", &settings), None);
+        let mut kept = row(Some(&name));
+        kept.trace_checksum = Some(trace_checksum(&path).unwrap());
+        folder.keep(&kept).unwrap();
+        assert_eq!(folder.finished("conical", &settings), Some(kept));
+        fs::write(&path, &whole[..whole.len() - 100]).unwrap();
+        assert_eq!(folder.finished("conical", &settings), None);
         fs::write(folder.row_path("conical"), "{\"key\":").unwrap();
         assert_eq!(folder.finished("conical", &settings), None);
     }

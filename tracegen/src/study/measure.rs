@@ -1,14 +1,16 @@
 //! Measures one row: what its frames are, then how long they take beside the baseline's.
 
-use super::folder::{Folder, FrameRecord, RowRecord};
+use super::counted::texture_bytes;
+use super::folder::{Folder, FrameRecord, RowRecord, trace_checksum};
 use super::memory;
 use super::processor;
 use super::rows::Row;
 use super::world::{Shot, Tracer, World};
-use formats::textrace::{Encoding, TextraceWriter};
+use formats::textrace::{Encoding, Textrace, TextraceWriter};
 use raster::backend::Marks;
 use raster::lavapipe::Lavapipe;
 use raster::truth::Wrong;
+use record::CaptureCounts;
 use shell::Progress;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
@@ -122,11 +124,16 @@ impl Bench<'_> {
             parts: row.parts.iter().map(|part| part.name.to_owned()).collect(),
             lossless: row.lossless,
             frames,
+            texture_bytes: self.world.texture_bytes,
             peak_memory_bytes: can_forget.then(memory::peak_bytes).flatten(),
             trace_frames: trace
                 .iter()
                 .flat_map(|_| self.extent.trace_frames.clone())
+                .filter(|frame| !row.settings.reprojects(*frame))
                 .collect(),
+            trace_checksum: (trace.as_ref())
+                .map(|_| trace_checksum(&self.folder.trace(&row.name).1))
+                .transpose()?,
             trace,
         })
     }
@@ -139,8 +146,10 @@ impl Bench<'_> {
         planner: &impl Fn(u32) -> &'s Planner,
     ) -> anyhow::Result<(Vec<FrameRecord>, Option<String>)> {
         let extent = self.extent;
-        let (kept, left_out): (Vec<u32>, Vec<u32>) =
-            (extent.frames().into_iter()).partition(|frame| extent.trace_frames.contains(frame));
+        let (kept, left_out): (Vec<u32>, Vec<u32>) = (extent.frames().into_iter())
+            // What is made of the frame before samples nothing of the scene.
+            .filter(|frame| !row.settings.reprojects(*frame))
+            .partition(|frame| extent.trace_frames.contains(frame));
         let tables = [
             self.world.trace_tables(planner, &kept)?,
             self.world.trace_tables(planner, &left_out)?,
@@ -163,7 +172,9 @@ impl Bench<'_> {
         };
         let mut frames = Vec::new();
         let mut memory = Occlusion::default();
-        for (number, measured) in extent.rendered(row.settings.occlusion) {
+        for (number, measured) in
+            extent.rendered(row.settings.occlusion || row.settings.half_rate.is_some())
+        {
             let shot = self
                 .world
                 .shoot(self.backend, planner(number), number, &mut memory)?;
@@ -172,11 +183,13 @@ impl Bench<'_> {
             }
             let pictures = self.world.pictures(self.backend, &shot)?;
             let size_px = self.world.hmd.eye_size_px;
-            let images = self
+            let [images, image_checksums] = self
                 .folder
                 .write_images(&row.name, number, &pictures, size_px)?;
             let job = self.world.job(planner(number));
-            let counts = if kept.contains(&number) {
+            let counts = if shot.reprojection.is_some() {
+                self.captures.then(|| Ok(CaptureCounts::default()))
+            } else if kept.contains(&number) {
                 traced
                     .as_mut()
                     .map(|t| t.capture(&job, self.backend, &shot.frame))
@@ -188,6 +201,7 @@ impl Bench<'_> {
             .transpose()?;
             let wrong = self.wrong(number, &shot)?;
             let work = &shot.work;
+            let targets = shot.frame.plan.target_bytes(row.settings.multiview);
             frames.push(FrameRecord {
                 frame: number,
                 cull_tests: shot.frame.cull_tests + shot.frame.occlusion_tests,
@@ -202,12 +216,20 @@ impl Bench<'_> {
                 quads: counts.map(|counts| counts.quads),
                 fragments: counts.map(|counts| counts.fragments),
                 bytes_uploaded: work.bytes_uploaded,
+                counted: counts.map(|counts| shot.counted(counts.fragments)),
+                // Textures come on top once the trace is complete.
+                memory_bytes: counts.map(|counts| shot.counted(counts.fragments).bytes()),
+                energy_mj: counts.map(|counts| shot.counted(counts.fragments).energy_mj()),
+                target_color_bytes: targets.color,
+                target_depth_bytes: targets.depth,
+                bytes_reprojected: (shot.reprojection.as_ref()).map_or(0, |made| made.bytes),
                 frame_s: Vec::new(),
                 baseline_s: Vec::new(),
                 processor_s: Vec::new(),
                 baseline_processor_s: Vec::new(),
                 stages_s: BTreeMap::new(),
                 images,
+                image_checksums,
                 predicted: shot.frame.plan.predicted,
             });
             self.progress.advance(1);
@@ -215,17 +237,22 @@ impl Bench<'_> {
         let trace = match traced {
             Some(traced) => {
                 traced.into_writer().finish()?;
+                count_textures(&mut frames, &Textrace::open(&trace_path)?)?;
                 Some(trace_name)
             }
             None => None,
         };
+        if let Some(counted) = counted {
+            let trace = Textrace::from_bytes(counted.into_writer().into_bytes()?)?;
+            count_textures(&mut frames, &trace)?;
+        }
         Ok((frames, trace))
     }
 
     /// What the lists of a frame get wrong of what the lenses show, both eyes; none where the device
     /// cannot tell.
     fn wrong(&mut self, number: u32, shot: &Shot) -> anyhow::Result<Option<Wrong>> {
-        if !self.captures {
+        if !self.captures || shot.reprojection.is_some() {
             return Ok(None);
         }
         let planner = self.world.planner(&Settings::default())?;
@@ -240,6 +267,21 @@ impl Bench<'_> {
         }
         Ok(Some(wrong))
     }
+}
+
+/// Adds the texture bytes of a trace's frames to their counts.
+fn count_textures(frames: &mut [FrameRecord], trace: &Textrace) -> anyhow::Result<()> {
+    let bytes = texture_bytes(trace)?;
+    for (views, bytes) in trace.tables().meta.frames.iter().zip(bytes) {
+        let of_frame = frames.iter_mut().find(|frame| frame.frame == views.frame);
+        let Some(frame) = of_frame else { continue };
+        if let Some(counted) = &mut frame.counted {
+            counted.texture_bytes = bytes;
+            frame.memory_bytes = Some(counted.bytes());
+            frame.energy_mj = Some(counted.energy_mj());
+        }
+    }
+    Ok(())
 }
 
 /// Times frames with a row's planners and with the baseline's, which take turns, several times over: one entry
@@ -296,7 +338,8 @@ pub fn in_turns<'s>(
 ) -> anyhow::Result<()> {
     let frames = extent.frames();
     let remembers = (frames.iter())
-        .any(|frame| (0..contestants).any(|c| planner(c, *frame).settings().occlusion));
+        .flat_map(|frame| (0..contestants).map(|c| planner(c, *frame).settings()))
+        .any(|settings| settings.occlusion || settings.half_rate.is_some());
     for repeat in 0..extent.repeats as usize {
         let mut memories: Vec<Occlusion> = (0..contestants).map(|_| Occlusion::default()).collect();
         let mut measured = 0;

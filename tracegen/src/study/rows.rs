@@ -1,7 +1,10 @@
 //! The techniques by name, and the rows of a study: each technique alone, and combinations.
 
 use formats::view::Hmd;
-use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
+use techniques::distance::DistanceCull;
+use techniques::settings::{
+    FarField, Foveation, FoveationKind, Rates, Reprojection, Split, Variant,
+};
 use techniques::{Gaze, Settings};
 use visibility::Culling;
 
@@ -35,6 +38,10 @@ pub enum Setting {
     Mask,
     /// Whether both eyes are drawn at once.
     Multiview,
+    /// What is too far or too small to be drawn.
+    Distance,
+    /// How often a frame is rendered.
+    Rate,
     /// Where and how both eyes share a picture of what is far.
     FarField,
     /// How the periphery is coarsened.
@@ -79,6 +86,27 @@ impl Part {
             Self::new("multiview", "Multiview", true, Setting::Multiview, |s| {
                 s.multiview = true;
             }),
+            Self::new(
+                "distance-culling",
+                "Distance culling, 4 px",
+                false,
+                Setting::Distance,
+                |s| s.distance_cull = Some(DistanceCull::Pixels(4.0)),
+            ),
+            Self::new(
+                "half-rate",
+                "Half rate, turned with the head",
+                false,
+                Setting::Rate,
+                |s| s.half_rate = Some(Reprojection::Rotation),
+            ),
+            Self::new(
+                "half-rate-depth",
+                "Half rate, moved with the head by depth",
+                false,
+                Setting::Rate,
+                |s| s.half_rate = Some(Reprojection::Depth),
+            ),
             Self::far_field("far-field", "Mono far field, 1 px", |s| {
                 s.far_field = far_field(Split::Pixels(1.0), Variant::Plain);
             }),
@@ -91,9 +119,10 @@ impl Part {
             ),
             Self::far_field(
                 "far-field-depth-shift",
-                "Mono far field with depth shift, 1 px",
+                "Mono far field with depth shift, 0.5 px",
                 |s| {
-                    s.far_field = far_field(Split::Pixels(1.0), Variant::DepthShift);
+                    // The split of the plain one.
+                    s.far_field = far_field(Split::Pixels(0.5), Variant::DepthShift);
                 },
             ),
             Self::far_field(
@@ -130,6 +159,15 @@ impl Part {
                     s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default()));
                 },
             ),
+            Self::new(
+                "lens-matched",
+                "Lens-matched viewports",
+                false,
+                Setting::Foveation,
+                |s| {
+                    s.foveation = Some(foveation(FoveationKind::LensMatched, Rates::default()));
+                },
+            ),
         ]);
         parts
     }
@@ -138,6 +176,8 @@ impl Part {
     #[must_use]
     pub fn options(hmd: &Hmd) -> Vec<Self> {
         let mut parts = Self::all();
+        // A search looks at frames one by one, and half of these have no picture of their own.
+        parts.retain(|part| part.setting() != Setting::Rate);
         parts.extend([
             Self::far_field("far-field-0.5px", "Mono far field, 0.5 px", |s| {
                 s.far_field = far_field(Split::Pixels(0.5), Variant::Plain);
@@ -146,10 +186,10 @@ impl Part {
                 s.far_field = far_field(Split::Pixels(2.0), Variant::Plain);
             }),
             Self::far_field(
-                "far-field-depth-shift-2px",
-                "Shifted far field, 2 px",
+                "far-field-depth-shift-1px",
+                "Mono far field with depth shift, 1 px",
                 |s| {
-                    s.far_field = far_field(Split::Pixels(2.0), Variant::DepthShift);
+                    s.far_field = far_field(Split::Pixels(1.0), Variant::DepthShift);
                 },
             ),
             Self::new(
@@ -342,12 +382,19 @@ impl Row {
     /// Never: the tests parse every row.
     #[must_use]
     pub fn all() -> Vec<Self> {
-        let alone = Part::all().into_iter().map(|part| part.name);
-        let combined = COMBINATIONS.iter().map(|(_, name)| (*name).to_owned());
-        alone
-            .chain(combined)
-            .map(|name| Self::parse(&name).expect("rows of the table are techniques"))
-            .collect()
+        let alone = Part::all().into_iter();
+        let alone = alone.map(|part| Self::parse(&part.name).expect("a technique is a row"));
+        alone.chain(Self::combinations()).collect()
+    }
+
+    /// The combinations that a study measures beside the techniques alone.
+    ///
+    /// # Panics
+    /// Never: the tests parse every row.
+    #[must_use]
+    pub fn combinations() -> Vec<Self> {
+        let parse = |name: &str| Self::parse(name).expect("rows of the table are techniques");
+        COMBINATIONS.iter().map(|(_, name)| parse(name)).collect()
     }
 
     /// The row of some parts, the baseline where there are none.

@@ -1,5 +1,7 @@
 //! What every row of a study shares: the scene, the path through it, and how a frame is taken.
 
+use super::counted::Counted;
+use super::timewarp;
 use formats::textrace::{Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use raster::backend::{CaptureBackend, Fragments, Work};
@@ -12,6 +14,7 @@ use record::CaptureCounts;
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
+use techniques::settings::Reprojection;
 use techniques::{Planner, Settings, SettingsError, Skips};
 use visibility::Occlusion;
 
@@ -40,6 +43,32 @@ pub struct World {
     pub views: Vec<FrameViews>,
     /// Tables of the traces, without frames and passes.
     pub tables: Tables,
+    /// Texels of its textures.
+    pub texture_bytes: u64,
+    /// At half rate the last frame that was rendered.
+    pub shown: Option<Shown>,
+}
+
+/// What a frame leaves to the next one at half rate.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// Its number.
+    pub number: u32,
+    /// Its pictures.
+    pub pictures: Pictures,
+    /// Their depth, where it is asked for.
+    pub depths: Option<Vec<Vec<f32>>>,
+}
+
+/// A frame that was made of the one before.
+#[derive(Debug)]
+pub struct Reprojected {
+    /// Its pictures.
+    pub pictures: Pictures,
+    /// Bytes of pictures and depth that were read and written for it.
+    pub bytes: u64,
+    /// Time that it took.
+    pub took: Duration,
 }
 
 /// A frame that was rendered without capture: what it took.
@@ -53,6 +82,36 @@ pub struct Shot {
     pub total: Duration,
     /// What the backend did for it.
     pub work: Work,
+    /// What it did to find what is hidden.
+    pub hiding: Work,
+    /// Depth passes found what is hidden.
+    pub occludes: bool,
+    /// One draw made both eyes' pictures.
+    pub at_once: bool,
+    /// What was done in place of rendering it.
+    pub reprojection: Option<Reprojected>,
+}
+
+impl Shot {
+    /// What it takes by counts, but for its textures, which only a capture tells.
+    #[must_use]
+    pub fn counted(&self, fragments: u64) -> Counted {
+        if let Some(reprojection) = &self.reprojection {
+            return Counted {
+                picture_bytes: reprojection.bytes,
+                ..Counted::default()
+            };
+        }
+        let mut work = self.work;
+        work.vertices += self.hiding.vertices;
+        work.bytes_uploaded += self.hiding.bytes_uploaded;
+        let mut counted = Counted::of(&self.frame.plan, self.occludes, &work, fragments);
+        if self.at_once {
+            // Read once, transformed for either eye.
+            counted.vertices += self.work.vertices;
+        }
+        counted
+    }
 }
 
 impl World {
@@ -106,6 +165,11 @@ impl World {
         number: u32,
         memory: &mut Occlusion,
     ) -> Result<Shot, RasterError> {
+        if planner.settings().reprojects(number)
+            && let Some(shown) = self.shown.take_if(|shown| shown.number + 1 == number)
+        {
+            return self.reproject(planner, number, &shown);
+        }
         let before = backend.work();
         let start = Instant::now();
         self.draws.pose(&self.scene, number as f32 / self.fps);
@@ -116,12 +180,14 @@ impl World {
         let planned = start.elapsed();
         // Of another technique's frame, the last one's targets and masks would not fit.
         backend.prepare(&frame)?;
-        let start = Instant::now();
-        if planner.settings().occlusion {
+        let (start, before) = (Instant::now(), backend.work());
+        let occludes = planner.settings().occlusion;
+        if occludes {
             job.occlude(backend, &mut frame, memory)?;
         }
-        let hidden = start.elapsed();
+        let (hidden, hiding) = (start.elapsed(), backend.work() - before);
         job.light(backend, &frame)?;
+        let at_once = job.draws_both_at_once(&frame);
         let before = backend.work();
         let start = Instant::now();
         job.render_layers(backend, &frame)?;
@@ -130,11 +196,51 @@ impl World {
         let done = start.elapsed();
         let mut work = backend.work() - before;
         work.bytes_uploaded += posed.bytes_uploaded;
-        Ok(Shot {
+        let shot = Shot {
             frame,
             compose: done - rendered,
             total: planned + hidden + done,
             work,
+            hiding,
+            occludes,
+            at_once,
+            reprojection: None,
+        };
+        if let Some(follows) = planner.settings().half_rate {
+            // What a runtime would still hold; reading it back is no part of the frame.
+            let job = self.job(planner);
+            let depths = (follows == Reprojection::Depth).then(|| job.depths(backend, &shot.frame));
+            let depths = depths.transpose()?;
+            self.shown = Some(Shown {
+                number,
+                pictures: self.pictures(backend, &shot)?,
+                depths,
+            });
+        }
+        Ok(shot)
+    }
+
+    /// Makes a frame of the one before, whose pictures are at hand.
+    fn reproject(
+        &self,
+        planner: &Planner,
+        number: u32,
+        shown: &Shown,
+    ) -> Result<Shot, RasterError> {
+        let [before, now] = [shown.number, number].map(|number| &self.views[number as usize]);
+        let mut frame = self.job(planner).frame(now)?;
+        // Nothing is drawn, so nothing is looked for.
+        (frame.cull_tests, frame.cull_time) = (0, Duration::ZERO);
+        let reprojection = timewarp::reproject(shown, before, now, self.hmd.eye_size_px);
+        Ok(Shot {
+            frame,
+            compose: reprojection.took,
+            total: reprojection.took,
+            work: Work::default(),
+            reprojection: Some(reprojection),
+            hiding: Work::default(),
+            occludes: false,
+            at_once: false,
         })
     }
 
@@ -147,6 +253,9 @@ impl World {
         backend: &mut dyn CaptureBackend,
         shot: &Shot,
     ) -> Result<Pictures, RasterError> {
+        if let Some(reprojection) = &shot.reprojection {
+            return Ok(reprojection.pictures.clone());
+        }
         (0..shot.frame.plan.pictures.len())
             .map(|number| backend.picture(&shot.frame, number))
             .collect()

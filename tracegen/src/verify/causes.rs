@@ -109,6 +109,8 @@ pub struct Subject<'a> {
     pub pixel: [u32; 2],
     /// Texels of the group.
     pub extent: DVec2,
+    /// Pixels of the screen, at whose border drivers clip.
+    pub size_px: [u32; 2],
     /// How the driver makes levels of detail, and which derivatives it takes.
     pub formula: LodFormula,
 }
@@ -139,6 +141,10 @@ impl Subject<'_> {
             }
         }
         if texels(error) <= SMALL + single {
+            return UvCause::SinglePrecision;
+        }
+        let [cut] = (self.coordinates).single_precision_cut(center, self.size_px, [center]);
+        if cut.is_finite() && texels(error) <= SMALL + texels(cut) {
             return UvCause::SinglePrecision;
         }
         let differences = [record.dx, record.dy, record.cross];

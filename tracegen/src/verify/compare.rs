@@ -159,6 +159,7 @@ impl Comparison<'_> {
                 coordinates: &coordinates,
                 pixel: fragment.pixel,
                 extent: extent(group),
+                size_px: geometry.size_px,
                 formula: self.formula,
             };
             let captured = captured_uv(record, index, group);
@@ -279,8 +280,14 @@ fn add_to_means(
     result: &mut Agreement,
 ) {
     let (coordinates, extent) = (subject.coordinates, subject.extent);
-    let bound =
-        coordinates.single_precision(center(subject.pixel)) * extent + rounding_texels(lane);
+    let center = center(subject.pixel);
+    let beyond = |error: DVec2, bound: DVec2| error.abs().cmpgt(bound).any();
+    let mut bound = coordinates.single_precision(center) * extent + rounding_texels(lane);
+    // The bound of clipped triangles costs much more and is wider: it is taken where an error needs it.
+    if beyond(error * extent, bound) {
+        let [cut] = coordinates.single_precision_cut(center, subject.size_px, [center]);
+        bound = cut * extent + rounding_texels(lane);
+    }
     let means = result.means.of(draw, group);
     for axis in 0..2 {
         means[axis].add(error[axis] * extent[axis], bound[axis]);
@@ -288,34 +295,32 @@ fn add_to_means(
     if lane != record.mask.trailing_zeros() {
         return;
     }
-    let quad = quad_center(subject.pixel);
-    let corners = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|step| {
-        let at = quad + step;
-        (
-            coordinates.at(at) * extent,
-            coordinates.single_precision(at) * extent,
-        )
-    });
-    let [top_left, top_right, bottom_left, bottom_right] = corners;
-    let sum = |of: &[(DVec2, DVec2)]| of.iter().map(|(_, bound)| *bound).sum::<DVec2>();
+    let points =
+        [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|step| quad_center(subject.pixel) + step);
+    let [top_left, top_right, bottom_left, bottom_right] =
+        points.map(|p| coordinates.at(p) * extent);
     let columns = [
-        (
-            record.dx,
-            top_right.0 - top_left.0,
-            sum(&[top_left, top_right]),
-        ),
-        (
-            record.dy,
-            bottom_left.0 - top_left.0,
-            sum(&[top_left, bottom_left]),
-        ),
+        (record.dx, top_right - top_left),
+        (record.dy, bottom_left - top_left),
         (
             record.cross,
-            bottom_right.0 - bottom_left.0 - (top_right.0 - top_left.0),
-            sum(&corners),
+            bottom_right - bottom_left - (top_right - top_left),
         ),
     ];
-    for (column, (found, expected, bound)) in columns.into_iter().enumerate() {
+    // What each column is a difference of.
+    let bounds_of = |bounds: [DVec2; 4]| {
+        let [top_left, top_right, bottom_left, bottom_right] = bounds.map(|bound| bound * extent);
+        let all = top_left + top_right + bottom_left + bottom_right;
+        [top_left + top_right, top_left + bottom_left, all].map(|b| b + rounding_texels(0))
+    };
+    let found = |found: [i32; 2]| DVec2::from(found.map(f64::from)) / f64::from(SUBTEXELS);
+    let mut bounds = bounds_of(points.map(|p| coordinates.single_precision(p)));
+    let needs_more = (columns.iter().zip(bounds))
+        .any(|((column, expected), bound)| beyond(found(*column) - *expected, bound));
+    if needs_more {
+        bounds = bounds_of(coordinates.single_precision_cut(center, subject.size_px, points));
+    }
+    for (column, ((found, expected), bound)) in columns.into_iter().zip(bounds).enumerate() {
         for axis in 0..2 {
             // Beyond the fixed point a record's differences end, or lose pairs of repeats.
             let largest = f64::from(LARGEST_DIFFERENCE) / f64::from(SUBTEXELS);
@@ -323,7 +328,7 @@ fn add_to_means(
                 continue;
             }
             let error = f64::from(found[axis]) / f64::from(SUBTEXELS) - expected[axis];
-            let bound = bound[axis] + rounding_texels(0);
+            let bound = bound[axis];
             means[2 + 2 * column + axis].add(error, bound);
             let explained = error.abs() <= SMALL + bound || !error.is_finite();
             result.differences_unexplained += u64::from(!explained);

@@ -111,6 +111,52 @@ fn clip_to_depth_range(triangle: &[ClipVertex; 3]) -> Vec<ClipVertex> {
     polygon
 }
 
+/// Clips a triangle on the screen to the screen's borders; corners in the same order.
+fn clip_to_screen(triangle: &[Corner; 3], size_px: [u32; 2]) -> Vec<Corner> {
+    let size = size_px.map(f64::from);
+    let inside: [&dyn Fn(DVec2) -> f64; 4] =
+        [&|at| at.x, &|at| size[0] - at.x, &|at| at.y, &|at| {
+            size[1] - at.y
+        }];
+    let mut polygon = triangle.to_vec();
+    for distance in inside {
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for (i, current) in polygon.iter().enumerate() {
+            let previous = &polygon[(i + polygon.len() - 1) % polygon.len()];
+            let (dp, dc) = (distance(previous.at), distance(current.at));
+            if (dp < 0.0) != (dc < 0.0) {
+                kept.push(previous.toward(current, dp / (dp - dc)));
+            }
+            if dc >= 0.0 {
+                kept.push(*current);
+            }
+        }
+        polygon = kept;
+    }
+    polygon
+}
+
+impl Corner {
+    /// The point at a share of the way to another corner on the screen.
+    fn toward(&self, other: &Self, share: f64) -> Self {
+        let inverse_w = self.inverse_w + share * (other.inverse_w - self.inverse_w);
+        // The same errors in clip space move a point more where w is smaller.
+        let moves = |of: &Self| of.moves_px * (inverse_w / of.inverse_w).max(1.0);
+        let at = self.at.lerp(other.at, share);
+        let over_w = (self.weights * self.inverse_w).lerp(other.weights * other.inverse_w, share);
+        Self {
+            at,
+            moves_px: moves(self).max(moves(other)),
+            snapped: at.to_array().map(|v| (v * SNAP).round_ties_even() as i64),
+            depth: self.depth + share * (other.depth - self.depth),
+            inverse_w,
+            inverse_w_error: self.inverse_w_error.max(other.inverse_w_error)
+                * (inverse_w / self.inverse_w.min(other.inverse_w)),
+            weights: over_w / inverse_w,
+        }
+    }
+}
+
 fn project(vertex: &ClipVertex, size_px: [u32; 2]) -> Corner {
     let inverse_w = 1.0 / vertex.clip.w;
     let ndc = vertex.clip * inverse_w;
@@ -234,6 +280,33 @@ impl Piece {
         [cross(b, c), cross(c, a), cross(a, b)].map(|w| w / total)
     }
 
+    /// The triangles that a driver may make of it where it crosses the screen's border: drivers clip there, and
+    /// each fans what is left in its own order. Those that may hold a point, to 1/128 pixel.
+    #[must_use]
+    pub fn cut_at_border(&self, size_px: [u32; 2], p: DVec2) -> Vec<Self> {
+        let polygon = clip_to_screen(&self.corners, size_px);
+        let mut found = Vec::new();
+        for c in 2..polygon.len() {
+            for b in 1..c {
+                for a in 0..b {
+                    let corners = [polygon[a], polygon[b], polygon[c]];
+                    let triangle = Self { corners, ..*self };
+                    if triangle.may_hold(p) {
+                        found.push(triangle);
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// A point is inside, or within 1/128 pixel of an edge.
+    fn may_hold(&self, p: DVec2) -> bool {
+        let [a, b, c] = self.corners.map(|corner| corner.at);
+        let inside = |a: DVec2, b: DVec2| (b - a).perp_dot(p - a) >= -(b - a).length() / 128.0;
+        (b - a).perp_dot(c - a) > 0.0 && inside(a, b) && inside(b, c) && inside(c, a)
+    }
+
     /// Depth at a point of the screen, 0 to 1.
     #[must_use]
     pub fn depth(&self, p: DVec2) -> f64 {
@@ -321,6 +394,23 @@ mod tests {
             (weights - DVec3::new(0.75, 0.25, 0.0)).length() < 1e-12,
             "{weights}"
         );
+    }
+
+    #[test]
+    fn a_triangle_over_the_border_is_cut_into_triangles_that_keep_its_coordinates() {
+        let t = piece([[3.0, 6.0], [5.0, -2.0], [7.0, 6.0]], [1.0, 3.0, 2.0], 8);
+        let p = DVec2::new(5.0, 2.0);
+        let whole = t.weights_over_w(p);
+        let parts = t.cut_at_border([8; 2], p);
+        assert!(parts.len() >= 2, "{parts:?}");
+        for part in &parts {
+            for corner in part.corners {
+                assert!(corner.at.min_element() >= -1e-9 && corner.at.max_element() <= 8.0 + 1e-9);
+            }
+            assert!((part.weights_over_w(p) - whole).length() < 1e-12);
+        }
+        let outside = DVec2::new(1.0, 7.0);
+        assert_eq!(t.cut_at_border([8; 2], outside).len(), 0);
     }
 
     #[test]

@@ -108,6 +108,25 @@ impl Plane {
 }
 
 impl Coordinates<'_> {
+    /// The largest of the bounds of [`Self::single_precision`] at points around a fragment, over the triangles that
+    /// clipping at the screen's border may have made there: thin ones lose digits when their planes are set up.
+    #[must_use]
+    pub fn single_precision_cut<const N: usize>(
+        &self,
+        fragment: DVec2,
+        size_px: [u32; 2],
+        points: [DVec2; N],
+    ) -> [DVec2; N] {
+        let mut bounds = points.map(|p| self.single_precision(p));
+        for triangle in self.piece().cut_at_border(size_px, fragment) {
+            let cut = self.on(&triangle);
+            for (bound, p) in bounds.iter_mut().zip(points) {
+                *bound = bound.max(cut.single_precision(p));
+            }
+        }
+        bounds
+    }
+
     /// How far coordinates at a point of the screen may be off in single precision, in repeats: moved vertices,
     /// interpolation, the texture's transform, and the record's sums. Infinite where nothing can be said.
     #[must_use]

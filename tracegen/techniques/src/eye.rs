@@ -1,16 +1,20 @@
 //! The pixels of an eye's picture as directions.
 
-use crate::gaze;
+use crate::hidden_mesh::HiddenMesh;
+use crate::{Mask, gaze};
 use formats::view::{FovTangents, Hmd, Lens, TILE_SIZE_PX};
 use glam::{DVec2, DVec3};
+use std::sync::Arc;
 
 /// One eye's picture: its pixels as tangents, what the lens shows of it, and where the user looks.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct EyePicture {
     pub size_px: [u32; 2],
     fov: FovTangents,
     /// What the lens shows, where that matters.
     pub lens: Option<Lens>,
+    /// Pixels that the headset's own mesh leaves, in place of the lens's circle.
+    left_by_mesh: Option<Arc<Mask>>,
     /// Direction of the gaze, the eye looking along -z.
     gaze: DVec3,
 }
@@ -22,7 +26,16 @@ impl EyePicture {
             size_px: hmd.eye_size_px,
             fov: hmd.fov[eye],
             lens,
+            left_by_mesh: None,
             gaze: gaze::direction(hmd, eye, gaze_deg).as_dvec3(),
+        }
+    }
+
+    /// The same picture, of which a mesh in place of the lens's circle hides what the user cannot see.
+    pub fn hidden_by(self, mesh: &HiddenMesh, eye: usize) -> Self {
+        Self {
+            left_by_mesh: Some(Arc::new(mesh.shown(eye, self.size_px))),
+            ..self
         }
     }
 
@@ -50,6 +63,10 @@ impl EyePicture {
 
     /// Whether the lens shows a point of a rectangle of pixels, of which `high_px` is the end.
     pub fn shows(&self, low_px: [u32; 2], high_px: [u32; 2]) -> bool {
+        if let Some(left) = &self.left_by_mesh {
+            let columns = || low_px[0]..high_px[0];
+            return (low_px[1]..high_px[1]).any(|y| columns().any(|x| left.get(x, y)));
+        }
         let Some(lens) = self.lens else { return true };
         let [low, high] = self.rectangle(low_px, high_px);
         let center = DVec2::new(lens.center[0].into(), lens.center[1].into());
@@ -76,6 +93,13 @@ impl EyePicture {
         (corners.into_iter().chain(ahead))
             .map(angle)
             .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Where straight ahead is in the picture, in pixels from the top left.
+    pub fn ahead_px(&self) -> [f64; 2] {
+        let [low, high] = self.rectangle([0, 0], self.size_px);
+        let part = DVec2::new(-low.x, high.y) / (high - low);
+        [0, 1].map(|axis| part[axis] * f64::from(self.size_px[axis]))
     }
 
     /// Where the gaze meets the picture, in pixels from the top left; straight ahead where it does

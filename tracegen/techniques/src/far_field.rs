@@ -2,15 +2,16 @@
 //!
 //! A camera between the eyes (or, alternating, in one of them) sees what lies beyond the split. An eye's
 //! picture takes from it what lies in the same direction, or (shifted) what would lie in the same place of a
-//! plane at the split. A point at depth z of an eye is then off by
+//! plane at twice the split. A point at depth z of an eye is then off by
 //!
 //! ```text
-//! same direction:  K / (z - c_z)                          at most K / (D - c_z), at the split D
-//! depth shift:     K / (D - c_z) * (z - D) / z            at most K / (D - c_z), at infinity
+//! same direction:  K / (z - c_z)                            at most K / (D - c_z), at the split D
+//! depth shift:     K / (P - c_z) * |z - P| / z, P = 2 D     at most K / (2 D - c_z), at the split and at infinity
 //! ```
 //!
 //! where c is the camera in the eye's coordinates (x right, y up, z ahead) and K, in pixels times metres, is
 //! the largest |c_xy - t c_z| over the tangents t of the eye's view. K is convex in t, so the corners tell.
+//! No other plane has as small a largest error. Beyond 4 D the same direction errs less than the shift.
 //! Parallel eyes of W pixels and h degrees, camera in the middle: K = W IPD / (4 tan(h/2)), c_z = 0.
 
 use crate::least_work::{Costs, Object, Pixels, least_work};
@@ -186,7 +187,7 @@ impl Stereo {
     #[must_use]
     pub fn worst_shift_px(&self, split_m: f32) -> f32 {
         let shift = |eye: &Eye| {
-            let room = f64::from(split_m) - self.camera_in(eye).z;
+            let room = self.plane_m(f64::from(split_m)) - self.camera_in(eye).z;
             if room > 0.0 {
                 self.shift_px_m(eye) / room
             } else {
@@ -199,10 +200,16 @@ impl Stereo {
     /// The nearest split beyond which nothing is off by more than `shift_px`.
     #[must_use]
     pub fn split_m(&self, shift_px: f32) -> f32 {
-        let split = |eye: &Eye| self.camera_in(eye).z + self.shift_px_m(eye) / f64::from(shift_px);
-        let exact = split(&self.eyes[0]).max(split(&self.eyes[1]));
+        let plane = |eye: &Eye| self.camera_in(eye).z + self.shift_px_m(eye) / f64::from(shift_px);
+        let exact = plane(&self.eyes[0]).max(plane(&self.eyes[1])) / self.plane_m(1.0);
         // Rounded up, so that the promise holds.
         (exact as f32).next_up()
+    }
+
+    /// Depth at which the error for `split_m` is as large as any beyond the split: the split, or the plane of the
+    /// depth shift, whose error at infinity is what one in the same direction has there.
+    fn plane_m(&self, split_m: f64) -> f64 {
+        if self.shifted { 2.0 * split_m } else { split_m }
     }
 
     /// Nearest and farthest distance ahead that the eyes see.
@@ -276,8 +283,8 @@ impl Stereo {
             let camera_from_eye = camera_from_world * eye.world_from_eye;
             let mut plane = DMat3::from_mat4(camera_from_eye);
             if self.shifted {
-                // A point of the plane at the split is `split * direction`, and a direction's z is -1.
-                plane.z_axis -= camera_from_eye.w_axis.truncate() / split;
+                // A point of the plane is `plane_m * direction`, and a direction's z is -1.
+                plane.z_axis -= camera_from_eye.w_axis.truncate() / self.plane_m(split);
             }
             far_px_from_direction * plane * eye.direction_from_px(self.size_px)
         });

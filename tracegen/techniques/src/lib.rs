@@ -2,11 +2,13 @@
 //!
 //! Knows displays and angles, and neither drivers nor scenes: a driver renders the [`layer::Layer`]s.
 
+pub mod distance;
 mod eye;
 pub mod far_field;
 mod foveation;
 pub mod gaze;
 mod hidden_area;
+pub mod hidden_mesh;
 pub mod layer;
 pub mod least_work;
 pub mod mask;
@@ -16,6 +18,7 @@ pub mod planner;
 pub mod settings;
 pub mod skips;
 pub mod start;
+pub mod timewarp;
 
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};

@@ -6,7 +6,7 @@ use crate::layer::{Layer, Stage};
 use crate::plan::{Filter, Part};
 use crate::start::Start;
 use formats::view::{Eye, EyeView, TILE_SIZE_PX};
-use glam::{DMat4, DVec4, Mat4};
+use glam::{DMat3, DMat4, DVec3, DVec4, Mat4};
 use std::sync::Arc;
 
 /// A layer of an eye's picture.
@@ -22,6 +22,8 @@ pub(crate) struct Patch {
     /// Tiles of the picture that it fills.
     pub tiles: Option<Arc<Mask>>,
     pub filter: Filter,
+    /// Pixels of the picture to those of the layer where that is no matter of origin and coarseness.
+    pub layer_from_px: Option<DMat3>,
 }
 
 /// What an eye's picture is made of.
@@ -50,6 +52,7 @@ impl Patch {
             mask,
             tiles: None,
             filter: Filter::Copy,
+            layer_from_px: None,
         }
     }
 
@@ -97,10 +100,14 @@ impl Patch {
     /// The layer for an eye's pose.
     pub fn layer(&self, eye: Eye, view: &EyeView, picture_px: [u32; 2]) -> Layer {
         let covers = [0, 1].map(|axis| self.size_px[axis] * self.coarseness[axis]);
+        let view = match &self.layer_from_px {
+            Some(map) => mapped(view, map, picture_px, self.size_px),
+            None => narrowed(view, self.origin_px, covers, picture_px),
+        };
         Layer {
             eye: Some(eye),
             number: self.number,
-            view: narrowed(view, self.origin_px, covers, picture_px),
+            view,
             size_px: self.size_px,
             mask: self.mask.clone(),
             draws: Stage::All,
@@ -116,6 +123,7 @@ impl Patch {
             coarseness: self.coarseness,
             tiles: self.tiles.clone(),
             filter: self.filter,
+            layer_from_px: self.layer_from_px,
         }
     }
 }
@@ -142,6 +150,38 @@ fn narrowed(view: &EyeView, origin: [u32; 2], covers: [u32; 2], picture_px: [u32
     let eye_to_clip = Mat4::from_cols_array_2d(&view.eye_to_clip).as_dmat4();
     EyeView {
         eye_to_clip: (narrow * eye_to_clip).as_mat4().to_cols_array_2d(),
+        ..*view
+    }
+}
+
+/// The view of a layer that a projective map of the picture's pixels leads to.
+fn mapped(
+    view: &EyeView,
+    layer_from_px: &DMat3,
+    picture_px: [u32; 2],
+    layer_px: [u32; 2],
+) -> EyeView {
+    // Homogeneous clip space (x, y, w) to pixels; rows count downwards.
+    let px_from_clip = |size_px: [u32; 2]| {
+        let [x, y] = size_px.map(|size| f64::from(size) / 2.0);
+        DMat3::from_cols(
+            DVec3::new(x, 0.0, 0.0),
+            DVec3::new(0.0, -y, 0.0),
+            DVec3::new(x, y, 1.0),
+        )
+    };
+    let map = px_from_clip(layer_px).inverse() * *layer_from_px * px_from_clip(picture_px);
+    // Depth passes as it is: points of one direction keep their order, as w grows alike for all of them.
+    let column = |c: DVec3| DVec4::new(c.x, c.y, 0.0, c.z);
+    let map = DMat4::from_cols(
+        column(map.x_axis),
+        column(map.y_axis),
+        DVec4::Z,
+        column(map.z_axis),
+    );
+    let eye_to_clip = Mat4::from_cols_array_2d(&view.eye_to_clip).as_dmat4();
+    EyeView {
+        eye_to_clip: (map * eye_to_clip).as_mat4().to_cols_array_2d(),
         ..*view
     }
 }

@@ -2,6 +2,8 @@
 
 use crate::Mask;
 use crate::layer::{Layer, Predicted};
+use crate::start::Start;
+use glam::DMat3;
 use std::sync::Arc;
 
 /// How one frame is rendered.
@@ -43,6 +45,8 @@ pub struct Part {
     pub tiles: Option<Arc<Mask>>,
     /// How its pixels come of the layer's.
     pub filter: Filter,
+    /// Pixels of the picture to those of the layer, homogeneous, in place of origin and coarseness.
+    pub layer_from_px: Option<DMat3>,
 }
 
 /// How a picture's pixels come of a layer's.
@@ -55,9 +59,54 @@ pub enum Filter {
     /// The layer's mask leaves out 2x2 quads: their pixels are the mean of the linear interpolations
     /// along row and column between the nearest pixels that are there, in linear light. The others are copied.
     FillQuads,
+    /// Linear between the four nearest pixels of a layer that the picture is mapped to by [`Part::layer_from_px`], in
+    /// linear light.
+    Projective,
 }
 
+/// Bytes of what a frame is rendered into.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TargetBytes {
+    /// Colour of the layers, and of the pictures composed of them.
+    pub color: u64,
+    /// Depth buffers that have to be there at a time.
+    pub depth: u64,
+}
+
+/// Bytes of a pixel's colour (sRGB RGBA8), and of its depth (32 bits).
+const PIXEL_BYTES: u64 = 4;
+
 impl FramePlan {
+    /// Bytes that the frame is rendered into. Passes one after the other share a depth buffer as large as the
+    /// largest, but for layers whose depth a later one looks at; views that are drawn `at_once` have one each.
+    #[must_use]
+    pub fn target_bytes(&self, at_once: bool) -> TargetBytes {
+        let bytes = |[width, height]: [u32; 2]| PIXEL_BYTES * u64::from(width) * u64::from(height);
+        let looked_at = |number: usize| {
+            self.layers.iter().any(|layer| match &layer.start {
+                Start::Behind(openings) => openings.iter().any(|opening| opening.nearer == number),
+                Start::Composed(made) => made.nearer == number || made.farther == number,
+                Start::Sky | Start::Nearer { .. } => false,
+            })
+        };
+        let composed = self.pictures.iter().map(|picture| match picture {
+            Picture::Composed { size_px, .. } => bytes(*size_px),
+            Picture::Layer(_) => 0,
+        });
+        let layers = || self.layers.iter().enumerate();
+        let (kept, shared): (Vec<_>, Vec<_>) =
+            layers().partition(|(number, _)| at_once || looked_at(*number));
+        let sum = |list: &[(usize, &Layer)]| -> u64 {
+            list.iter().map(|(_, layer)| bytes(layer.size_px)).sum()
+        };
+        let largest = shared.iter().map(|(_, layer)| bytes(layer.size_px)).max();
+        TargetBytes {
+            color: layers().map(|(_, layer)| bytes(layer.size_px)).sum::<u64>()
+                + composed.sum::<u64>(),
+            depth: sum(&kept) + largest.unwrap_or(0),
+        }
+    }
+
     /// Whether a layer is the picture of an eye as it is.
     #[must_use]
     pub fn is_picture(&self, layer: usize) -> bool {

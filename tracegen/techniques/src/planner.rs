@@ -2,7 +2,7 @@
 
 use crate::eye::EyePicture;
 use crate::far_field::{self, FarFieldError, FarView, Stereo};
-use crate::foveation::{multi_resolution, radial_density, rings};
+use crate::foveation::{lens_matched, multi_resolution, radial_density, rings};
 use crate::layer::Predicted;
 use crate::least_work::Object;
 use crate::patch::EyePatches;
@@ -53,7 +53,11 @@ impl Planner {
             return Err(SettingsError {
                 what,
                 expected: "both eyes".into(),
-                found: format!("{eyes:?}"),
+                found: eyes
+                    .iter()
+                    .map(Eye::to_string)
+                    .collect::<Vec<_>>()
+                    .join(", "),
             });
         }
         Ok(Self {
@@ -120,6 +124,9 @@ impl Planner {
         views: &FrameViews,
         objects: impl FnOnce() -> Vec<Object>,
     ) -> Result<FramePlan, FarFieldError> {
+        if self.settings.reprojects(views.frame) {
+            return Ok(FramePlan::default());
+        }
         if let Some(far) = self.far_view(views, objects)? {
             let masks = self.patches([0.0; 2]);
             let mask = |eye: usize| masks[eye].patches.first().and_then(|p| p.mask.clone());
@@ -160,7 +167,7 @@ impl Planner {
         let all = all * eyes.len() as f64;
         let rate_px: f64 = eyes.iter().map(|eye| eye.rate_px).sum();
         let drawn_px: u64 = layers.iter().map(|layer| layer.drawn_px()).sum();
-        let shares = self.settings.foveation.is_some() || self.settings.hidden_area_mask;
+        let shares = self.settings.foveation.is_some() || self.settings.masks_hidden_area();
         Ok(FramePlan {
             predicted: Predicted {
                 shaded_share: shares.then_some((drawn_px as f64 / all) as f32),
@@ -180,13 +187,18 @@ impl Planner {
             return Arc::clone(patches);
         }
         let of_eye = |eye: &Eye| {
-            let lens = (self.settings.hidden_area_mask).then_some(self.lenses[*eye as usize]);
-            let picture = EyePicture::new(&self.hmd, *eye as usize, lens, gaze_deg);
+            let number = *eye as usize;
+            let lens = (self.settings.masks_hidden_area()).then_some(self.lenses[number]);
+            let mut picture = EyePicture::new(&self.hmd, number, lens, gaze_deg);
+            if let Some(mesh) = &self.settings.hidden_area_mesh {
+                picture = picture.hidden_by(mesh, number);
+            }
             let mut made = match &self.settings.foveation {
                 None => hidden_area::patches(&picture),
                 Some(foveation) => match foveation.kind {
                     FoveationKind::Rings => rings::patches(&picture, &foveation.rates),
                     FoveationKind::MultiResolution => multi_resolution::patches(&picture),
+                    FoveationKind::LensMatched => lens_matched::patches(&picture),
                     FoveationKind::RadialDensity => {
                         radial_density::patches(&picture, &foveation.rates)
                     }

@@ -1,6 +1,8 @@
 //! What a capture leaves out or does more coarsely.
 
+use crate::distance::DistanceCull;
 use crate::gaze::{self, Gaze};
+use crate::hidden_mesh::HiddenMesh;
 use formats::view::Hmd;
 use serde::{Deserialize, Serialize};
 use visibility::Culling;
@@ -17,6 +19,15 @@ pub struct Settings {
     pub multiview: bool,
     /// Nothing outside the lens is drawn.
     pub hidden_area_mask: bool,
+    /// What the headset's own mesh hides is not drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hidden_area_mesh: Option<HiddenMesh>,
+    /// What is too far or too small is not drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_cull: Option<DistanceCull>,
+    /// Every other frame is made of the last one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub half_rate: Option<Reprojection>,
     /// Far geometry once for both eyes.
     pub far_field: Option<FarField>,
     /// The periphery more coarsely.
@@ -62,6 +73,16 @@ pub enum Variant {
     AlternateEye,
 }
 
+/// What a frame that is made of the last one follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reprojection {
+    /// How the head has turned.
+    Rotation,
+    /// How it has turned and moved, by the last frame's depth.
+    Depth,
+}
+
 /// Coarser shading away from the gaze.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -86,6 +107,8 @@ pub enum FoveationKind {
     MultiResolution,
     /// Every other 2x2 quad, from the first angle of the rates on.
     RadialDensity,
+    /// 2x2 viewports, coarser towards the edges by a projective map.
+    LensMatched,
 }
 
 /// Shading rates by angle from the gaze.
@@ -117,11 +140,38 @@ pub struct SettingsError {
 }
 
 impl Settings {
+    /// Whether pixels that the user cannot see are left out, by the lens's circle or a mesh.
+    #[must_use]
+    pub fn masks_hidden_area(&self) -> bool {
+        self.hidden_area_mask || self.hidden_area_mesh.is_some()
+    }
+
+    /// Whether a frame is made of the one before in place of being rendered.
+    #[must_use]
+    pub fn reprojects(&self, frame: u32) -> bool {
+        self.half_rate.is_some() && frame % 2 == 1
+    }
+
     /// Checks every figure, and that no two techniques exclude each other.
     ///
     /// # Errors
     /// The first setting that cannot be, and what it may be.
     pub fn check(&self, hmd: &Hmd) -> Result<(), SettingsError> {
+        if let Some(mesh) = &self.hidden_area_mesh {
+            mesh.check(hmd.eye_size_px)?;
+        }
+        if let Some(distance) = &self.distance_cull {
+            distance.check()?;
+        }
+        if self.half_rate == Some(Reprojection::Depth)
+            && (self.foveation.is_some() || self.far_field.is_some() || self.multiview)
+        {
+            return Err(SettingsError {
+                what: "half rate by depth",
+                expected: "pictures that are one layer each, which has their depth".into(),
+                found: "foveation, a far field or multiview".into(),
+            });
+        }
         if let Some(foveation) = &self.foveation {
             foveation.check(hmd)?;
         }
@@ -151,7 +201,11 @@ impl FarField {
         Err(SettingsError {
             what: "split of the far field",
             expected: "a number above 0".into(),
-            found: format!("{:?}", self.split),
+            found: match self.split {
+                Split::Metres(value)
+                | Split::Pixels(value)
+                | Split::LeastWork { within_px: value } => value.to_string(),
+            },
         })
     }
 }

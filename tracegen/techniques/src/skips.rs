@@ -12,19 +12,16 @@ pub struct Skips {
     pub mip_levels: bool,
     /// Shadow cascades in which nothing that is seen looks up its shadow.
     pub cascades: bool,
-    /// Draws whose box a view may see but none of whose triangles.
-    pub draws: bool,
     /// Draws that do not touch the region of a view that is captured.
     pub regions: bool,
 }
 
 /// Names for [`Skips::without`], what they stand for, and the switch.
 type Row = (&'static str, fn(&mut Skips) -> &mut bool);
-const ROWS: [Row; 5] = [
+const ROWS: [Row; 4] = [
     ("images", |skips| &mut skips.images),
     ("mip-levels", |skips| &mut skips.mip_levels),
     ("cascades", |skips| &mut skips.cascades),
-    ("draws", |skips| &mut skips.draws),
     ("regions", |skips| &mut skips.regions),
 ];
 
@@ -34,7 +31,6 @@ impl Default for Skips {
             images: true,
             mip_levels: true,
             cascades: true,
-            draws: true,
             regions: true,
         }
     }
@@ -46,7 +42,6 @@ impl Skips {
         images: false,
         mip_levels: false,
         cascades: false,
-        draws: false,
         regions: false,
     };
 
@@ -105,7 +100,7 @@ mod tests {
         let each: Vec<Skip> = ROWS.iter().map(|(name, _)| skip(name)).collect();
         assert_eq!(Skips::without(&each), Skips::NONE);
         let some = Skips::without(&[skip("cascades"), skip("mip-levels")]);
-        assert!(!some.cascades && !some.mip_levels && some.images && some.draws && some.regions);
+        assert!(!some.cascades && !some.mip_levels && some.images && some.regions);
         let error = "mips".parse::<Skip>().unwrap_err().to_string();
         assert!(
             error.contains("mip-levels") && error.contains("'mips'"),

@@ -11,9 +11,9 @@
 //!
 //! Nothing here fails: a folder that cannot be read or written is an empty one.
 
-use formats::container::AtomicFile;
+use formats::container::{AtomicFile, open_regular};
 use formats::texture::TexelFormat;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -79,7 +79,7 @@ impl Cache {
 
     /// Format and blocks of a texture, if a whole file of that key is there.
     pub(crate) fn load(&self, key: Key) -> Option<(TexelFormat, Vec<u8>)> {
-        let mut file = File::open(self.path(key)).ok()?;
+        let mut file = open_regular(&self.path(key)).ok()?;
         let metadata = file.metadata().ok()?;
         let mut header = [0; HEADER_BYTES];
         file.read_exact(&mut header).ok()?;

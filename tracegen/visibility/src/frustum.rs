@@ -48,18 +48,6 @@ pub(crate) fn frustum_planes(clip_from_world: Mat4) -> [Vec4; 6] {
     ]
 }
 
-/// Whether world-space bounds lie wholly inside a frustum. Errs on the side of no.
-#[must_use]
-pub fn holds(clip_from_world: Mat4, bounds: [Vec3; 2]) -> bool {
-    let inside = |plane: Vec4| {
-        let [lo, hi] = bounds;
-        let normal = plane.truncate();
-        let farthest = Vec3::select(normal.cmpge(Vec3::ZERO), lo, hi);
-        normal.dot(farthest) + plane.w >= 0.0
-    };
-    frustum_planes(clip_from_world).into_iter().all(inside)
-}
-
 fn outside(plane: Vec4, [lo, hi]: [Vec3; 2]) -> bool {
     let normal = plane.truncate();
     let nearest = Vec3::select(normal.cmpge(Vec3::ZERO), hi, lo);
@@ -85,8 +73,6 @@ mod tests {
             [Vec3::splat(f32::NAN), Vec3::splat(f32::NAN)],
         ];
         assert_eq!(visible(boxes, clip), [1, 4, 5]);
-        let held = boxes.map(|bounds| holds(clip, bounds));
-        assert_eq!(held, [false, true, false, false, false, false]);
     }
 
     #[test]

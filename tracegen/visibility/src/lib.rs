@@ -8,6 +8,7 @@
 //!     depth of what was visible -> Pyramid -> Occlusion -> shorter list
 //! ```
 
+pub mod binning;
 pub mod culling;
 mod draw_set;
 pub mod frustum;

@@ -5,6 +5,7 @@ use super::super::counts::{CacheCounts, CellMisses};
 use super::thread::{FETCHES_UNTIL_KEPT, Thread};
 use crate::cache::{Delay, DelayedFill, Levels, NOT_ASKED};
 use crate::config::TmuConfig;
+use crate::memory::dram::Dram;
 use crate::result::FirstLookups;
 
 /// What a footprint finds in its core's own cache.
@@ -23,6 +24,7 @@ pub struct Memory<D> {
     l1_penalty_cycles: u64,
     l2_penalty_cycles: u64,
     counts: CacheCounts,
+    dram: Option<Dram>,
     /// Lines of the footprint looked up last that were not there, by core: index and arrival.
     missing: Vec<Vec<(usize, u64)>>,
     first: FirstLookups,
@@ -36,6 +38,7 @@ impl<D: DelayedFill> Memory<D> {
         levels: Levels<C>,
         tmu: &TmuConfig,
         counts: CacheCounts,
+        dram: Option<Dram>,
     ) -> Self {
         let [l1_penalty_cycles, l2_penalty_cycles] =
             [tmu.l1_penalty_cycles, tmu.l2_penalty_cycles].map(u64::from);
@@ -48,9 +51,15 @@ impl<D: DelayedFill> Memory<D> {
             l1_penalty_cycles,
             l2_penalty_cycles,
             counts,
+            dram,
             first: FirstLookups::default(),
             forwarded: 0,
         }
+    }
+
+    /// The memory below the caches.
+    pub fn dram(&self) -> Option<&Dram> {
+        self.dram.as_ref()
     }
 
     /// Primary misses.
@@ -130,6 +139,9 @@ impl<D: DelayedFill> Memory<D> {
                 0 => now,
                 NOT_ASKED => {
                     from_memory += 1;
+                    if let Some(dram) = &mut self.dram {
+                        dram.read(line, Some(now));
+                    }
                     let arrival = now + self.l2_penalty_cycles;
                     self.l2.enter(line, now, arrival);
                     arrival

@@ -15,6 +15,7 @@ use super::counts::CacheCounts;
 use super::items::Items;
 use crate::cache::{Delay, DelayedFill, Levels};
 use crate::config::{Assign, RunConfig, TmuConfig};
+use crate::memory::dram::Dram;
 use crate::order::{Phase, WorkItem};
 use crate::result::FirstLookups;
 use crate::stream::{Cores, StreamError, furthest_behind};
@@ -85,10 +86,11 @@ impl<D: DelayedFill> FirstMiss<D> {
         levels: Levels<C>,
         tmu: TmuConfig,
         counts: CacheCounts,
+        dram: Option<Dram>,
     ) -> Self {
         let cores = levels.l1.len();
         Self {
-            memory: Memory::new(levels, &tmu, counts),
+            memory: Memory::new(levels, &tmu, counts, dram),
             units: (0..cores).map(|_| Unit::default()).collect(),
             tmu,
             cycles: 0,
@@ -205,7 +207,10 @@ impl<D: DelayedFill> Machine for FirstMiss<D> {
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
         let stats = self.units.iter().map(|unit| unit.stats);
-        Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
+        Outcome {
+            dram: self.memory.dram().map(Dram::result),
+            ..Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
+        }
     }
 
     fn first_lookups(&self) -> Option<FirstLookups> {

@@ -290,6 +290,7 @@ impl Machine for PlainTimed {
                 loops: sum(|unit| unit.loops),
             }),
             cycles: Some(self.cycles),
+            dram: None,
         }
     }
 }
@@ -364,7 +365,7 @@ fn compiled_and_general_caches_agree() {
         l2: l2.into_box(),
     };
     let counts = CacheCounts::new(&Bins::new(&trace.tables).unwrap(), false);
-    let mut general = Timed::new(pointers, config.tmu, counts);
+    let mut general = Timed::new(pointers, config.tmu, counts, None);
     assert_eq!(
         alone(&trace, &config, &mut general),
         replay(&trace, &config).unwrap()

@@ -4,6 +4,7 @@
 use super::super::counts::{CacheCounts, FootprintMisses};
 use crate::cache::{DelayedFill, NOT_ASKED};
 use crate::config::TmuConfig;
+use crate::memory::dram::Dram;
 use crate::stream::{QuadLines, Use};
 use crate::tmu::{Pending, Waiting};
 use std::hint::select_unpredictable;
@@ -28,6 +29,7 @@ pub struct Asking<'m, D> {
     pub l2: &'m mut D,
     pub tmu: &'m TmuConfig,
     pub counts: &'m mut CacheCounts,
+    pub dram: Option<&'m mut Dram>,
     pub waiting: &'m mut Waiting,
     pub now: u64,
     pub trips: Trips,
@@ -135,6 +137,9 @@ impl<D: DelayedFill> Asking<'_, D> {
             0 => now,
             NOT_ASKED => {
                 misses.l2_lines += 1;
+                if let Some(dram) = &mut self.dram {
+                    dram.read(line, Some(now));
+                }
                 let arrival = now + u64::from(tmu.l2_penalty_cycles);
                 self.l2.enter(line, now, arrival);
                 arrival

@@ -10,6 +10,7 @@ use super::super::counts::CacheCounts;
 use super::asking::{Absent, Asking, Trips};
 use crate::cache::{Delay, DelayedFill, Levels, NOT_ASKED};
 use crate::config::TmuConfig;
+use crate::memory::dram::Dram;
 use crate::stream::{QuadLines, Use};
 use crate::tmu::{Pending, Waiting};
 use std::ops::Range;
@@ -42,6 +43,7 @@ pub struct Memory<D> {
     l2: D,
     tmu: TmuConfig,
     counts: CacheCounts,
+    dram: Option<Dram>,
     /// Of a segment the lines that nobody has asked for, by first use.
     by_first_use: [Absent; Use::FIRST_LINES],
 }
@@ -52,6 +54,7 @@ impl<D: DelayedFill> Memory<D> {
         levels: Levels<C>,
         tmu: TmuConfig,
         counts: CacheCounts,
+        dram: Option<Dram>,
     ) -> Self {
         let memory_cycles = u64::from(tmu.l1_penalty_cycles) + u64::from(tmu.l2_penalty_cycles);
         // Later trips of threads that miss many lines included.
@@ -68,6 +71,7 @@ impl<D: DelayedFill> Memory<D> {
             l2,
             tmu,
             counts,
+            dram,
             by_first_use: [Absent::default(); Use::FIRST_LINES],
         }
     }
@@ -75,6 +79,11 @@ impl<D: DelayedFill> Memory<D> {
     /// What missed.
     pub fn counts(&self) -> &CacheCounts {
         &self.counts
+    }
+
+    /// The memory below the caches.
+    pub fn dram(&self) -> Option<&Dram> {
+        self.dram.as_ref()
     }
 
     /// Empties all caches. Nobody waits for what is on its way.
@@ -147,6 +156,7 @@ impl<D: DelayedFill> Memory<D> {
             l2: &mut self.l2,
             tmu: &self.tmu,
             counts: &mut self.counts,
+            dram: self.dram.as_mut(),
             waiting: &mut first.waiting,
             now,
             trips: Trips::default(),

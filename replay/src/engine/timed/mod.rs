@@ -10,6 +10,7 @@ use super::counts::CacheCounts;
 use super::items::Items;
 use crate::cache::{Delay, DelayedFill, Levels};
 use crate::config::{Assign, RunConfig, TmuConfig};
+use crate::memory::dram::Dram;
 use crate::order::{Phase, WorkItem};
 use crate::stream::{Cores, StreamError, furthest_behind};
 use crate::tmu::{Pipeline, Turn};
@@ -29,10 +30,11 @@ impl<D: DelayedFill> Timed<D> {
         levels: Levels<C>,
         tmu: TmuConfig,
         counts: CacheCounts,
+        dram: Option<Dram>,
     ) -> Self {
         let cores = levels.l1.len();
         Self {
-            memory: Memory::new(levels, tmu, counts),
+            memory: Memory::new(levels, tmu, counts, dram),
             units: vec![Pipeline::new(tmu); cores],
             cycles: 0,
         }
@@ -121,6 +123,9 @@ impl<D: DelayedFill> Machine for Timed<D> {
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
         let stats = self.units.iter().map(Pipeline::stats);
-        Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
+        Outcome {
+            dram: self.memory.dram().map(Dram::result),
+            ..Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
+        }
     }
 }

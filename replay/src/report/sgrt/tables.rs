@@ -133,7 +133,22 @@ impl Row for RuleRow<'_> {
         }
         vec![
             text("scene", "scene", |r| scene_name(r.report)),
+            text("trace", "trace", |r| r.report.trace.name.clone()),
             text("checksum", "checksum", |r| r.report.trace.checksum.clone()),
+            text("camera", "camera", |r| r.report.trace.camera.clone()),
+            text("display", "display", |r| r.report.trace.display.clone()),
+            Column::text("width_px", "width", |r: &RuleRow| {
+                u64::from(r.report.eye_size_px[0])
+            }),
+            Column::text("height_px", "height", |r: &RuleRow| {
+                u64::from(r.report.eye_size_px[1])
+            }),
+            Column::text("model_version", "model", |r: &RuleRow| {
+                u64::from(r.report.model_version)
+            }),
+            text("cache_misses", "cache misses from", |r| {
+                r.report.config.cache_misses.clone()
+            }),
             text("run", "rule", |r| r.run.to_owned()),
             text("rule", "rule", |r| match r.run {
                 "chosen" => r.report.config.rule.to_string(),

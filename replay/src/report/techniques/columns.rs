@@ -1,14 +1,15 @@
 //! The figures of a technique, a line each.
 
 use crate::config::Order;
+use crate::model_version::MODEL_VERSION;
 use crate::report::columns::{Column, Show};
-use crate::techniques::{CacheFigures, Count, Measured, OrderGain};
+use crate::techniques::{CacheFigures, Count, Measured, OrderGain, RATES_HZ};
 
 /// A column of techniques.
 pub type Figure<'a> = Column<'a, &'a Measured<'a>>;
 
 /// Keys of the table for a terminal, where it has them.
-pub const SHORT: [&str; 17] = [
+pub const SHORT: [&str; 20] = [
     "scene",
     "technique",
     "frame_time_ratio",
@@ -21,12 +22,26 @@ pub const SHORT: [&str; 17] = [
     "false_positives",
     "draws_ratio",
     "fragments_ratio",
+    "memory_bytes_ratio",
+    "energy_ratio",
     "flip_mean",
     "flip_worst",
     "flicker",
     "external_mb_per_frame",
     "dominated",
+    "dominated_in",
 ];
+
+/// Keys of the table of pacing.
+#[must_use]
+pub fn pacing_keys() -> Vec<String> {
+    let rates = |name: &'static str| RATES_HZ.map(|hz| format!("{name}_{hz}hz"));
+    let start = ["scene", "technique", "frame_ms"].map(str::to_owned);
+    (start.into_iter())
+        .chain(rates("missed_pct"))
+        .chain(rates("steps"))
+        .collect()
+}
 
 /// Mean of a count over the frames.
 fn mean<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
@@ -48,13 +63,27 @@ fn ratio<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
 pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
     let mut columns = vec![
         Figure::text("scene", "scene", |m| m.scene),
+        Figure::text("trace", "trace", |m| m.row.trace.as_deref().map(|file| file.trim_end_matches(".textrace")))
+            .about("name of the technique's trace without folder and extension"),
+        Figure::text("checksum", "checksum", |m| m.row.trace_checksum.as_deref())
+            .about("checksum of the trace's content"),
+        Figure::text("camera", "camera", |m| m.manifest.camera.as_str()),
+        Figure::text("display", "display", |m| m.manifest.hmd.name.as_str()),
+        Figure::text("width_px", "width", |m| u64::from(m.manifest.size_px[0]))
+            .about("width of an eye's picture in pixels"),
+        Figure::text("height_px", "height", |m| u64::from(m.manifest.size_px[1]))
+            .about("height of an eye's picture in pixels"),
+        Figure::text("model_version", "model", |_| u64::from(MODEL_VERSION))
+            .about("version of the models; counts of different versions cannot be compared"),
         Figure::text("technique", "technique", |m| m.row.technique.as_str()),
         Figure::text("title", "name", |m| m.row.title.as_str()),
         Figure::text("parts", "combines", |m| m.row.parts.join(" + ")),
         Figure::text("lossless", "lossless", |m| m.row.lossless)
             .about("no pixel that the user can see is meant to change"),
         Figure::text("dominated", "dominated", |m| m.dominated)
-            .about("another technique takes no more time, errs no more, and is better at one of both"),
+            .about("another technique errs no more and takes less time: the quartiles of both are apart"),
+        Figure::text("dominated_in", "dominated in", |m| m.dominated_in.join(" "))
+            .about("counts of which another technique needs no more, with no more error in its worst picture, and is better at one of both"),
 
         Figure::real("frame_time_ratio", "time", "\u{d7} baseline", 3, |m| m.timing.ratio.median)
             .about("median over all frames and repeats of the frame time over the baseline's that was measured beside it"),
@@ -77,6 +106,16 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
         Figure::real("cull_ms", "culling", "ms", 3, |m| m.timing.cull_ms)
             .about("median time of culling a frame"),
     ];
+    columns.extend((0..RATES_HZ.len()).map(|at| {
+        let hz = RATES_HZ[at];
+        Figure::real(format!("missed_pct_{hz}hz"), format!("missed at {hz} Hz"), "%", 1, move |m| Some(m.timing.pacing.get(at)?.missed_pct))
+            .about("frames that take longer than a refresh, by their times as measured")
+    }));
+    columns.extend((0..RATES_HZ.len()).map(|at| {
+        let hz = RATES_HZ[at];
+        Figure::real(format!("steps_{hz}hz"), format!("steps at {hz} Hz"), "refreshes", 2, move |m| Some(m.timing.pacing.get(at)?.steps))
+            .about("refreshes that a frame takes on average, 1 where none is missed; the rate over it is what is shown")
+    }));
     let mut stages: Vec<&str> = Vec::new();
     for (stage, _) in rows.iter().flat_map(|m| &m.timing.stages_ms) {
         if !stages.contains(&stage.as_str()) {
@@ -109,6 +148,18 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
         mean("fragments", "fragments", |f| f.fragments),
         ratio("fragments_ratio", "fragments", |f| f.fragments),
         mean("bytes_uploaded", "uploaded", |f| Some(f.bytes_uploaded)),
+        mean("memory_bytes", "traffic", |f| f.memory_bytes)
+            .about("counted memory traffic: texture lines once a tile, vertices, pictures, uploads"),
+        ratio("memory_bytes_ratio", "traffic", |f| f.memory_bytes),
+        Figure::real("energy_ratio", "energy", "\u{d7} baseline", 3, |m| m.energy_ratio())
+            .about("energy of the counted traffic, fragments and vertices over the baseline's"),
+        mean("bytes_reprojected", "reprojected", |f| Some(f.bytes_reprojected)),
+        Figure::new("target_color_bytes", "colour targets", "MB", Show::Millions(2), |m| m.most(|f| f.target_color_bytes))
+            .about("colour of all layers of a frame, and of pictures composed of them; the frame with the most"),
+        Figure::new("target_depth_bytes", "depth targets", "MB", Show::Millions(2), |m| m.most(|f| f.target_depth_bytes))
+            .about("depth buffers that have to be there at a time: passes one after the other share one, views drawn at once do not"),
+        Figure::new("texture_bytes", "textures", "MB", Show::Millions(2), |m| m.row.texture_bytes)
+            .about("texels of the scene, there once for both eyes"),
         Figure::new("peak_memory_bytes", "memory", "MB", Show::Millions(0), |m| m.row.peak_memory_bytes)
             .about("most memory that the capturer held"),
 
@@ -126,7 +177,7 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
             .about("mean structural similarity"),
         Figure::real("ssim_worst", "worst", "SSIM", 4, |m| m.pictures.ssim_worst),
         Figure::real("flicker", "flicker", "", 5, |m| m.pictures.flicker)
-            .about("mean difference, 0 to 1, between the change from frame to frame and the baseline's"),
+            .about("how much more the picture changes from frame to frame than the baseline's, 0 to 1, followed along the baseline's motion"),
         Figure::real("identical_pct", "identical", "% of pictures", 1, |m| m.pictures.identical_pct)
             .about("pictures whose visible pixels are the baseline's to the bit"),
     ]);

@@ -1,6 +1,7 @@
 //! Techniques of stereo rendering on some scenes: table, JSON, CSV and page.
 
 mod columns;
+mod frusta;
 mod page;
 mod plots;
 mod published;
@@ -109,6 +110,18 @@ impl<'a> TechniquesReport<'a> {
         table.grouped_by(usize::from(!one))
     }
 
+    /// How the frames fare at the refresh rates of displays.
+    #[must_use]
+    pub fn pacing_table(&self) -> Table {
+        let one = self.scenes.len() == 1;
+        let keys = columns::pacing_keys();
+        let keys = keys.iter().map(String::as_str);
+        let table = self
+            .table()
+            .picked(keys.filter(|key| !(one && *key == "scene")));
+        table.grouped_by(usize::from(!one))
+    }
+
     /// What an order gains with and without each technique.
     #[must_use]
     pub fn order_table(&self) -> Table {
@@ -127,6 +140,8 @@ impl<'a> TechniquesReport<'a> {
     #[must_use]
     pub fn text(&self) -> String {
         let mut text = self.short_table().text();
+        text += "\n";
+        text += &self.pacing_table().text();
         let orders = self.order_table();
         if !orders.rows.is_empty() {
             text += "\n";

@@ -1,5 +1,6 @@
 //! The page: tables, plots and pictures of every scene.
 
+use super::frusta::Frusta;
 use super::{TechniquesReport, plots};
 use crate::report::html::{self, Section, figures, slug};
 use crate::report::picture::EmbeddedPicture;
@@ -7,12 +8,12 @@ use crate::report::plots::PlotError;
 use crate::report::table::Table;
 use crate::report::theme::group_thousands;
 use crate::techniques::manifest::{Auto, Manifest};
-use crate::techniques::{Difference, Measures};
+use crate::techniques::{Difference, Measured, Measures};
 use formats::view::Eye;
 use maud::{Markup, html};
 
 /// Keys of the columns that the page's table shows; CSV and JSON have them all.
-const SHOWN: [&str; 27] = [
+const SHOWN: [&str; 30] = [
     "technique",
     "frame_time_ratio",
     "frame_time_ratio_q1",
@@ -31,6 +32,8 @@ const SHOWN: [&str; 27] = [
     "vertices",
     "fragments",
     "fragments_ratio",
+    "memory_bytes_ratio",
+    "energy_ratio",
     "flip_mean",
     "flip_p99",
     "flip_worst",
@@ -40,6 +43,7 @@ const SHOWN: [&str; 27] = [
     "external_mb_per_frame",
     "peak_memory_bytes",
     "dominated",
+    "dominated_in",
 ];
 
 /// A scene's pictures.
@@ -75,6 +79,27 @@ impl TechniquesReport<'_> {
             sections.push(section(
                 format!("{name}: time and error"),
                 time_and_error(measures, manifest)?,
+            ));
+            let pacing = self.pacing_table();
+            let pacing = if pacing.headings.iter().any(|h| h.key == "scene") {
+                pacing.only("scene", name)
+            } else {
+                pacing
+            };
+            sections.push(section(
+                format!("{name}: frames and refreshes"),
+                html! {
+                    (pacing.markup())
+                    (meanings(&pacing))
+                    p.note { "Times are as they were measured on the device above, not scaled to a display's." }
+                },
+            ));
+            sections.push(section(
+                format!("{name}: frusta and cones"),
+                html::figure(
+                    &frusta(measures, manifest).svg(),
+                    "Both drawings are to scale. Far fields lie beyond their split, seen by one camera between the eyes.",
+                ),
             ));
             let stages = self.stage_table(&table, name);
             if !stages.rows.is_empty() {
@@ -204,6 +229,17 @@ fn meanings(table: &Table) -> Markup {
                 }
             }
         }
+    }
+}
+
+/// The display from above, with the splits that the scene's techniques chose on average.
+fn frusta<'a>(measures: &Measures, manifest: &'a Manifest) -> Frusta<'a> {
+    let split = |m: &Measured| Some((m.row.technique.clone(), m.predicted("split_m")?));
+    Frusta {
+        title: format!("{}: display {}", measures.scene, manifest.hmd.name),
+        hmd: &manifest.hmd,
+        lens: manifest.lens,
+        splits: measures.rows.iter().filter_map(split).collect(),
     }
 }
 

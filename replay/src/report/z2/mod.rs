@@ -6,6 +6,7 @@ pub mod model;
 pub mod page;
 pub mod plots;
 pub mod tables;
+mod whole_frame;
 
 #[cfg(test)]
 pub(crate) mod testing;

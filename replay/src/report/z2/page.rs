@@ -2,7 +2,7 @@
 
 use super::model::{PaperReport, TraceInfo};
 use super::plots::{self, TileMeasure};
-use super::tables;
+use super::{tables, whole_frame};
 use crate::config::{Mode, Order};
 use crate::report::errors::{self, Of};
 use crate::report::html::{self, Section, figures, folded};
@@ -38,6 +38,7 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
         "External bandwidth (Fig. 5)",
         bandwidth(report)?,
     ));
+    sections.extend(whole_frame::section(report)?);
     sections.push(Section::new("Charts of Table 2", rates(report)?));
     if let Some(table) = tables::as_the_paper_counts(report) {
         sections.push(Section::new(

@@ -116,6 +116,9 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
             ..TmuResult::default()
         }),
         cycles: Some(30_000_000),
+        dram: None,
+        clients: Vec::new(),
+        geometry: None,
         first_lookups: Some(FirstLookups {
             l1_miss_rate: l1_pct / 100.0,
             l2_miss_rate: l2_pct / 100.0,

@@ -17,7 +17,7 @@ pub struct Composer {
     part_layout: wgpu::BindGroupLayout,
     /// Writes the nearest depth wherever a layer's mask is not set.
     pub mask: OverLayer,
-    filters: [(Filter, wgpu::RenderPipeline); 3],
+    filters: [(Filter, wgpu::RenderPipeline); 4],
     /// Stands for the mask of a layer and the tiles of a part that have none.
     absent: wgpu::TextureView,
 }
@@ -29,6 +29,8 @@ struct PartData {
     origin: [i32; 2],
     coarseness: [i32; 2],
     some_tiles: [u32; 4],
+    /// Columns, each with a float of padding.
+    layer_from_px: [[f32; 4]; 3],
 }
 
 impl Composer {
@@ -70,6 +72,7 @@ impl Composer {
                     (Filter::Copy, compose("fragment_copy")),
                     (Filter::Bilinear, compose("fragment_bilinear")),
                     (Filter::FillQuads, compose("fragment_fill")),
+                    (Filter::Projective, compose("fragment_projective")),
                 ],
                 absent: upload(gpu, &Mask::new([1, 1], |_, _| true)),
                 mask_layout,
@@ -118,6 +121,9 @@ impl Composer {
             });
             for ((part, layer), bindings) in parts.iter().zip(&bound) {
                 let covers = |axis: usize| {
+                    if part.layer_from_px.is_some() {
+                        return picture.size_px[axis] - part.origin_px[axis];
+                    }
                     let end =
                         part.origin_px[axis] + layer.color.size_px[axis] * part.coarseness[axis];
                     end.min(picture.size_px[axis]) - part.origin_px[axis]
@@ -143,6 +149,12 @@ impl Composer {
             origin: part.origin_px.map(|px| px as i32),
             coarseness: part.coarseness.map(|n| n as i32),
             some_tiles: [u32::from(part.tiles.is_some()), 0, 0, 0],
+            layer_from_px: part
+                .layer_from_px
+                .unwrap_or_default()
+                .as_mat3()
+                .to_cols_array_2d()
+                .map(|[x, y, z]| [x, y, z, 0.0]),
         };
         let uniform = gpu
             .device

@@ -38,7 +38,7 @@ const PICTURE_FEATURES: wgpu::Features = wgpu::Features::TEXTURE_COMPRESSION_BC;
 /// has to be able to capture, where none is asked for.
 ///
 /// # Errors
-/// [`RasterError::NoDriver`] with the packages to install, [`RasterError::NoAdapter`] with the
+/// [`RasterError::NoDriver`] with the packages to install, [`RasterError::NotLoaded`] where they are, [`RasterError::NoAdapter`] with the
 /// names of those present, or [`RasterError::Unsupported`].
 pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
@@ -49,6 +49,11 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
     let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
     let infos: Vec<wgpu::AdapterInfo> = adapters.iter().map(wgpu::Adapter::get_info).collect();
     let names: Vec<&str> = infos.iter().map(|i| i.name.as_str()).collect();
+    if names.is_empty()
+        && let Some(reason) = super::missing::reason()
+    {
+        return Err(RasterError::NotLoaded(reason));
+    }
     let chosen = match wanted {
         Some(wanted) => named(&names, wanted).ok_or_else(|| RasterError::NoAdapter {
             wanted: wanted.to_owned(),
@@ -70,7 +75,8 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
     let no_capture = if missing.is_empty() {
         by_fragment.clone().filter(|_| !is_llvmpipe(info))
     } else {
-        Some(format!("{missing:?}"))
+        let names: Vec<&str> = missing.iter_names().map(|(name, _)| name).collect();
+        Some(names.join(", "))
     };
     let no_picture = missing.intersects(PICTURE_FEATURES);
     if let Some(what) = no_capture

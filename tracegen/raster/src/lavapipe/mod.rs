@@ -5,6 +5,7 @@ mod bindings;
 mod compose;
 mod counter;
 pub mod device;
+mod missing;
 mod multiview;
 mod pipelines;
 mod readback;

@@ -189,8 +189,8 @@ fn upload_texture(
         TexelFormat::Rgba8 => wgpu::TextureFormat::Rgba8Unorm,
         other => {
             return Err(RasterError::Scene(format!(
-                "texture {}: expected BC1, BC3 or RGBA8, found {other:?}",
-                texture.name
+                "texture {}: expected BC1, BC3 or RGBA8, found format {}",
+                texture.name, other as u16
             )));
         }
     };

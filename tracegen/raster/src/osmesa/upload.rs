@@ -164,8 +164,8 @@ fn upload_texture(gl: &Gl, compressed: &CompressedTexture) -> Result<Texture, Ra
         ),
         other => {
             return Err(RasterError::Scene(format!(
-                "texture {}: expected BC1, BC3 or RGBA8, found {other:?}",
-                texture.name
+                "texture {}: expected BC1, BC3 or RGBA8, found format {}",
+                texture.name, other as u16
             )));
         }
     };

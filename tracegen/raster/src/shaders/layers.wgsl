@@ -10,6 +10,8 @@ struct Part {
     coarseness: vec2<i32>,
     // x: only some tiles are filled.
     some_tiles: vec4<u32>,
+    // Pixels of the picture to those of the layer, where the part is projective.
+    layer_from_px: mat3x3<f32>,
 }
 
 @group(1) @binding(0) var<uniform> part: Part;
@@ -48,7 +50,17 @@ fn fragment_copy(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f3
 fn fragment_bilinear(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let pixel = pixel_of(position);
     // In pixels of the layer, from the centre of its first one.
-    let at = (vec2<f32>(pixel) + 0.5) / vec2<f32>(part.coarseness) - 0.5;
+    return bilinear((vec2<f32>(pixel) + 0.5) / vec2<f32>(part.coarseness) - 0.5);
+}
+
+@fragment
+fn fragment_projective(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+    let pixel = pixel_of(position);
+    let at = part.layer_from_px * vec3(vec2<f32>(pixel) + 0.5, 1.0);
+    return bilinear(at.xy / at.z - 0.5);
+}
+
+fn bilinear(at: vec2<f32>) -> vec4<f32> {
     let low = vec2<i32>(floor(at));
     let last = vec2<i32>(textureDimensions(layer)) - 1;
     let a = clamp(low, vec2(0), last);

@@ -107,7 +107,11 @@ impl<'a> Buffers<'a> {
             return Err(self.origin.invalid(
                 format!("accessors[{index}]"),
                 expected,
-                format!("{:?} of {component:?}", valid(&accessor.type_)),
+                format!(
+                    "{} of {}",
+                    type_name(&accessor.type_),
+                    component_name(component)
+                ),
             ));
         }
         let read = |bytes: &[u8]| {
@@ -129,7 +133,11 @@ impl<'a> Buffers<'a> {
             return Err(self.origin.invalid(
                 format!("accessors[{index}]"),
                 "indices: scalars of U8, U16 or U32",
-                format!("{:?} of {component:?}", valid(&accessor.type_)),
+                format!(
+                    "{} of {}",
+                    type_name(&accessor.type_),
+                    component_name(component)
+                ),
             ));
         }
         let read = |bytes: &[u8]| read_index(bytes, component);
@@ -259,6 +267,31 @@ impl<'a> Elements<'a> {
 /// The index's table position.
 pub(super) fn at<T>(index: &Index<T>) -> usize {
     index.value()
+}
+
+/// A type as glTF spells it.
+fn type_name(type_: &Checked<Type>) -> &'static str {
+    match valid(type_) {
+        None => "no valid type",
+        Some(Type::Scalar) => "SCALAR",
+        Some(Type::Vec2) => "VEC2",
+        Some(Type::Vec3) => "VEC3",
+        Some(Type::Vec4) => "VEC4",
+        Some(Type::Mat2) => "MAT2",
+        Some(Type::Mat3) => "MAT3",
+        Some(Type::Mat4) => "MAT4",
+    }
+}
+
+fn component_name(component: ComponentType) -> &'static str {
+    match component {
+        ComponentType::I8 => "bytes",
+        ComponentType::U8 => "unsigned bytes",
+        ComponentType::I16 => "shorts",
+        ComponentType::U16 => "unsigned shorts",
+        ComponentType::U32 => "unsigned integers",
+        ComponentType::F32 => "floats",
+    }
 }
 
 fn valid<T: Copy>(checked: &Checked<T>) -> Option<T> {

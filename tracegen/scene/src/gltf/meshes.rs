@@ -68,7 +68,7 @@ impl Reader<'_> {
             Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
         ) {
             warnings.count("not triangles", || {
-                format!("{place} is {mode:?}, not triangles; skipped")
+                format!("{place} holds {}, not triangles; skipped", mode_name(mode))
             });
             return Ok(None);
         }
@@ -349,4 +349,17 @@ fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
 fn is_direction(v: Vec3) -> bool {
     let length_squared = v.length_squared();
     length_squared > 1e-12 && length_squared.is_finite()
+}
+
+/// Primitives of a mode, in words.
+const fn mode_name(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Points => "points",
+        Mode::Lines => "lines",
+        Mode::LineLoop => "a line loop",
+        Mode::LineStrip => "a line strip",
+        Mode::Triangles => "triangles",
+        Mode::TriangleStrip => "a triangle strip",
+        Mode::TriangleFan => "a triangle fan",
+    }
 }

@@ -1,6 +1,6 @@
 //! From a budget to what every frame of a path is rendered with.
 
-use super::{AutoRecord, Bench, Budget, Held, hold, search};
+use super::{AutoRecord, Bench, Budget, Held, Known, Objective, hold, search};
 use crate::study::measure::{Extent, median_s};
 use crate::study::rows::{Part, Row};
 use crate::study::world::World;
@@ -25,6 +25,8 @@ pub struct Choice {
     pub record: AutoRecord,
     /// By frame.
     pub held: Held,
+    /// What this search and those before have seen.
+    pub known: Known,
 }
 
 impl Choice {
@@ -41,18 +43,22 @@ impl Choice {
 
 /// Searches for the best combination of techniques under a budget on a few frames of the path, and
 /// holds it on all of them: where a frame would break an error budget, it falls back to a safer
-/// combination; where the path's median frame breaks a time budget, that is an error.
+/// combination; where the path's median frame breaks a time budget, that is an error. The search sees the frames
+/// of `runs`, which are runs of consecutive ones; `known` is what earlier searches have seen of them.
 ///
 /// # Errors
 /// A budget that nothing meets, and driver errors.
 pub fn choose(
     world: &mut World,
     backend: &mut Lavapipe,
+    runs: Vec<Vec<u32>>,
     budget: Budget,
+    objective: Objective,
+    known: Known,
     progress: &Progress,
 ) -> anyhow::Result<Choice> {
     let path_frames = world.views.len() as u32;
-    let search_frames = search_frames(path_frames);
+    let search_frames = runs.concat();
     let options = options(budget, &world.hmd);
     progress.stage(
         "searching",
@@ -64,8 +70,11 @@ pub fn choose(
         world,
         backend,
         budget,
+        objective,
+        baseline: None,
+        known,
         extent: Extent {
-            runs: search_frames.iter().map(|frame| vec![*frame]).collect(),
+            runs,
             trace_frames: Vec::new(),
             repeats: SEARCH_REPEATS,
         },
@@ -73,14 +82,15 @@ pub fn choose(
         planners: Vec::new(),
         progress,
     };
-    let found = match search(&mut bench, &options, budget)? {
+    let combinations = Row::combinations();
+    let found = match search(&mut bench, &options, &combinations, budget, objective)? {
         Ok(found) => found,
         Err(infeasible) => {
             let closest = infeasible.closest;
             bail!(
                 "nothing meets --auto {budget}: the fastest found, {}, takes {:.1} ms a frame on this device",
                 closest.row.name,
-                closest.verdict.frame_s * 1e3
+                closest.per_frame() * 1e3
             );
         }
     };
@@ -115,8 +125,9 @@ pub fn choose(
         }
     };
     Ok(Choice {
-        record: AutoRecord::new(budget, &found, &held, search_frames),
+        record: AutoRecord::new(budget, objective, &found, &held, search_frames),
         held,
+        known: bench.known,
     })
 }
 
@@ -135,7 +146,8 @@ fn check_median(budget: Budget, chosen: &Row, median_s: f64) -> anyhow::Result<(
 
 /// Frames in the middle of equal parts of the path, alternately even and odd: some techniques tell
 /// them apart.
-fn search_frames(path_frames: u32) -> Vec<u32> {
+#[must_use]
+pub fn search_frames(path_frames: u32) -> Vec<u32> {
     let count = SEARCH_FRAMES.min(path_frames);
     let middle = |part: u32| {
         let middle = u64::from(path_frames) * (2 * u64::from(part) + 1) / (2 * u64::from(count));

@@ -1,15 +1,19 @@
 //! Measures combinations on a device.
 
 use super::budget::Budget;
-use super::search::{Judge, Verdict};
+use super::objective::Objective;
+use super::search::{Cost, Judge, Spread, Verdict};
+use crate::study::counted::{Counted, texture_bytes};
 use crate::study::measure::{Extent, in_turns, median_s, time, undisturbed_s};
 use crate::study::rows::Row;
-use crate::study::world::World;
+use crate::study::world::{Shot, Tracer, World};
 use anyhow::Context;
+use formats::textrace::{Textrace, TextraceWriter};
 use image_error::{Mask, Picture, Reference};
 use raster::lavapipe::Lavapipe;
+use serde::{Deserialize, Serialize};
 use shell::Progress;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::time::Duration;
 use techniques::{Planner, Settings};
@@ -19,6 +23,19 @@ use visibility::Occlusion;
 const RUN_OFF_REPEATS: u32 = 6;
 /// Frames that the search did not see and on which its winner must win, too.
 const ELSEWHERE_FRAMES: u32 = 8;
+
+/// Errors and counts of combinations on the frames of a search: the same in every search of these frames, whatever its
+/// objective and budget. By kind of error, then the settings as JSON.
+pub type Known = BTreeMap<String, Seen>;
+
+/// What the frames of a search show of a combination.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// The worst frame's error.
+    pub error: f64,
+    /// All frames together; none where the error was beyond the budget.
+    pub counted: Option<Counted>,
+}
 
 /// Renders combinations and the baseline beside them.
 pub struct Bench<'a> {
@@ -30,6 +47,12 @@ pub struct Bench<'a> {
     pub is_software: bool,
     /// What errors are measured in.
     pub budget: Budget,
+    /// What is made as small as the budget allows.
+    pub objective: Objective,
+    /// The baseline's cost a frame, once it is counted.
+    pub baseline: Option<f64>,
+    /// Errors and counts on the frames of the search, of this search and those before.
+    pub known: Known,
     /// Frames and repeats of the search.
     pub extent: Extent,
     /// The baseline's pictures of the frames of the search, as far as they were asked for.
@@ -48,11 +71,16 @@ impl Bench<'_> {
     pub fn error(&mut self, row: &Row, frame: u32, memory: &mut Occlusion) -> anyhow::Result<f64> {
         let planner = self.planner(&row.settings)?;
         let shot = self.world.shoot(self.backend, &planner, frame, memory)?;
+        self.error_of(&shot, frame)
+    }
+
+    /// The error of a frame that was just rendered.
+    fn error_of(&mut self, shot: &Shot, frame: u32) -> anyhow::Result<f64> {
         if let Budget::Pixels(_) = self.budget {
             let shift = shot.frame.plan.predicted.disparity_px;
             return Ok(shift.map_or(0.0, f64::from));
         }
-        let pictures = self.world.pictures(self.backend, &shot)?;
+        let pictures = self.world.pictures(self.backend, shot)?;
         let references = match self.references.remove(&frame) {
             Some(known) => known,
             None => self.references(frame)?,
@@ -70,8 +98,89 @@ impl Bench<'_> {
         Ok(worst)
     }
 
-    /// Renders frames with each of the rows, the baseline first, in turns: each row's time over the baseline's.
-    fn race(&mut self, rows: &[&Row], extent: &Extent) -> anyhow::Result<Vec<f64>> {
+    /// What a frame that was just rendered takes, counted by a capture of it.
+    fn count(&mut self, planner: &Planner, shot: &Shot, frame: u32) -> anyhow::Result<Counted> {
+        if shot.reprojection.is_some() {
+            return Ok(shot.counted(0));
+        }
+        let tables = self.world.trace_tables(|_| planner, &[frame])?;
+        let mut tracer = Tracer::new(&tables, TextraceWriter::in_memory(&tables)?);
+        let captured = tracer.capture(&self.world.job(planner), self.backend, &shot.frame)?;
+        let trace = Textrace::from_bytes(tracer.into_writer().into_bytes()?)?;
+        Ok(Counted {
+            texture_bytes: texture_bytes(&trace)?.iter().sum(),
+            ..shot.counted(captured.fragments)
+        })
+    }
+
+    /// Error and counts on the frames of the search; no counts where the error is beyond the limit.
+    fn see(&mut self, row: &Row, limit: f64) -> anyhow::Result<Seen> {
+        let planner = self.planner(&row.settings)?;
+        let (mut error, mut counted) = (0.0_f64, Counted::default());
+        let mut memory = Occlusion::default();
+        let remembers = row.settings.occlusion || row.settings.half_rate.is_some();
+        let rendered: Vec<(u32, bool)> = self.extent.rendered(remembers).collect();
+        for (frame, measured) in rendered {
+            // Rendered later, it would take the place of what is captured.
+            let is_picture = !matches!(self.budget, Budget::Pixels(_));
+            if measured && is_picture && !self.references.contains_key(&frame) {
+                let references = self.references(frame)?;
+                self.references.insert(frame, references);
+            }
+            let shot = (self.world).shoot(self.backend, &planner, frame, &mut memory)?;
+            if !measured {
+                continue;
+            }
+            error = error.max(self.error_of(&shot, frame)?);
+            if error <= limit {
+                counted += self.count(&planner, &shot, frame)?;
+            }
+        }
+        Ok(Seen {
+            error,
+            counted: (error <= limit).then_some(counted),
+        })
+    }
+
+    /// The verdict by counts, of an earlier search where that saw the combination.
+    fn judge_by_counts(&mut self, row: &Row) -> anyhow::Result<Verdict> {
+        let limit = match (row.lossless, self.budget.error_limit()) {
+            (false, Some(limit)) => limit,
+            _ => f64::INFINITY,
+        };
+        let unit = match self.budget {
+            Budget::Pixels(_) => "px",
+            _ => "flip",
+        };
+        let key = format!("{unit} {}", serde_json::to_string(&row.settings)?);
+        let known = self.known.get(&key).copied();
+        let seen = match known.filter(|seen| seen.counted.is_some() || seen.error > limit) {
+            Some(seen) => seen,
+            None => self.see(row, limit)?,
+        };
+        self.known.insert(key, seen);
+        self.progress.advance(1);
+        let frames = self.extent.frames().len() as f64;
+        let counted = seen.counted.filter(|_| seen.error <= limit);
+        let per_frame = counted.and_then(|counted| self.objective.counted(&counted));
+        let cost = per_frame.map(|cost| cost / frames).map(|per_frame| {
+            let baseline = *self.baseline.get_or_insert(per_frame);
+            let is_none = baseline <= 0.0;
+            Cost {
+                ratio: if is_none { 1.0 } else { per_frame / baseline },
+                per_frame,
+                spread: None,
+            }
+        });
+        Ok(Verdict {
+            cost,
+            error: seen.error,
+        })
+    }
+
+    /// Renders frames with each of the rows, the baseline first, in turns: each row's time over the baseline's,
+    /// repeat by repeat.
+    fn race(&mut self, rows: &[&Row], extent: &Extent) -> anyhow::Result<Vec<Spread>> {
         let planners: Vec<Arc<Planner>> = (rows.iter())
             .map(|row| self.planner(&row.settings))
             .collect::<anyhow::Result<_>>()?;
@@ -92,11 +201,17 @@ impl Bench<'_> {
                 }
             },
         )?;
-        let total_s = |times: &Vec<Vec<Duration>>| undisturbed_s(times.iter().map(|t| &**t));
-        let baseline_s = total_s(&times[0]);
-        Ok(times
-            .iter()
-            .map(|times| total_s(times) / baseline_s)
+        let total_s = &|contestant: usize, repeat: usize| {
+            let frames = times[contestant].iter().map(|times| times[repeat]);
+            frames.sum::<Duration>().as_secs_f64()
+        };
+        let ratios = |contestant| {
+            let repeats = 0..extent.repeats as usize;
+            repeats.map(move |repeat| total_s(contestant, repeat) / total_s(0, repeat))
+        };
+        let contestants = 0..rows.len();
+        Ok(contestants
+            .map(|c| Spread::of(ratios(c).collect()))
             .collect())
     }
 
@@ -131,15 +246,22 @@ impl Judge for Bench<'_> {
     type Error = anyhow::Error;
 
     fn can(&self, row: &Row) -> bool {
-        self.world.check(&row.settings).is_ok()
+        // A frame is made of the one before: frames that are searched alone have none.
+        let alone = self.extent.runs.iter().any(|run| run.len() < 2);
+        !(row.settings.half_rate.is_some() && alone) && self.world.check(&row.settings).is_ok()
     }
 
     fn judge(&mut self, row: &Row) -> anyhow::Result<Verdict> {
+        if self.objective != Objective::Time {
+            return self.judge_by_counts(row);
+        }
         let extent = self.extent.clone();
         let planner = self.planner(&row.settings)?;
         let mut error = 0.0_f64;
         let mut memory = Occlusion::default();
-        for (frame, measured) in extent.rendered(row.settings.occlusion) {
+        for (frame, measured) in
+            extent.rendered(row.settings.occlusion || row.settings.half_rate.is_some())
+        {
             if measured {
                 error = error.max(self.error(row, frame, &mut memory)?);
             } else {
@@ -152,14 +274,18 @@ impl Judge for Bench<'_> {
         let own = undisturbed_s(times.iter().map(|times| &*times.frame));
         let beside = undisturbed_s(times.iter().map(|times| &*times.baseline));
         let frames: Vec<Duration> = times.into_iter().flat_map(|times| times.frame).collect();
+        let cost = Cost {
+            ratio: own / beside,
+            per_frame: median_s(&frames),
+            spread: None,
+        };
         Ok(Verdict {
-            frame_time_ratio: own / beside,
-            frame_s: median_s(&frames),
+            cost: Some(cost),
             error,
         })
     }
 
-    fn run_off(&mut self, rows: &[&Row]) -> anyhow::Result<Vec<f64>> {
+    fn run_off(&mut self, rows: &[&Row]) -> anyhow::Result<Vec<Spread>> {
         let extent = Extent {
             repeats: RUN_OFF_REPEATS,
             ..self.extent.clone()
@@ -172,7 +298,7 @@ impl Judge for Bench<'_> {
         self.race(rows, &extent)
     }
 
-    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> anyhow::Result<Option<Vec<f64>>> {
+    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> anyhow::Result<Option<Vec<Spread>>> {
         let path_frames = self.world.views.len() as u32;
         let frames = elsewhere(path_frames, &self.extent.frames());
         if frames.is_empty() {

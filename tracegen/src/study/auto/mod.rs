@@ -5,14 +5,18 @@ mod budget;
 mod choose;
 mod guard;
 mod judge;
+mod objective;
 mod record;
+mod schedule;
 mod search;
 #[cfg(test)]
 mod tests;
 
 pub use budget::Budget;
-pub use choose::{Choice, choose};
+pub use choose::{Choice, choose, search_frames};
 pub use guard::{Held, hold};
-pub use judge::Bench;
+pub use judge::{Bench, Known};
+pub use objective::Objective;
 pub use record::AutoRecord;
-pub use search::{Elsewhere, Found, Infeasible, Judge, Verdict, search};
+pub use schedule::Schedule;
+pub use search::{Cost, Elsewhere, Found, Infeasible, Judge, Spread, Verdict, search};

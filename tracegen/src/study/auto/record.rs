@@ -2,6 +2,8 @@
 
 use super::budget::Budget;
 use super::guard::Held;
+use super::objective::Objective;
+use super::schedule::Schedule;
 use super::search::{Elsewhere, Found, Tried, Verdict};
 use serde::{Deserialize, Serialize};
 use techniques::Settings;
@@ -11,6 +13,8 @@ use techniques::Settings;
 pub struct AutoRecord {
     /// As asked for.
     pub budget: String,
+    /// What was made as small as the budget allows.
+    pub objective: Objective,
     /// The chosen combination.
     pub chosen: Chosen,
     /// Why, in words.
@@ -21,6 +25,8 @@ pub struct AutoRecord {
     pub held_frames: Vec<u32>,
     /// Frames that are rendered with a safer combination, and with which.
     pub fallbacks: Vec<Fallback>,
+    /// The choice for every frame, as `tracegen raster --technique` takes it.
+    pub schedule: String,
     /// The worst frame's error over the whole path, in the budget's unit.
     pub worst_error: Option<f64>,
     /// The best single technique that keeps the budget.
@@ -65,7 +71,13 @@ impl From<&Tried> for Chosen {
 impl AutoRecord {
     /// The record of a search over `search_frames` whose promise is held by `held`.
     #[must_use]
-    pub fn new(budget: Budget, found: &Found, held: &Held, search_frames: Vec<u32>) -> Self {
+    pub fn new(
+        budget: Budget,
+        objective: Objective,
+        found: &Found,
+        held: &Held,
+        search_frames: Vec<u32>,
+    ) -> Self {
         let path = 0..held.of_frame.len() as u32;
         let held_frames = path
             .filter(|frame| !search_frames.contains(frame))
@@ -78,8 +90,10 @@ impl AutoRecord {
             .collect();
         Self {
             budget: budget.to_string(),
+            objective,
+            schedule: Schedule::of(held).to_string(),
             chosen: (&found.chosen).into(),
-            reason: reason(budget, found, held),
+            reason: reason(budget, objective, found, held),
             search_frames,
             held_frames,
             fallbacks,
@@ -91,26 +105,35 @@ impl AutoRecord {
     }
 }
 
-fn reason(budget: Budget, found: &Found, held: &Held) -> String {
+fn reason(budget: Budget, objective: Objective, found: &Found, held: &Held) -> String {
     let (chosen, single) = (&found.chosen, &found.best_single);
+    let cost = match objective {
+        Objective::Time => format!("{:.1} ms", chosen.per_frame() * 1e3),
+        Objective::Energy => format!("{:.3} mJ", chosen.per_frame()),
+        _ => format!("{:.0} {}", chosen.per_frame(), objective.unit()),
+    };
+    let what = match objective {
+        Objective::Time => "frame time",
+        other => other.name(),
+    };
     let mut text = format!(
-        "of {} tried, {} takes {:.2} of the baseline's frame time ({:.1} ms) at an error of {:.4}",
+        "of {} tried, {} takes {:.3} of the baseline's {what} ({cost} a frame) at an error of {:.4}",
         found.tried.len(),
         chosen.row.name,
-        chosen.verdict.frame_time_ratio,
-        chosen.verdict.frame_s * 1e3,
+        chosen.ratio(),
         chosen.verdict.error,
     );
     text += &match budget {
-        Budget::Flip(limit) => format!(", FLIP; the search kept 0.8 of the budget {limit}"),
+        Budget::Flip(_) => ", FLIP".to_owned(),
         Budget::Pixels(limit) => format!(" px; every shift is at most {limit} px by construction"),
         Budget::BudgetMs(limit) => {
             format!(", FLIP: the least that fits {limit} ms on this device, not scaled")
         }
     };
     text += &format!(
-        "; the best single technique, {}, takes {:.2}",
-        single.row.name, single.verdict.frame_time_ratio
+        "; the best single technique, {}, takes {:.3}",
+        single.row.name,
+        single.ratio()
     );
     if found.finalists > 0 {
         text += &format!(
@@ -121,11 +144,10 @@ fn reason(budget: Budget, found: &Found, held: &Held) -> String {
     if let Some(elsewhere) = found.elsewhere {
         text += &format!(
             "; on frames that the search did not see {:.2} and {:.2}",
-            elsewhere.chosen, elsewhere.best_single
+            elsewhere.chosen.median, elsewhere.best_single.median
         );
         if elsewhere.overruled {
-            text +=
-                ", where what was cheapest before was not, and something simpler took its place";
+            text += ", where the quartiles of what was fastest before were not apart from something simpler, which took its place";
         }
     }
     let fallen = held.fallen_back().len();

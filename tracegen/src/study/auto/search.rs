@@ -1,18 +1,29 @@
 //! The search: each option alone, then the best with one more, as long as that pays.
 
-use super::Budget;
+use super::{Budget, Objective};
 use crate::study::rows::{Part, Row, Setting};
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 
 /// What a combination costs and shows on the frames of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Frame time over the baseline's beside it, each frame's shortest.
-    pub frame_time_ratio: f64,
-    /// Median frame time.
-    pub frame_s: f64,
+    /// Its cost; none where its error is beyond the budget before anything was counted.
+    pub cost: Option<Cost>,
     /// The worst frame's error, in the budget's unit.
     pub error: f64,
+}
+
+/// A cost in the objective's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Over the baseline's; of times, over those measured beside it, each frame's shortest.
+    pub ratio: f64,
+    /// Of a frame: the mean of counts, the median of times in seconds.
+    pub per_frame: f64,
+    /// Of a time that was measured several times over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread: Option<Spread>,
 }
 
 /// Whoever renders.
@@ -30,17 +41,63 @@ pub trait Judge {
     fn judge(&mut self, row: &Row) -> Result<Verdict, Self::Error>;
 
     /// Times the baseline, which comes first, and combinations that were judged, in turns, more often and as
-    /// exactly as can be: the ratio of each one's frame time to the baseline's.
+    /// exactly as can be: the ratio of each one's frame time to the baseline's, with its spread.
     ///
     /// # Errors
     /// Its own.
-    fn run_off(&mut self, rows: &[&Row]) -> Result<Vec<f64>, Self::Error>;
+    fn run_off(&mut self, rows: &[&Row]) -> Result<Vec<Spread>, Self::Error>;
 
     /// The same on frames of the path that the search did not see; none where there are none.
     ///
     /// # Errors
     /// Its own.
-    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> Result<Option<Vec<f64>>, Self::Error>;
+    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> Result<Option<Vec<Spread>>, Self::Error>;
+}
+
+/// A ratio of times that was measured several times over.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Lower quartile.
+    pub q1: f64,
+    /// Median.
+    pub median: f64,
+    /// Upper quartile.
+    pub q3: f64,
+}
+
+impl Spread {
+    /// The baseline over itself.
+    pub const ONE: Self = Self {
+        q1: 1.0,
+        median: 1.0,
+        q3: 1.0,
+    };
+
+    /// Of measured values.
+    ///
+    /// # Panics
+    /// Where there are none.
+    #[must_use]
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let last = values.len() - 1;
+        let at = |quarter: usize| {
+            let (whole, rest) = (quarter * last / 4, (quarter * last % 4) as f64 / 4.0);
+            let next = values[(whole + 1).min(last)];
+            values[whole] + rest * (next - values[whole])
+        };
+        Self {
+            q1: at(1),
+            median: at(2),
+            q3: at(3),
+        }
+    }
+
+    /// It is less, and not by noise: the quartiles are apart.
+    #[must_use]
+    pub fn is_less(&self, other: &Self) -> bool {
+        self.q3 < other.q1
+    }
 }
 
 /// A combination that was tried.
@@ -50,6 +107,30 @@ pub struct Tried {
     pub row: Row,
     /// What it costs and shows.
     pub verdict: Verdict,
+}
+
+impl Tried {
+    /// Its cost over the baseline's; infinite where it was not counted.
+    #[must_use]
+    pub fn ratio(&self) -> f64 {
+        self.verdict.cost.map_or(f64::INFINITY, |cost| cost.ratio)
+    }
+
+    /// Its cost a frame; infinite where it was not counted.
+    #[must_use]
+    pub fn per_frame(&self) -> f64 {
+        (self.verdict.cost).map_or(f64::INFINITY, |cost| cost.per_frame)
+    }
+
+    /// Counts rank exactly: the least cost, then the least error, then the fewest parts, then the name.
+    fn by_count(&self, other: &Self) -> Ordering {
+        let key = |tried: &Self| [tried.ratio(), tried.verdict.error];
+        let [a, b] = [key(self), key(other)];
+        (a[0].total_cmp(&b[0]))
+            .then(a[1].total_cmp(&b[1]))
+            .then(self.row.parts.len().cmp(&other.row.parts.len()))
+            .then_with(|| self.row.name.cmp(&other.row.name))
+    }
 }
 
 /// What the search found.
@@ -71,9 +152,9 @@ pub struct Found {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Elsewhere {
     /// Of the chosen combination.
-    pub chosen: f64,
+    pub chosen: Spread,
     /// Of the best single technique.
-    pub best_single: f64,
+    pub best_single: Spread,
     /// What was cheapest on the frames of the search was not here, and something simpler took its place.
     pub overruled: bool,
 }
@@ -94,22 +175,29 @@ const FINALISTS: usize = 4;
 /// An option that alone costs more than this over the baseline is not tried with others.
 const WORST_ALONE: f64 = 1.10;
 
-/// The best combination of `options` under a budget: alone, then the cheapest with one more option
-/// (or another one of the same kind) as long as that saves time; the cheapest few single ones and
-/// combinations are then timed again, in turns; what wins must win on frames that the search did not see, too, or
-/// gives way to the best single technique, and that to the baseline. Where time is bounded, errors are added only
-/// as long as the time is not kept.
+/// The best combination of `options` under a budget: alone, as listed in `combinations`, then the cheapest with one
+/// more option (or another one of the same kind) as long as that saves. Counts decide at once. Times are noisy: the
+/// cheapest few single ones and combinations are timed again, in turns; what wins must win on frames that the search
+/// did not see, too, or gives way to the best single technique, and that to the baseline. Where time is bounded,
+/// errors are added only as long as the time is not kept.
 ///
 /// # Errors
 /// The judge's; the inner result tells where nothing keeps the budget.
 pub fn search<J: Judge>(
     judge: &mut J,
     options: &[Part],
+    combinations: &[Row],
     budget: Budget,
+    objective: Objective,
 ) -> Result<Result<Found, Infeasible>, J::Error> {
+    let least_gain = match objective {
+        Objective::Time => LEAST_GAIN,
+        _ => 0.0,
+    };
     let mut search = Search {
         judge,
         tried: Vec::new(),
+        least_gain,
     };
     let baseline = search.try_row(Row::baseline())?;
     let mut alone = Vec::new();
@@ -123,25 +211,36 @@ pub fn search<J: Judge>(
         None => true,
     };
     alone.retain(fits_error);
-    alone.sort_by(|a, b| {
-        let ratio = |t: &Tried| t.verdict.frame_time_ratio;
-        ratio(a)
-            .total_cmp(&ratio(b))
-            .then_with(|| a.row.name.cmp(&b.row.name))
-    });
+    alone.sort_by(Tried::by_count);
     let best_single = match alone.first() {
-        Some(first) if saves(first, &baseline) => first.clone(),
+        Some(first) if search.saves(first, &baseline) => first.clone(),
         _ => baseline.clone(),
     };
-    alone.retain(|tried| tried.verdict.frame_time_ratio <= WORST_ALONE);
+    if objective == Objective::Time {
+        alone.retain(|tried| tried.ratio() <= WORST_ALONE);
+    }
     match budget {
         Budget::Flip(_) | Budget::Pixels(_) => {
-            search.descend(best_single, &alone, fits_error)?;
-            search.decide(fits_error).map(Ok)
+            for row in combinations {
+                let allowed = row.parts.iter().all(|part| options.contains(part));
+                if allowed && search.judge.can(row) {
+                    search.try_row(row.clone())?;
+                }
+            }
+            let start = (search.tried.iter().filter(|tried| fits_error(tried)))
+                .min_by(|a, b| a.by_count(b))
+                .filter(|best| objective != Objective::Time && search.saves(best, &best_single))
+                .unwrap_or(&best_single)
+                .clone();
+            search.descend(start, &alone, fits_error)?;
+            match objective {
+                Objective::Time => search.decide(fits_error).map(Ok),
+                _ => Ok(Ok(search.least(best_single, fits_error))),
+            }
         }
         Budget::BudgetMs(limit_ms) => {
             let limit_s = limit_ms / 1e3;
-            let fits = |tried: &Tried| tried.verdict.frame_s <= limit_s;
+            let fits = |tried: &Tried| tried.per_frame() <= limit_s;
             let (free, lossy): (Vec<Tried>, Vec<Tried>) =
                 alone.into_iter().partition(|tried| tried.row.lossless);
             let mut chosen = search.descend(baseline, &free, |_| true)?;
@@ -171,6 +270,8 @@ pub fn search<J: Judge>(
 struct Search<'a, J> {
     judge: &'a mut J,
     tried: Vec<Tried>,
+    /// Share of the cost that a combination must save to take the place of another.
+    least_gain: f64,
 }
 
 impl<J: Judge> Search<'_, J> {
@@ -198,7 +299,7 @@ impl<J: Judge> Search<'_, J> {
                     continue;
                 };
                 let candidate = self.try_row(row)?;
-                if fits(&candidate) && saves(&candidate, &best) {
+                if fits(&candidate) && self.saves(&candidate, &best) {
                     best = candidate;
                     improved = true;
                 }
@@ -209,6 +310,23 @@ impl<J: Judge> Search<'_, J> {
         }
     }
 
+    /// The cheapest of what was tried and fits, by counts.
+    fn least(self, best_single: Tried, fits: impl Fn(&Tried) -> bool) -> Found {
+        let fitting = self.tried.iter().filter(|tried| fits(tried));
+        let chosen = fitting.min_by(|a, b| a.by_count(b));
+        Found {
+            chosen: chosen.unwrap_or(&self.tried[0]).clone(),
+            best_single,
+            finalists: 0,
+            elsewhere: None,
+            tried: self.tried,
+        }
+    }
+
+    fn saves(&self, a: &Tried, b: &Tried) -> bool {
+        a.ratio() < b.ratio() * (1.0 - self.least_gain)
+    }
+
     /// Times the cheapest of what was tried and fits again, in turns: the cheapest is chosen, and of those
     /// that are as cheap the one of fewest parts.
     fn decide(mut self, fits: impl Fn(&Tried) -> bool) -> Result<Found, J::Error> {
@@ -216,7 +334,7 @@ impl<J: Judge> Search<'_, J> {
         let mut cheapest: Vec<usize> = (0..self.tried.len())
             .filter(|&i| self.tried[i].row.settings != baseline && fits(&self.tried[i]))
             .collect();
-        let ratio = |tried: &Tried| tried.verdict.frame_time_ratio;
+        let ratio = Tried::ratio;
         cheapest.sort_by(|&a, &b| ratio(&self.tried[a]).total_cmp(&ratio(&self.tried[b])));
         let (single, combined): (Vec<usize>, Vec<usize>) =
             (cheapest.into_iter()).partition(|&i| self.tried[i].row.parts.len() == 1);
@@ -229,29 +347,29 @@ impl<J: Judge> Search<'_, J> {
             .collect();
         let rows: Vec<&Row> = finalists.iter().map(|&i| &self.tried[i].row).collect();
         let ratios = self.judge.run_off(&rows)?;
-        for (&finalist, ratio) in finalists.iter().zip(ratios) {
-            let verdict = &mut self.tried[finalist].verdict;
-            verdict.frame_s *= ratio / verdict.frame_time_ratio;
-            verdict.frame_time_ratio = ratio;
-        }
-        // Simple ones first: a combination must save something over them to take their place.
-        let mut in_turn = finalists.clone();
-        in_turn.sort_by_key(|&i| (i != 0, self.tried[i].row.parts.len()));
-        let best_of = |most_parts: usize| {
-            let mut best = &self.tried[0];
-            for &i in &in_turn {
-                let tried = &self.tried[i];
-                let as_simple =
-                    tried.row.parts.len() == best.row.parts.len() && best.row.settings != baseline;
-                let cheaper = match as_simple {
-                    true => ratio(tried) < ratio(best),
-                    false => saves(tried, best),
-                };
-                if tried.row.parts.len() <= most_parts && cheaper {
-                    best = tried;
-                }
+        for (&finalist, spread) in finalists.iter().zip(&ratios) {
+            if let Some(cost) = &mut self.tried[finalist].verdict.cost {
+                cost.per_frame *= spread.median / cost.ratio;
+                cost.ratio = spread.median;
+                cost.spread = Some(*spread);
             }
-            best.clone()
+        }
+        // Of those whose quartiles overlap with the fastest's none can be said to be faster: the simplest of them.
+        let best_of = |most_parts: usize| {
+            let parts = |i: usize| match self.tried[i].row.settings == baseline {
+                true => 0,
+                false => self.tried[i].row.parts.len(),
+            };
+            let simple = finalists.iter().copied().zip(&ratios);
+            let simple = simple.filter(|(i, _)| parts(*i) <= most_parts);
+            let fastest = simple.clone().map(|(_, spread)| spread);
+            let fastest = fastest.min_by(|a, b| a.median.total_cmp(&b.median));
+            let open = simple.filter(|(_, spread)| fastest.is_some_and(|f| !f.is_less(spread)));
+            let best = open.min_by(|(a, of_a), (b, of_b)| {
+                let by_time = of_a.median.total_cmp(&of_b.median);
+                parts(*a).cmp(&parts(*b)).then(by_time)
+            });
+            self.tried[best.map_or(0, |(i, _)| i)].clone()
         };
         let (mut chosen, mut best_single) = (best_of(usize::MAX), best_of(1));
         let baseline = Row::baseline();
@@ -263,17 +381,20 @@ impl<J: Judge> Search<'_, J> {
         let elsewhere = times.map(|times| {
             let mut single = times[1];
             let mut winner = times.get(2).copied().unwrap_or(single);
-            let overruled = winner > single || single > 1.0;
-            if single > 1.0 {
-                (single, best_single) = (1.0, self.tried[0].clone());
+            let is_baseline = best_single.row.settings == baseline.settings;
+            let single_fails = !is_baseline && !single.is_less(&Spread::ONE);
+            if single_fails {
+                (single, best_single) = (Spread::ONE, self.tried[0].clone());
             }
-            if winner > single {
+            let is_single = times.len() < 3;
+            let winner_fails = !is_single && !winner.is_less(&single) || is_single && single_fails;
+            if winner_fails {
                 (winner, chosen) = (single, best_single.clone());
             }
             Elsewhere {
                 chosen: winner,
                 best_single: single,
-                overruled,
+                overruled: single_fails || winner_fails,
             }
         });
         Ok(Found {
@@ -319,11 +440,11 @@ impl<J: Judge> Search<'_, J> {
             if let Some(kept) = kept.min_by(|a, b| error(a).total_cmp(&error(b))) {
                 return Ok(kept.clone());
             }
-            let time = |(_, t): &(Setting, Tried)| t.verdict.frame_s;
+            let time = |(_, t): &(Setting, Tried)| t.per_frame();
             let fastest = candidates
                 .into_iter()
                 .min_by(|a, b| time(a).total_cmp(&time(b)));
-            let Some((taken, fastest)) = fastest.filter(|(_, fastest)| saves(fastest, &best))
+            let Some((taken, fastest)) = fastest.filter(|(_, fastest)| self.saves(fastest, &best))
             else {
                 return Ok(best);
             };
@@ -345,8 +466,4 @@ impl<J: Judge> Search<'_, J> {
         let new = Row::of(all).ok()?;
         (new.settings != row.settings && self.judge.can(&new)).then_some(new)
     }
-}
-
-fn saves(a: &Tried, b: &Tried) -> bool {
-    a.verdict.frame_time_ratio < b.verdict.frame_time_ratio * (1.0 - LEAST_GAIN)
 }

@@ -13,11 +13,21 @@ struct Made<'a> {
     noise: &'a [(&'a str, f64)],
     /// By what costs differ on frames that the search does not see.
     elsewhere: &'a [(&'a str, f64)],
+    /// Half of the distance of the quartiles of times that are measured again.
+    half_spread: f64,
     judged: usize,
     ran_off: Vec<String>,
 }
 
 impl Made<'_> {
+    fn spread(&self, median: f64) -> Spread {
+        Spread {
+            q1: median - self.half_spread,
+            median,
+            q3: median + self.half_spread,
+        }
+    }
+
     fn cost(&self, row: &Row) -> f64 {
         let known = |part: &Part| self.parts.iter().find(|(name, ..)| *name == part.name);
         row.parts
@@ -37,37 +47,36 @@ impl Judge for Made<'_> {
 
     fn judge(&mut self, row: &Row) -> Result<Verdict, Infallible> {
         self.judged += 1;
-        let mut verdict = Verdict {
-            frame_time_ratio: 1.0,
-            frame_s: 0.1,
-            error: 0.0,
-        };
-        for part in &row.parts {
-            let known = self.parts.iter().find(|(name, ..)| *name == part.name);
-            if let Some((.., error)) = known {
-                verdict.error += error;
-            }
-        }
+        let known = |part: &Part| self.parts.iter().find(|(name, ..)| *name == part.name);
+        let errors = row.parts.iter().filter_map(known).map(|(.., error)| error);
         let noise = self.noise.iter().find(|(name, _)| *name == row.name);
-        let cost = self.cost(row) * noise.map_or(1.0, |(_, factor)| *factor);
-        verdict.frame_time_ratio *= cost;
-        verdict.frame_s *= cost;
-        Ok(verdict)
+        let ratio = self.cost(row) * noise.map_or(1.0, |(_, factor)| *factor);
+        let per_frame = 0.1 * ratio;
+        Ok(Verdict {
+            cost: Some(Cost {
+                ratio,
+                per_frame,
+                spread: None,
+            }),
+            error: errors.sum(),
+        })
     }
 
-    fn run_off(&mut self, rows: &[&Row]) -> Result<Vec<f64>, Infallible> {
+    fn run_off(&mut self, rows: &[&Row]) -> Result<Vec<Spread>, Infallible> {
         assert_eq!(rows[0].settings, Row::baseline().settings);
         self.ran_off = rows.iter().map(|row| row.name.clone()).collect();
-        Ok(rows.iter().map(|row| self.cost(row)).collect())
+        Ok(rows.iter().map(|row| self.spread(self.cost(row))).collect())
     }
 
-    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> Result<Option<Vec<f64>>, Infallible> {
+    fn run_off_elsewhere(&mut self, rows: &[&Row]) -> Result<Option<Vec<Spread>>, Infallible> {
         assert_eq!(rows[0].settings, Row::baseline().settings);
         let factor = |row: &Row| {
             let known = self.elsewhere.iter().find(|(name, _)| *name == row.name);
             known.map_or(1.0, |(_, factor)| *factor)
         };
-        let times = rows.iter().map(|row| self.cost(row) * factor(row));
+        let times = rows
+            .iter()
+            .map(|row| self.spread(self.cost(row) * factor(row)));
         Ok(Some(times.collect()))
     }
 }
@@ -83,6 +92,22 @@ fn found(parts: &[(&str, f64, f64)], budget: Budget) -> Result<Found, Infeasible
     found_in_noise(parts, &[], &[], budget)
 }
 
+fn found_by_counts(parts: &[(&str, f64, f64)], budget: Budget) -> Found {
+    let options: Vec<Part> = parts.iter().map(|(name, ..)| part(name)).collect();
+    let mut made = Made {
+        parts,
+        noise: &[],
+        elsewhere: &[],
+        half_spread: 0.0,
+        judged: 0,
+        ran_off: Vec::new(),
+    };
+    let combinations = Row::combinations();
+    let found = search(&mut made, &options, &combinations, budget, Objective::Bytes).unwrap();
+    assert!(made.ran_off.is_empty(), "counts need no second look");
+    found.unwrap()
+}
+
 fn found_in_noise(
     parts: &[(&str, f64, f64)],
     noise: &[(&str, f64)],
@@ -94,10 +119,11 @@ fn found_in_noise(
         parts,
         noise,
         elsewhere,
+        half_spread: 0.004,
         judged: 0,
         ran_off: Vec::new(),
     };
-    let found = search(&mut made, &options, budget).unwrap();
+    let found = search(&mut made, &options, &[], budget, Objective::Time).unwrap();
     if let Ok(found) = &found {
         assert_eq!(found.tried.len(), made.judged, "nothing is judged twice");
         assert_eq!(found.finalists, made.ran_off.len());
@@ -122,9 +148,39 @@ fn the_cheapest_inside_the_error_budget_is_chosen_and_no_dearer_than_the_best_si
     let tight = found(COSTS, Budget::Flip(0.02)).unwrap();
     assert_eq!(tight.chosen.row.name, "round-robin");
     for found in [strict, loose, tight] {
-        let cost = |tried: &Tried| tried.verdict.frame_time_ratio;
+        let cost = Tried::ratio;
         assert!(cost(&found.chosen) <= cost(&found.best_single));
     }
+}
+
+#[test]
+fn counts_choose_the_cheapest_of_all_that_fit_however_little_it_saves() {
+    let costs = [
+        ("superfrustum", 0.999, 0.0),
+        ("hidden-area-mask", 0.9, 0.0),
+        ("far-field", 0.8, 0.02),
+        ("foveation-rings", 0.5, 0.2),
+    ];
+    let found = found_by_counts(&costs, Budget::Flip(0.01));
+    assert_eq!(found.chosen.row.parts.len(), 2, "{}", found.chosen.row.name);
+    assert!((found.chosen.ratio() - 0.999 * 0.9).abs() < 1e-12);
+    assert_eq!(found.best_single.row.name, "hidden-area-mask");
+    // Nothing that was tried and fits is cheaper, or as cheap with less error.
+    for limit in [0.0, 0.01, 0.02, 0.2, 0.3] {
+        let found = found_by_counts(&costs, Budget::Flip(limit));
+        let of = |tried: &Tried| [tried.ratio(), tried.verdict.error];
+        let [cost, error] = of(&found.chosen);
+        for tried in &found.tried {
+            let [other_cost, other_error] = of(tried);
+            let fits = tried.row.lossless || other_error <= limit;
+            let better = other_cost < cost || other_cost == cost && other_error < error;
+            assert!(!(fits && better), "{limit}: {}", tried.row.name);
+        }
+    }
+    // Of equal costs, the one with less error, then the simpler one.
+    let equal = [("far-field", 0.8, 0.02), ("superfrustum", 0.8, 0.0)];
+    let found = found_by_counts(&equal[..], Budget::Flip(0.001));
+    assert_eq!(found.chosen.row.name, "superfrustum");
 }
 
 #[test]
@@ -138,11 +194,11 @@ fn what_a_single_timing_flatters_does_not_win() {
     let noise = [("round-robin", 0.8), ("hidden-area-mask", 1.08)];
     let found = found_in_noise(&costs, &noise, &[], Budget::Flip(0.01)).unwrap();
     assert_eq!(found.best_single.row.name, "hidden-area-mask");
-    assert!((found.best_single.verdict.frame_time_ratio - 0.9).abs() < 1e-12);
-    let cost = |tried: &Tried| tried.verdict.frame_time_ratio;
+    assert!((found.best_single.ratio() - 0.9).abs() < 1e-12);
+    let cost = Tried::ratio;
     assert!(cost(&found.chosen) <= cost(&found.best_single));
     // Times and their ratio stay together.
-    assert!((found.best_single.verdict.frame_s - 0.09).abs() < 1e-12);
+    assert!((found.best_single.per_frame() - 0.09).abs() < 1e-12);
 }
 
 #[test]
@@ -157,17 +213,17 @@ fn what_wins_on_the_frames_of_the_search_alone_gives_way_to_something_simpler() 
         combination.contains('+') && !here.overruled,
         "{combination}"
     );
-    assert!(here.chosen < here.best_single);
+    assert!(here.chosen.is_less(&here.best_single));
     let (single, here) = won(&[(&combination, 1.2)]);
     assert_eq!(single, "conical");
     assert!(here.overruled && here.chosen == here.best_single);
     // A single technique that wins the search runs once, not against itself.
     let (single, here) = won(&[(&combination, 1.2), ("conical", 0.9)]);
     assert_eq!(single, "conical");
-    assert!(here.chosen < 0.8 && here.chosen == here.best_single);
+    assert!(here.chosen.median < 0.8 && here.chosen == here.best_single);
     let (none, here) = won(&[(&combination, 1.6), ("conical", 1.3)]);
     assert_eq!(none, Row::baseline().name);
-    assert!(here.overruled && here.chosen == 1.0);
+    assert!(here.overruled && here.chosen.median == 1.0);
 }
 
 #[test]
@@ -179,6 +235,26 @@ fn a_combination_that_saves_nothing_over_a_part_of_it_is_not_chosen() {
     ];
     let found = found_in_noise(&costs, &noise, &[], Budget::Flip(0.01)).unwrap();
     assert_eq!(found.chosen.row.name, "conical");
+}
+
+#[test]
+fn times_whose_quartiles_overlap_tell_nothing_apart() {
+    let of = |values: &[f64]| Spread::of(values.to_vec());
+    let [slow, fast, between] = [
+        &[0.9, 0.9, 0.92, 0.95, 0.95],
+        &[0.7, 0.8, 0.8, 0.85, 0.9],
+        &[0.8, 0.8, 0.9, 0.9, 1.0],
+    ]
+    .map(|v| of(v));
+    assert_eq!((fast.q1, fast.median, fast.q3), (0.8, 0.8, 0.85));
+    assert!(fast.is_less(&slow) && !slow.is_less(&fast));
+    assert!(!fast.is_less(&between) && !between.is_less(&slow));
+    // 0.5 % are less than the quartiles' distance of 0.8 %: the simpler one, and the baseline where that is it.
+    let costs = [("conical", 0.8, 0.0), ("hidden-area-mask", 0.993, 0.0)];
+    let found = found_in_noise(&costs, &[], &[], Budget::Flip(0.01)).unwrap();
+    assert_eq!(found.chosen.row.name, "conical");
+    let found = found_in_noise(&[("conical", 0.995, 0.0)], &[], &[], Budget::Flip(0.01)).unwrap();
+    assert_eq!(found.chosen.row.name, Row::baseline().name);
 }
 
 #[test]

@@ -129,6 +129,7 @@ pub(super) fn capture_skipping(
             frames: vec![views.clone()],
             surfaces: Some(draws.surfaces(fragments)),
             origin_m: [0.0; 3],
+            techniques: None,
         },
         textures,
         samplers,

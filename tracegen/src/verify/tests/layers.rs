@@ -2,7 +2,9 @@
 
 use super::*;
 use formats::view::TILE_SIZE_PX;
+use techniques::distance::DistanceCull;
 use techniques::gaze::Gaze;
+use techniques::hidden_mesh::HiddenMesh;
 use techniques::settings::{Foveation, FoveationKind, Rates};
 
 const KINDS: [FoveationKind; 3] = [
@@ -142,8 +144,19 @@ fn a_masked_picture_has_every_pixel_of_the_lens_and_no_tile_outside_it() {
 fn a_surface_over_the_whole_view_has_a_fragment_for_each_pixel_that_may_be_shaded() {
     let scene = wall(0.3, [glowing(0.2), glowing(0.5)]);
     let pictures_px = 2.0 * (SIZE_PX[0] * SIZE_PX[1]) as f32;
-    let mut all = vec![masked()];
-    for kind in KINDS {
+    let halves = [
+        [[0.0, 0.0], [0.5, 0.0], [0.5, 1.0]],
+        [[0.0, 0.0], [0.5, 1.0], [0.0, 1.0]],
+    ];
+    let half_hidden = Settings {
+        hidden_area_mesh: Some(HiddenMesh {
+            left: halves.into(),
+            right: Vec::new(),
+        }),
+        ..Settings::default()
+    };
+    let mut all = vec![masked(), half_hidden];
+    for kind in KINDS.into_iter().chain([FoveationKind::LensMatched]) {
         all.push(foveated(kind, [10.0, 20.0, 30.0, 40.0]));
         all.push(Settings {
             hidden_area_mask: true,
@@ -263,4 +276,68 @@ fn layers_captured_in_parts_give_the_same_trace() {
         assert!(parts.trace == whole.trace);
         assert!(parts.pictures == whole.pictures);
     }
+}
+
+#[test]
+fn a_lens_matched_picture_is_the_baselines_but_for_its_resolution() {
+    // Light that changes slowly: what a coarser grid interpolates is what it was.
+    let scene = wall(20.0, [glowing(0.4), glowing(0.4)]);
+    let whole = capture(&scene, SIZE_PX, 0, BUDGET);
+    let matched = capture_with(
+        &foveated(FoveationKind::LensMatched, [15.0, 25.0, 35.0, 45.0]),
+        &scene,
+        SIZE_PX,
+    );
+    for (a, b) in whole.pictures.iter().zip(&matched.pictures) {
+        for at in pixels() {
+            let (a, b) = (pixel(a, at), pixel(b, at));
+            assert!(
+                a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 1),
+                "{at:?}: {a:?} {b:?}"
+            );
+        }
+    }
+    // An edge stays where it is: at most a coarse pixel off.
+    let edge = wall(0.3, [glowing(0.9), glowing(0.0)]);
+    let (whole, matched) = (
+        capture(&edge, SIZE_PX, 0, BUDGET),
+        capture_with(
+            &foveated(FoveationKind::LensMatched, [15.0, 25.0, 35.0, 45.0]),
+            &edge,
+            SIZE_PX,
+        ),
+    );
+    for (a, b) in whole.pictures.iter().zip(&matched.pictures) {
+        for y in 0..SIZE_PX[1] {
+            let edge = |picture: &[u8]| (0..SIZE_PX[0]).find(|x| pixel(picture, [*x, y])[0] < 128);
+            let (a, b) = (edge(a).unwrap(), edge(b).unwrap());
+            assert!(a.abs_diff(b) <= 2, "row {y}: {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn what_is_beyond_the_cull_distance_is_not_there() {
+    let near = wall(0.3, [glowing(0.9), glowing(0.2)]);
+    let mut both = near.clone();
+    both.meshes[0]
+        .positions
+        .iter_mut()
+        .for_each(|at| at.z = -20.0);
+    let mut only = both.clone();
+    // The nearer half alone.
+    only.instances.remove(0);
+    let culled = |limit| Settings {
+        distance_cull: Some(limit),
+        ..Settings::default()
+    };
+    let all = capture(&both, SIZE_PX, 0, BUDGET);
+    let expected = capture(&only, SIZE_PX, 0, BUDGET);
+    let far = capture_with(&culled(DistanceCull::Metres(10.0)), &both, SIZE_PX);
+    assert_eq!(far.pictures, expected.pictures);
+    assert_eq!(far.counts.fragments, expected.counts.fragments);
+    assert!(far.counts.fragments < all.counts.fragments);
+    // Both halves are larger than a pixel, and none is larger than the world.
+    let kept = capture_with(&culled(DistanceCull::Pixels(1.0)), &both, SIZE_PX);
+    assert_eq!(kept.pictures, all.pictures);
 }

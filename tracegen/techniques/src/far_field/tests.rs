@@ -158,7 +158,11 @@ fn parallel_eyes_have_the_split_and_the_shift_of_the_published_formulae() {
         .view(split_m, 8192)
         .unwrap();
     let unshifted = plain.view(split_m, 8192).unwrap();
-    let ndc_shift = 1.0 / tangent * (ipd_m / 2.0) / split_m;
+    // The plane of the shift lies at twice the split, which halves both the split and the largest error.
+    let ndc_shift = 1.0 / tangent * (ipd_m / 2.0) / (2.0 * split_m);
+    let of_shift = Stereo::new(&pair, [1024, 1024], Variant::DepthShift, 0);
+    assert!((of_shift.split_m(1.0) / plain.split_m(1.0) - 0.5).abs() < 1e-6);
+    assert!((shifted.worst_shift_px / unshifted.worst_shift_px - 0.5).abs() < 1e-6);
     for (eye, sign) in [(0, -1.0), (1, 1.0)] {
         let px = DVec2::new(300.5, 200.5);
         let moved = through(&shifted.far_from_eye_px[eye], px)

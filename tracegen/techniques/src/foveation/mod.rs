@@ -4,6 +4,7 @@
 //! display with fewer pixels: its derivatives span more texels, and coarser mip levels follow by themselves.
 
 pub(crate) mod acuity;
+pub mod lens_matched;
 pub(crate) mod multi_resolution;
 pub(crate) mod radial_density;
 pub(crate) mod rings;

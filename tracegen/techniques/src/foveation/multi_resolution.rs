@@ -65,6 +65,14 @@ fn viewport(
     high: [u32; 2],
     coarseness: [u32; 2],
 ) -> Patch {
+    let owned = Mask::new(picture.tiles(), |x, y| {
+        let [first, _] = picture.tile_px([x, y]);
+        (0..2).all(|axis| (low[axis]..high[axis]).contains(&first[axis]))
+    });
+    if coarseness == [1, 1] {
+        // With the eye's own projection: one that is narrowed rounds otherwise, which moves edges.
+        return Patch::of_tiles(picture, number, coarseness, owned);
+    }
     // A whole pixel of the layer beyond each edge at which it is interpolated and has a neighbour.
     let border = coarseness.map(|n| if n > 1 { n } else { 0 });
     let origin_px = [0, 1].map(|axis: usize| low[axis].saturating_sub(border[axis]));
@@ -74,15 +82,8 @@ fn viewport(
         origin_px,
         coarseness,
         size_px: [0, 1].map(|axis| (end[axis] - origin_px[axis]).div_ceil(coarseness[axis])),
-        tiles: Some(Arc::new(Mask::new(picture.tiles(), |x, y| {
-            let [first, _] = picture.tile_px([x, y]);
-            (0..2).all(|axis| (low[axis]..high[axis]).contains(&first[axis]))
-        }))),
-        filter: if coarseness == [1, 1] {
-            Filter::Copy
-        } else {
-            Filter::Bilinear
-        },
+        tiles: Some(Arc::new(owned)),
+        filter: Filter::Bilinear,
         ..Patch::whole(picture, None)
     };
     let mask = picture.lens.map(|_| {

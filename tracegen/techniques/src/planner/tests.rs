@@ -1,8 +1,10 @@
 use super::*;
+use crate::Mask;
 use crate::gaze::Gaze;
+use crate::hidden_mesh::HiddenMesh;
 use crate::layer::Layer;
 use crate::plan::{Filter, Part};
-use crate::settings::{FarField, Foveation, Rates, Split, Variant};
+use crate::settings::{FarField, Foveation, Rates, Reprojection, Split, Variant};
 use formats::view::{EyeView, FovTangents};
 
 const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
@@ -53,6 +55,7 @@ fn all() -> Vec<Settings> {
         FoveationKind::Rings,
         FoveationKind::MultiResolution,
         FoveationKind::RadialDensity,
+        FoveationKind::LensMatched,
     ] {
         for gaze in [[0.0, 0.0], [-40.0, 30.0]] {
             for masked in [false, true] {
@@ -67,6 +70,17 @@ fn all() -> Vec<Settings> {
 fn taps(part: &Part, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
     let own = [0, 1].map(|axis: usize| pixel[axis] - part.origin_px[axis]);
     match part.filter {
+        Filter::Projective => {
+            let [x, y] = pixel.map(|px| f64::from(px) + 0.5);
+            let at = part.layer_from_px.unwrap() * glam::DVec3::new(x, y, 1.0);
+            let axis = |axis: usize| {
+                let first = ([at.x, at.y][axis] / at.z - 0.5).floor();
+                let last = f64::from(layer.size_px[axis] - 1);
+                [first, first + 1.0].map(|tap| tap.clamp(0.0, last) as u32)
+            };
+            let ([x0, x1], [y0, y1]) = (axis(0), axis(1));
+            vec![[x0, y0], [x1, y0], [x0, y1], [x1, y1]]
+        }
         Filter::Copy => vec![own],
         Filter::FillQuads if layer.mask.as_ref().is_some_and(|m| m.get(own[0], own[1])) => {
             vec![own]
@@ -117,6 +131,7 @@ fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
                         coarseness: [1, 1],
                         tiles: None,
                         filter: Filter::Copy,
+                        layer_from_px: None,
                     }],
                     Picture::Composed { parts, .. } => parts.clone(),
                 };
@@ -181,9 +196,16 @@ fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
                 let layer = &plan.layers[part.layer];
                 for corner in [[0, 0], layer.size_px] {
                     // A point in the picture's pixels, and the same in the layer's.
-                    let px = [0, 1].map(|axis: usize| {
-                        f64::from(part.origin_px[axis] + corner[axis] * part.coarseness[axis])
-                    });
+                    let px = match &part.layer_from_px {
+                        None => [0, 1].map(|axis: usize| {
+                            f64::from(part.origin_px[axis] + corner[axis] * part.coarseness[axis])
+                        }),
+                        Some(map) => {
+                            let [x, y] = corner.map(f64::from);
+                            let at = map.inverse() * glam::DVec3::new(x, y, 1.0);
+                            [at.x / at.z, at.y / at.z]
+                        }
+                    };
                     let ndc = |px: [f64; 2], size: [u32; 2]| {
                         let [x, y] = [px[0] / f64::from(size[0]), px[1] / f64::from(size[1])];
                         glam::Vec2::new((2.0 * x - 1.0) as f32, (1.0 - 2.0 * y) as f32)
@@ -341,4 +363,79 @@ fn the_layers_of_a_gaze_that_stays_are_made_once() {
                 .is_some_and(|(a, b)| Arc::ptr_eq(a, b))
         );
     }
+}
+
+#[test]
+fn a_headsets_mesh_masks_a_picture_in_place_of_the_lens() {
+    let hmd = hmd([128, 96]);
+    // The left half of the left eye's picture, and the lower half of the right eye's.
+    let rectangle = |x: f32, y: f32| {
+        let [a, b, c, d] = [[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]];
+        vec![[a, b, c], [a, c, d]]
+    };
+    let settings = Settings {
+        hidden_area_mesh: Some(HiddenMesh {
+            left: rectangle(0.5, 1.0),
+            right: rectangle(1.0, 0.5),
+        }),
+        ..Settings::default()
+    };
+    let made = plan(&settings, &hmd);
+    assert_eq!(made.pictures, [Picture::Layer(0), Picture::Layer(1)]);
+    for (layer, shown) in made.layers.iter().zip([
+        (|x, _| x >= 64) as fn(u32, u32) -> bool,
+        // Rows count downwards, the mesh upwards.
+        |_, y| y < 48,
+    ]) {
+        let expected = Mask::new([128, 96], shown);
+        assert_eq!(layer.mask.as_deref(), Some(&expected));
+    }
+    assert_eq!(made.predicted.shaded_share, Some(0.5));
+    // Rings leave out the same tiles.
+    let rings = Settings {
+        foveation: foveated(FoveationKind::Rings, [0.0; 2], false).foveation,
+        ..settings
+    };
+    let drawn = |settings: &Settings| plan(settings, &hmd).predicted.rate_share.unwrap();
+    let unmasked = foveated(FoveationKind::Rings, [0.0; 2], false);
+    assert!(drawn(&rings) < 0.6 * drawn(&unmasked));
+}
+
+#[test]
+fn at_half_rate_every_other_frame_has_no_layers() {
+    let hmd = hmd([64, 64]);
+    let settings = Settings {
+        half_rate: Some(Reprojection::Rotation),
+        ..Settings::default()
+    };
+    let lenses = hmd.fov.map(|fov| Lens::of(&fov));
+    let planner = Planner::new(&settings, &hmd, lenses, BOTH, 72.0).unwrap();
+    let layers = |frame| {
+        let views = FrameViews {
+            frame,
+            ..FrameViews::default()
+        };
+        planner.plan(&views, Vec::new).unwrap().layers.len()
+    };
+    assert_eq!([0, 1, 2, 3].map(layers), [2, 0, 2, 0]);
+}
+
+#[test]
+fn views_at_once_need_a_depth_buffer_each_and_passes_in_turn_share_one() {
+    let hmd = hmd([100, 80]);
+    let view = 4 * 100 * 80;
+    let baseline = plan(&Settings::default(), &hmd);
+    let bytes = |plan: &FramePlan, at_once| {
+        let bytes = plan.target_bytes(at_once);
+        (bytes.color, bytes.depth)
+    };
+    assert_eq!(bytes(&baseline, false), (2 * view, view));
+    assert_eq!(bytes(&baseline, true), (2 * view, 2 * view));
+    // Composed pictures are there beside their layers, and the largest layer lends its depth.
+    let rings = plan(&foveated(FoveationKind::Rings, [0.0; 2], false), &hmd);
+    let layers: u64 = (rings.layers.iter())
+        .map(|layer| 4 * u64::from(layer.size_px[0]) * u64::from(layer.size_px[1]))
+        .sum();
+    assert_eq!(bytes(&rings, false), (layers + 2 * view, view));
+    assert_eq!(FramePlan::default().target_bytes(true), Default::default());
 }

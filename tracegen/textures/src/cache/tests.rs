@@ -1,6 +1,7 @@
 //! Hits, damage, sharing and bounds.
 
 use super::*;
+use std::fs::File;
 use std::os::unix::fs::PermissionsExt;
 
 fn key(n: u8) -> Key {

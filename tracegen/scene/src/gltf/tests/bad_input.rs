@@ -265,6 +265,43 @@ fn a_huge_image_in_a_small_file_is_refused_before_it_is_decoded() {
     files.fails_with(&["my image.png", "16384x16384", "bytes of texels"]);
 }
 
+#[test]
+fn many_small_images_are_refused_before_one_is_decoded() {
+    // 1024x1024 in 1-bit grey, of which the header alone is there: 4 MiB of texels each.
+    let mut image = png([1, 1], [0; 4]);
+    image[16..24].copy_from_slice(&[0, 0, 4, 0, 0, 0, 4, 0]);
+    image[24..26].copy_from_slice(&[1, 0]);
+    let checksum = crc(&image[12..29]);
+    image[29..33].copy_from_slice(&checksum.to_be_bytes());
+    let scene = |count: usize| {
+        let images: Vec<Value> = (0..count)
+            .map(|i| json!({"uri": format!("{i}.png")}))
+            .collect();
+        let numbers: Vec<Value> = (0..count).map(|i| json!({"source": i})).collect();
+        let materials: Vec<Value> = (0..count)
+            .map(|i| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}}))
+            .collect();
+        let primitives: Vec<Value> = (0..count)
+            .map(|i| json!({"attributes": {"POSITION": 0}, "indices": 1, "material": i}))
+            .collect();
+        let json = with(base(), "/images", json!(images));
+        let json = with(json, "/textures", json!(numbers));
+        let json = with(json, "/materials", json!(materials));
+        let files = Files::new(&with(json, "/meshes/0/primitives", json!(primitives)));
+        for i in 0..count {
+            files.write(&format!("{i}.png"), &image);
+        }
+        files
+    };
+    assert!(scene(128).load().is_ok());
+    scene(129).fails_with(&[
+        "128.png",
+        "images[128], used by materials[128]",
+        "at most 536870912 bytes of texels in all images",
+        "541065216 bytes with this image of 1024x1024, number 129 of 129",
+    ]);
+}
+
 /// CRC-32 as PNG has it.
 fn crc(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0u32, |crc, &byte| {

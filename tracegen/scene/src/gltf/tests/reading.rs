@@ -256,7 +256,7 @@ fn points_and_lines_are_skipped_with_a_warning() {
     let loaded = Files::new(&json).load().unwrap();
     assert_eq!(loaded.scene.triangle_count(), 1);
     assert!(
-        loaded.warnings[0].contains("Lines"),
+        loaded.warnings[0].contains("holds lines, not triangles"),
         "{:?}",
         loaded.warnings
     );

@@ -1,0 +1,113 @@
+//! An allocation that fails ends the program with a message and exit code 2.
+//!
+//! Rust's collections abort where memory ends, and some libraries panic. The allocator notes that an allocation failed, so that
+//! the handler of SIGABRT and the panic hook can tell this end from that of a broken assumption.
+
+use anyhow::Context;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Bytes of the allocation that failed last, 0 where none has.
+static FAILED_BYTES: AtomicUsize = AtomicUsize::new(0);
+
+/// The system's allocator, which the programs use: it notes what it cannot give.
+#[derive(Clone, Copy, Debug)]
+pub struct Allocator;
+
+fn noted(pointer: *mut u8, bytes: usize) -> *mut u8 {
+    if pointer.is_null() {
+        FAILED_BYTES.store(bytes, Ordering::Relaxed);
+    }
+    pointer
+}
+
+// SAFETY: every call goes to the system's allocator as it is.
+unsafe impl GlobalAlloc for Allocator {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller keeps the contract of `alloc`.
+        noted(unsafe { System.alloc(layout) }, layout.size())
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller keeps the contract of `alloc_zeroed`.
+        noted(unsafe { System.alloc_zeroed(layout) }, layout.size())
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
+        // SAFETY: the caller keeps the contract of `realloc`.
+        noted(unsafe { System.realloc(pointer, layout, bytes) }, bytes)
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller keeps the contract of `dealloc`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+/// Turns an abort or a panic for want of memory into a message and exit code 2; any other one stays what it is.
+///
+/// # Errors
+/// The system refuses the handler.
+#[cfg(unix)]
+pub(crate) fn explain_aborts() -> anyhow::Result<()> {
+    // SAFETY: the handler allocates nothing and takes no lock: it formats a number into its own stack,
+    // writes it to a descriptor and leaves.
+    let registered = unsafe {
+        signal_hook::low_level::register(signal_hook::consts::SIGABRT, || {
+            let bytes = FAILED_BYTES.load(Ordering::Relaxed);
+            if bytes > 0 {
+                tell_and_leave(bytes);
+            }
+        })
+    };
+    registered.context("cannot handle signals")?;
+    let default_hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        let bytes = FAILED_BYTES.load(Ordering::Relaxed);
+        // A refusal that was handled may lie long back: what counts is that the memory is missing now.
+        if bytes > 0 && Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+            tell_and_leave(bytes);
+        }
+        default_hook(info);
+    }));
+    Ok(())
+}
+
+/// Ends the program, without an allocation.
+#[cfg(unix)]
+fn tell_and_leave(bytes: usize) {
+    let mut text = [0; 160];
+    let left = write_message(&mut text, bytes);
+    let length = text.len() - left;
+    let _untold = rustix::io::write(std::io::stderr(), &text[..length]);
+    signal_hook::low_level::exit(super::program::USAGE.into());
+}
+
+/// Nothing to do where there are no signals.
+#[cfg(not(unix))]
+pub(crate) fn explain_aborts() -> anyhow::Result<()> {
+    Ok(())
+}
+
+/// Writes the message; returns how many bytes of the text are left.
+#[cfg(unix)]
+fn write_message(text: &mut [u8], bytes: usize) -> usize {
+    use std::io::Write;
+    let mut rest = text;
+    let _fits = writeln!(
+        rest,
+        "error: not enough memory: {bytes} bytes more were refused (the machine's memory, or ulimit -v)"
+    );
+    rest.len()
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    #[test]
+    fn the_largest_number_fits_the_message() {
+        let mut text = [0; 160];
+        let left = super::write_message(&mut text, usize::MAX);
+        let text = std::str::from_utf8(&text[..160 - left]).unwrap();
+        assert!(text.contains("18446744073709551615 bytes") && text.ends_with("ulimit -v)\n"));
+    }
+}

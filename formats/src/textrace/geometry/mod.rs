@@ -1,0 +1,168 @@
+//! What a trace says of geometry: the vertices that draws read, and the primitives that enter each tile before any depth test.
+//!
+//! Optional: a trace without it serves every replay of texture accesses.
+
+mod lists;
+mod read;
+#[cfg(test)]
+pub(crate) mod tests;
+mod write;
+
+pub use lists::TileLists;
+pub(super) use read::{lists_of, read};
+pub(super) use write::Spool;
+
+use super::{Pass, Tables};
+use crate::container::ChunkTag;
+use crate::error::{Broken, ensure};
+use crate::tiles::TileSpan;
+use crate::view::TILE_SIZE_PX;
+
+/// Meshes, and the mesh of each draw.
+pub const GEOMETRY: ChunkTag = ChunkTag(*b"GEOM");
+/// The primitive lists of all views.
+pub const PRIMITIVE_LISTS: ChunkTag = ChunkTag(*b"PLST");
+/// Where the lists of each view are.
+pub const LIST_INDEX: ChunkTag = ChunkTag(*b"PLIX");
+/// Minor version from which on a trace may have geometry.
+pub const GEOMETRY_MINOR: u16 = 2;
+/// Bytes of a mesh without its indices.
+pub const MESH_BYTES: usize = 12;
+/// Bytes of an entry of the list index.
+pub const LIST_INDEX_ENTRY_BYTES: usize = 36;
+/// Largest width and height of a view in pixels.
+const MOST_PIXELS: u32 = 16384;
+
+/// The triangles of a mesh as a driver reads them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MeshGeometry {
+    /// Vertices in the vertex buffer.
+    pub vertices: u32,
+    /// Bytes from one vertex to the next.
+    pub vertex_bytes: u16,
+    /// Bytes of an index, 2 or 4.
+    pub index_bytes: u16,
+    /// Three vertices for each triangle, in the order of the draw's primitives.
+    pub indices: Vec<u32>,
+}
+
+/// What a view renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ViewTarget {
+    /// A pass of the trace.
+    Pass(u32),
+    /// A shadow map, by the number of its cascade.
+    ShadowMap(u32),
+}
+
+/// A view of a frame, for which there are primitive lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GeometryView {
+    /// Number of the frame.
+    pub frame: u32,
+    /// What it renders.
+    pub target: ViewTarget,
+    /// Width and height in pixels.
+    pub size_px: [u32; 2],
+}
+
+impl GeometryView {
+    /// Tile columns and rows.
+    #[must_use]
+    pub fn tiles(&self) -> [u32; 2] {
+        self.size_px.map(|size| size.div_ceil(TILE_SIZE_PX))
+    }
+
+    /// Number of tiles.
+    #[must_use]
+    pub fn tile_count(&self) -> usize {
+        let [columns, rows] = self.tiles().map(|tiles| tiles as usize);
+        columns * rows
+    }
+
+    fn check(&self, tables: &Tables) -> Result<(), Broken> {
+        let frames = &tables.meta.frames;
+        let fits = (self.size_px.iter()).all(|size| (1..=MOST_PIXELS).contains(size))
+            && frames.iter().any(|views| views.frame == self.frame)
+            && match self.target {
+                ViewTarget::ShadowMap(_) => true,
+                ViewTarget::Pass(pass) => {
+                    (tables.passes.get(pass as usize)).is_some_and(|pass: &Pass| {
+                        (pass.frame, pass.size_px) == (self.frame, self.size_px)
+                    })
+                }
+            };
+        ensure(fits, || {
+            Broken::new(
+                "view",
+                format!(
+                    "a pass of the trace with its frame and size, or a shadow map of 1 to {MOST_PIXELS} pixels of one of its frames"
+                ),
+                format_args!("{self:?}"),
+            )
+        })
+    }
+}
+
+/// Meshes, the mesh of each draw, and the views for which there are primitive lists.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Geometry {
+    /// The meshes.
+    pub meshes: Vec<MeshGeometry>,
+    /// Mesh of each draw of the draw table.
+    pub draw_meshes: Vec<u32>,
+    /// The views, in the order in which they are rendered.
+    pub views: Vec<GeometryView>,
+    /// Where the lists of each view lie.
+    pub(super) spans: Vec<TileSpan>,
+}
+
+impl Geometry {
+    /// Checks meshes and draws against the tables.
+    fn check_meshes(&self, tables: &Tables) -> Result<(), Broken> {
+        for (number, mesh) in self.meshes.iter().enumerate() {
+            let fits = matches!(mesh.index_bytes, 2 | 4)
+                && mesh.vertex_bytes > 0
+                && mesh.indices.len().is_multiple_of(3)
+                && mesh.indices.iter().all(|index| *index < mesh.vertices);
+            ensure(fits, || {
+                Broken::new(
+                    format!("mesh {number}"),
+                    "indices of 2 or 4 bytes, three for each triangle, below the number of vertices; vertices of at least 1 byte",
+                    format_args!(
+                        "{} indices of {} bytes, {} vertices of {} bytes",
+                        mesh.indices.len(),
+                        mesh.index_bytes,
+                        mesh.vertices,
+                        mesh.vertex_bytes
+                    ),
+                )
+            })?;
+        }
+        ensure(self.draw_meshes.len() == tables.draws.len(), || {
+            Broken::new(
+                "meshes of draws",
+                format!("{}", tables.draws.len()),
+                self.draw_meshes.len(),
+            )
+        })?;
+        for (number, (mesh, draw)) in self.draw_meshes.iter().zip(&tables.draws).enumerate() {
+            let triangles = self
+                .meshes
+                .get(*mesh as usize)
+                .map(|mesh| mesh.indices.len() / 3);
+            ensure(triangles == Some(draw.primitives as usize), || {
+                Broken::new(
+                    format!("mesh of draw {number}"),
+                    format!(
+                        "one of {} meshes, of {} triangles",
+                        self.meshes.len(),
+                        draw.primitives
+                    ),
+                    format_args!("mesh {mesh} of {triangles:?}"),
+                )
+            })?;
+        }
+        Ok(())
+    }
+}

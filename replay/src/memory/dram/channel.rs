@@ -1,0 +1,295 @@
+//! One channel: its queue, its banks, and when each command may be issued.
+
+use super::PagePolicy;
+use super::mapping::Place;
+use super::presets::Device;
+use std::collections::VecDeque;
+
+/// What a channel counts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Counts {
+    /// Reads.
+    pub reads: u64,
+    /// Reads whose row was open when the scheduler first saw the request, or was opened for an earlier one.
+    pub row_hits: u64,
+    /// Reads that had to open a row in a bank without one.
+    pub row_empty: u64,
+    /// Reads that had to close another row first.
+    pub row_conflicts: u64,
+    /// Rows opened.
+    pub activates: u64,
+    /// Refreshes of all banks.
+    pub refreshes: u64,
+    /// Clock at which the last data was there.
+    pub end: u64,
+    /// Requests by their latency in clocks, arrival to last data.
+    pub latencies: Vec<u64>,
+}
+
+/// A request in the queue.
+#[derive(Clone, Copy, Debug)]
+struct Request {
+    place: Place,
+    arrival: u64,
+    /// The first command that it needed.
+    needed: Option<Needed>,
+}
+
+/// What a request found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Needed {
+    Read,
+    Activate,
+    Precharge,
+}
+
+/// A bank: its open row, and the clocks from which on commands may be issued.
+#[derive(Clone, Copy, Debug, Default)]
+struct Bank {
+    row: Option<u64>,
+    read_from: u64,
+    activate_from: u64,
+    precharge_from: u64,
+}
+
+/// A channel.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    device: Device,
+    capacity: usize,
+    policy: PagePolicy,
+    banks: Vec<Bank>,
+    /// By group.
+    read_from: Vec<u64>,
+    activate_from: Vec<u64>,
+    /// Clocks of the last four activates.
+    window: VecDeque<u64>,
+    queue: Vec<Request>,
+    /// Those that found the queue full, and no time where none was given.
+    backlog: VecDeque<(Place, Option<u64>)>,
+    /// The next clock that has no command.
+    now: u64,
+    refresh_due: u64,
+    /// What was counted.
+    pub counts: Counts,
+}
+
+impl Channel {
+    /// All banks closed.
+    pub fn new(device: Device, capacity: usize, policy: PagePolicy) -> Self {
+        let groups = device.groups as usize;
+        Self {
+            device,
+            capacity,
+            policy,
+            banks: vec![Bank::default(); device.banks() as usize],
+            read_from: vec![0; groups],
+            activate_from: vec![0; groups],
+            window: VecDeque::with_capacity(4),
+            queue: Vec::with_capacity(capacity),
+            backlog: VecDeque::new(),
+            now: 0,
+            refresh_due: u64::from(device.refi),
+            counts: Counts::default(),
+        }
+    }
+
+    /// A request arrives at a clock, or as soon as there is room.
+    pub fn arrive(&mut self, place: Place, clock: Option<u64>) {
+        if let Some(clock) = clock {
+            // What the channel does before is not changed by what comes later.
+            while !self.queue.is_empty() && self.step(Some(clock)) {}
+            if self.queue.is_empty() {
+                // Idle until now, but for refreshes.
+                while self.refresh_due <= clock {
+                    self.now = self.now.max(self.refresh_due);
+                    self.refresh();
+                }
+                self.now = self.now.max(clock);
+            }
+        } else {
+            while self.queue.len() >= self.capacity {
+                self.step(None);
+            }
+        }
+        self.backlog.push_back((place, clock));
+        self.admit();
+    }
+
+    /// Answers everything that is queued.
+    pub fn drain(&mut self) {
+        while !self.queue.is_empty() {
+            self.step(None);
+        }
+    }
+
+    /// Requests enter the queue while there is room.
+    fn admit(&mut self) {
+        while self.queue.len() < self.capacity
+            && let Some((place, clock)) = self.backlog.pop_front()
+        {
+            self.queue.push(Request {
+                place,
+                arrival: clock.unwrap_or(self.now),
+                needed: None,
+            });
+        }
+    }
+
+    /// Issues the next command, if it comes before `until`; says whether it did.
+    fn step(&mut self, until: Option<u64>) -> bool {
+        let before = |clock: u64| until.is_none_or(|until| clock < until);
+        if self.now >= self.refresh_due {
+            self.refresh();
+            return true;
+        }
+        let mut best: Option<(u64, bool, usize, Needed)> = None;
+        for (index, request) in self.queue.iter().enumerate() {
+            let Some((from, needed)) = self.next_command(request) else {
+                continue;
+            };
+            let from = from.max(self.now).max(request.arrival);
+            let other = needed != Needed::Read;
+            // The queue is in the order of arrival.
+            if best.is_none_or(|(clock, is_other, ..)| (from, other) < (clock, is_other)) {
+                best = Some((from, other, index, needed));
+            }
+        }
+        let Some((clock, _, index, needed)) = best else {
+            return false;
+        };
+        if clock >= self.refresh_due && before(self.refresh_due) {
+            self.now = self.refresh_due;
+            return true;
+        }
+        if !before(clock) {
+            return false;
+        }
+        self.now = clock + 1;
+        self.queue[index].needed.get_or_insert(needed);
+        let place = self.queue[index].place;
+        match needed {
+            Needed::Precharge => self.precharge(place.bank as usize, clock),
+            Needed::Activate => self.activate(place, clock),
+            Needed::Read => self.read(index, clock),
+        }
+        true
+    }
+
+    /// The next command of a request and the clock from which on it may be issued; none while a row that others read
+    /// is open in its bank.
+    fn next_command(&self, request: &Request) -> Option<(u64, Needed)> {
+        let Place {
+            bank, group, row, ..
+        } = request.place;
+        let (bank_state, group) = (&self.banks[bank as usize], group as usize);
+        match bank_state.row {
+            Some(open) if open == row => Some((
+                bank_state.read_from.max(self.read_from[group]),
+                Needed::Read,
+            )),
+            Some(open) => {
+                let is_wanted =
+                    |other: &Request| other.place.bank == bank && other.place.row == open;
+                (!self.queue.iter().any(is_wanted))
+                    .then_some((bank_state.precharge_from, Needed::Precharge))
+            }
+            None => {
+                let window = match self.window.len() {
+                    4 => self.window[0] + u64::from(self.device.faw),
+                    _ => 0,
+                };
+                let from = bank_state.activate_from.max(self.activate_from[group]);
+                Some((from.max(window), Needed::Activate))
+            }
+        }
+    }
+
+    fn precharge(&mut self, bank: usize, clock: u64) {
+        let bank = &mut self.banks[bank];
+        bank.row = None;
+        bank.activate_from = bank.activate_from.max(clock + u64::from(self.device.rp));
+    }
+
+    fn activate(&mut self, place: Place, clock: u64) {
+        let device = &self.device;
+        let bank = &mut self.banks[place.bank as usize];
+        bank.row = Some(place.row);
+        bank.read_from = clock + u64::from(device.rcd);
+        bank.precharge_from = clock + u64::from(device.ras);
+        for (group, from) in (0..).zip(&mut self.activate_from) {
+            let gap = if group == place.group {
+                device.rrd_l
+            } else {
+                device.rrd_s
+            };
+            *from = (*from).max(clock + u64::from(gap));
+        }
+        if self.window.len() == 4 {
+            self.window.pop_front();
+        }
+        self.window.push_back(clock);
+        self.counts.activates += 1;
+    }
+
+    fn read(&mut self, index: usize, clock: u64) {
+        let device = self.device;
+        let request = self.queue.remove(index);
+        let place = request.place;
+        for (group, from) in (0..).zip(&mut self.read_from) {
+            let gap = if group == place.group {
+                device.ccd_l
+            } else {
+                device.ccd_s
+            };
+            *from = (*from).max(clock + u64::from(gap.max(device.burst)));
+        }
+        let bank = &mut self.banks[place.bank as usize];
+        bank.precharge_from = bank.precharge_from.max(clock + u64::from(device.rtp));
+        let data = clock + u64::from(device.cl) + u64::from(device.burst);
+        let counts = &mut self.counts;
+        counts.reads += 1;
+        counts.end = counts.end.max(data);
+        match request.needed {
+            Some(Needed::Precharge) => counts.row_conflicts += 1,
+            Some(Needed::Activate) => counts.row_empty += 1,
+            _ => counts.row_hits += 1,
+        }
+        let latency = (data - request.arrival) as usize;
+        // One bucket for what waited longer than any figure of interest.
+        let latency = latency.min(LONGEST);
+        if counts.latencies.len() <= latency {
+            counts.latencies.resize(latency + 1, 0);
+        }
+        counts.latencies[latency] += 1;
+        self.admit();
+        let is_last = !(self.queue.iter())
+            .any(|other| other.place.bank == place.bank && other.place.row == place.row);
+        if self.policy == PagePolicy::Closed && is_last {
+            // With the read, as auto-precharge: it takes no command of its own.
+            let from = self.banks[place.bank as usize].precharge_from;
+            self.precharge(place.bank as usize, from);
+        }
+    }
+
+    /// Closes all rows and refreshes all banks.
+    fn refresh(&mut self) {
+        let rp = u64::from(self.device.rp);
+        let ready = self.banks.iter().map(|bank| match bank.row {
+            Some(_) => bank.precharge_from.max(self.now) + rp,
+            None => bank.activate_from.max(self.now),
+        });
+        let start = ready.max().unwrap_or(self.now);
+        let end = start + u64::from(self.device.rfc);
+        for bank in &mut self.banks {
+            bank.row = None;
+            bank.activate_from = end;
+        }
+        self.counts.refreshes += 1;
+        self.refresh_due += u64::from(self.device.refi);
+        self.now = start + 1;
+    }
+}
+
+/// Latencies beyond this many clocks count as this many.
+const LONGEST: usize = 1 << 20;

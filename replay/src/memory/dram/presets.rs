@@ -1,0 +1,197 @@
+//! Devices and their timings.
+//!
+//! Timings are in clocks of the command bus, after the speed bins of the standards. Energies are those of typical
+//! data sheets, to one digit: use them to compare, not as a level.
+
+use serde::{Deserialize, Serialize};
+
+/// A device by name.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum DramPreset {
+    /// LPDDR4-3200, 16-bit channels (JESD209-4).
+    #[default]
+    Lpddr4,
+    /// LPDDR5-6400, 16-bit channels, bank groups (JESD209-5).
+    Lpddr5,
+    /// DDR4-2400R (16-16-16), 64-bit channels of 4 Gb x8 devices (JESD79-4).
+    Ddr4,
+    /// GDDR6 at 14 Gb/s per pin, 16-bit channels (JESD250).
+    Gddr6,
+}
+
+/// Organisation, timings and energies of one channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Device {
+    /// Name of the standard and speed.
+    pub name: &'static str,
+    /// Bytes of a read.
+    pub burst_bytes: u32,
+    /// Bytes of an open row of the channel.
+    pub row_bytes: u32,
+    /// Bank groups, a power of two; 1 where there are none.
+    pub groups: u32,
+    /// Banks of a group, a power of two.
+    pub banks_of_group: u32,
+    /// Length of a clock, picoseconds.
+    pub clock_ps: u32,
+    /// Clocks of data of a read.
+    pub burst: u32,
+    /// Read to its first data.
+    pub cl: u32,
+    /// Activate to read.
+    pub rcd: u32,
+    /// Precharge to activate.
+    pub rp: u32,
+    /// Activate to precharge.
+    pub ras: u32,
+    /// Read to precharge.
+    pub rtp: u32,
+    /// Read to read, another group.
+    pub ccd_s: u32,
+    /// Read to read, the same group.
+    pub ccd_l: u32,
+    /// Activate to activate, another group.
+    pub rrd_s: u32,
+    /// Activate to activate, the same group.
+    pub rrd_l: u32,
+    /// Window of four activates.
+    pub faw: u32,
+    /// Refresh of all banks.
+    pub rfc: u32,
+    /// From one refresh to the next.
+    pub refi: u32,
+    /// Activate and precharge of a row, nanojoules.
+    pub activate_nj: f64,
+    /// Reading and driving a burst, nanojoules.
+    pub read_nj: f64,
+    /// Refresh of all banks, nanojoules.
+    pub refresh_nj: f64,
+    /// Standing by with open rows, milliwatts.
+    pub background_mw: f64,
+}
+
+impl DramPreset {
+    /// The device.
+    #[must_use]
+    pub const fn device(self) -> Device {
+        match self {
+            Self::Lpddr4 => Device {
+                name: "LPDDR4-3200",
+                burst_bytes: 32,
+                row_bytes: 2048,
+                groups: 1,
+                banks_of_group: 8,
+                clock_ps: 625,
+                burst: 8,
+                cl: 28,
+                rcd: 29,
+                rp: 29,
+                ras: 68,
+                rtp: 12,
+                ccd_s: 8,
+                ccd_l: 8,
+                rrd_s: 16,
+                rrd_l: 16,
+                faw: 64,
+                rfc: 448,
+                refi: 6246,
+                activate_nj: 1.5,
+                read_nj: 1.3,
+                refresh_nj: 30.0,
+                background_mw: 15.0,
+            },
+            Self::Lpddr5 => Device {
+                name: "LPDDR5-6400",
+                burst_bytes: 32,
+                row_bytes: 2048,
+                groups: 4,
+                banks_of_group: 4,
+                clock_ps: 1250,
+                burst: 2,
+                cl: 20,
+                rcd: 15,
+                rp: 15,
+                ras: 34,
+                rtp: 6,
+                ccd_s: 2,
+                ccd_l: 4,
+                rrd_s: 4,
+                rrd_l: 4,
+                faw: 16,
+                rfc: 168,
+                refi: 3123,
+                activate_nj: 1.5,
+                read_nj: 1.0,
+                refresh_nj: 30.0,
+                background_mw: 15.0,
+            },
+            Self::Ddr4 => Device {
+                name: "DDR4-2400R",
+                burst_bytes: 64,
+                row_bytes: 8192,
+                groups: 4,
+                banks_of_group: 4,
+                clock_ps: 833,
+                burst: 4,
+                cl: 16,
+                rcd: 16,
+                rp: 16,
+                ras: 39,
+                rtp: 9,
+                ccd_s: 4,
+                ccd_l: 6,
+                rrd_s: 4,
+                rrd_l: 6,
+                faw: 26,
+                rfc: 312,
+                refi: 9360,
+                activate_nj: 10.0,
+                read_nj: 8.0,
+                refresh_nj: 700.0,
+                background_mw: 400.0,
+            },
+            Self::Gddr6 => Device {
+                name: "GDDR6-14000",
+                burst_bytes: 32,
+                row_bytes: 2048,
+                groups: 4,
+                banks_of_group: 4,
+                clock_ps: 571,
+                burst: 2,
+                cl: 24,
+                rcd: 26,
+                rp: 26,
+                ras: 53,
+                rtp: 4,
+                ccd_s: 2,
+                ccd_l: 3,
+                rrd_s: 7,
+                rrd_l: 7,
+                faw: 28,
+                rfc: 210,
+                refi: 3333,
+                activate_nj: 2.0,
+                read_nj: 1.9,
+                refresh_nj: 50.0,
+                background_mw: 150.0,
+            },
+        }
+    }
+}
+
+impl Device {
+    /// Banks of a channel.
+    #[must_use]
+    pub const fn banks(&self) -> u32 {
+        self.groups * self.banks_of_group
+    }
+
+    /// Bytes per second that a channel's data bus carries at most.
+    #[must_use]
+    pub fn peak_bytes_per_s(&self) -> f64 {
+        f64::from(self.burst_bytes) / (f64::from(self.burst) * f64::from(self.clock_ps) * 1e-12)
+    }
+}

@@ -1,0 +1,142 @@
+//! What a memory counted, in the units of users.
+
+use super::DramConfig;
+use super::channel::Channel;
+use super::presets::Device;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// The `dram` object of a result.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DramResult {
+    /// Device.
+    pub device: String,
+    /// Lines asked for.
+    pub requests: u64,
+    /// Bursts read; a line that is smaller than a burst takes a whole one.
+    pub reads: u64,
+    /// Bytes that the data buses carried.
+    pub read_bytes: u64,
+    /// Reads whose row was open.
+    pub row_hits: u64,
+    /// Reads that opened a row in a bank without one.
+    pub row_empty: u64,
+    /// Reads that had another row closed first.
+    pub row_conflicts: u64,
+    /// `row_hits` over `reads`.
+    pub row_hit_rate: f64,
+    /// Rows opened.
+    pub activates: u64,
+    /// Refreshes of all banks, over all channels.
+    pub refreshes: u64,
+    /// From the first clock to the last data.
+    pub time_us: f64,
+    /// Bytes over time.
+    pub bandwidth_gb_per_s: f64,
+    /// What the data buses carry at most.
+    pub peak_gb_per_s: f64,
+    /// From arrival to the last data; where requests carry no time, from the place in the queue on.
+    pub latency_mean_ns: f64,
+    /// Half of the requests take no longer.
+    pub latency_p50_ns: f64,
+    /// 99 of 100 requests take no longer.
+    pub latency_p99_ns: f64,
+    /// Activates, reads, refreshes and standing by.
+    pub energy_mj: f64,
+}
+
+impl DramResult {
+    /// Over all channels, each done with its queue.
+    pub(super) fn of(
+        config: &DramConfig,
+        device: &Device,
+        channels: &[Channel],
+        requests: u64,
+    ) -> Self {
+        let sum = |of: fn(&Channel) -> u64| channels.iter().map(of).sum::<u64>();
+        let reads = sum(|c| c.counts.reads);
+        let (activates, refreshes) = (sum(|c| c.counts.activates), sum(|c| c.counts.refreshes));
+        let end = channels.iter().map(|c| c.counts.end).max().unwrap_or(0);
+        let clock_ns = f64::from(device.clock_ps) * 1e-3;
+        let time_s = end as f64 * clock_ns * 1e-9;
+        let read_bytes = reads * u64::from(device.burst_bytes);
+        let mut latencies: Vec<u64> = Vec::new();
+        for channel in channels {
+            let of = &channel.counts.latencies;
+            latencies.resize(latencies.len().max(of.len()), 0);
+            (latencies.iter_mut().zip(of)).for_each(|(all, own)| *all += own);
+        }
+        let total: u64 = (0..)
+            .zip(&latencies)
+            .map(|(clocks, n): (u64, _)| clocks * n)
+            .sum();
+        let quantile = |share: f64| {
+            let (wanted, mut seen) = ((share * reads as f64).ceil().max(1.0) as u64, 0);
+            let at = latencies.iter().position(|n| {
+                seen += n;
+                seen >= wanted
+            });
+            at.unwrap_or(0) as f64 * clock_ns
+        };
+        let over_reads = |value: f64| {
+            if reads == 0 {
+                0.0
+            } else {
+                value / reads as f64
+            }
+        };
+        let row_hits = sum(|c| c.counts.row_hits);
+        let nj = activates as f64 * device.activate_nj
+            + reads as f64 * device.read_nj
+            + refreshes as f64 * device.refresh_nj;
+        let background_mj = device.background_mw * time_s * f64::from(config.channels);
+        Self {
+            device: device.name.to_owned(),
+            requests,
+            reads,
+            read_bytes,
+            row_hits,
+            row_empty: sum(|c| c.counts.row_empty),
+            row_conflicts: sum(|c| c.counts.row_conflicts),
+            row_hit_rate: over_reads(row_hits as f64),
+            activates,
+            refreshes,
+            time_us: time_s * 1e6,
+            bandwidth_gb_per_s: if end == 0 {
+                0.0
+            } else {
+                read_bytes as f64 / time_s * 1e-9
+            },
+            peak_gb_per_s: f64::from(config.channels) * device.peak_bytes_per_s() * 1e-9,
+            latency_mean_ns: over_reads(total as f64 * clock_ns),
+            latency_p50_ns: quantile(0.5),
+            latency_p99_ns: quantile(0.99),
+            energy_mj: nj * 1e-6 + background_mj,
+        }
+    }
+}
+
+impl fmt::Display for DramResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: {} reads, {:.2} MB; row hits {:.2} %, {} rows opened, {} closed for another",
+            self.device,
+            self.reads,
+            self.read_bytes as f64 * 1e-6,
+            100.0 * self.row_hit_rate,
+            self.activates,
+            self.row_conflicts
+        )?;
+        writeln!(
+            f,
+            "{:.2} of {:.2} GB/s; latency mean {:.1}, median {:.1}, 99 % {:.1} ns; {:.4} mJ",
+            self.bandwidth_gb_per_s,
+            self.peak_gb_per_s,
+            self.latency_mean_ns,
+            self.latency_p50_ns,
+            self.latency_p99_ns,
+            self.energy_mj
+        )
+    }
+}

@@ -1,0 +1,4 @@
+//! What lies below the caches, and who asks it for what.
+
+pub mod clients;
+pub mod dram;

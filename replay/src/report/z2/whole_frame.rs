@@ -1,0 +1,128 @@
+//! Where the traffic of whole frames goes: a stacked bar of clients for each order, and what they need at the frame rates of
+//! displays.
+
+use super::model::PaperReport;
+use crate::experiment::ResultRow;
+use crate::memory::clients::{Client, ClientTraffic};
+use crate::report::columns::Column;
+use crate::report::html::{Section, figures};
+use crate::report::plots::stacked::StackedChart;
+use crate::report::plots::{PlotError, SeriesStyle};
+use crate::report::table::Table;
+use maud::html;
+
+/// Frame rates of headsets, Hz.
+const RATES_HZ: [u32; 3] = [72, 90, 120];
+
+/// Parts of a bar from the bottom up; a theme has eight colours.
+const PARTS: [(&str, &[Client]); 8] = [
+    ("textures", &[Client::Texture]),
+    ("indices and vertices", &[Client::Index, Client::Vertex]),
+    ("shaded vertices", &[Client::ShadedVertex]),
+    ("primitive lists", &[Client::PrimitiveList]),
+    ("colour", &[Client::Colour]),
+    ("depth", &[Client::Depth]),
+    ("G-buffer", &[Client::GBuffer]),
+    ("composition and warp", &[Client::Composition]),
+];
+
+/// The section of a page; none where whole frames were not counted.
+///
+/// # Errors
+/// A chart that cannot be drawn.
+pub(super) fn section(report: &PaperReport) -> Result<Option<Section>, PlotError> {
+    let counted = |row: &&ResultRow| !row.result.clients.is_empty();
+    let mut charts = Vec::new();
+    for info in &report.traces {
+        let rows = report.details(&info.label);
+        if rows.iter().any(counted) {
+            charts.push((chart(&info.label, &rows).svg()?, String::new()));
+        }
+    }
+    if charts.is_empty() {
+        return Ok(None);
+    }
+    let rows = report.rows.iter().filter(counted);
+    let table = Table::new(&columns(), rows).grouped_by(2);
+    let body = html! {
+        (figures(&charts))
+        p.note { "Bars are those of the first cache configuration. An order changes what textures and shaded vertices read, nothing else." }
+        (table.without_empty_columns().markup())
+        p.note { "GB/s are 10\u{2079} bytes per second, reads and writes of all clients together." }
+    };
+    Ok(Some(Section::new("Where the traffic goes", body)))
+}
+
+fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {
+    let bytes = |row: &ResultRow, clients: &[Client]| -> u64 {
+        let of = row.result.clients.iter().filter(|c| clients.contains(&c.client));
+        of.map(ClientTraffic::bytes).sum()
+    };
+    let used: Vec<(usize, (&str, &[Client]))> = (PARTS.into_iter().enumerate())
+        .filter(|(_, (_, clients))| rows.iter().any(|row| bytes(row, clients) > 0))
+        .collect();
+    let bar = |row: &&ResultRow| {
+        let parts = used.iter().map(|(_, (_, clients))| row.mb_per_frame(bytes(row, clients)));
+        (row.point.config.order.title().to_owned(), parts.collect())
+    };
+    StackedChart {
+        title: format!("{scene}: traffic by client"),
+        value_label: "MB per frame".to_owned(),
+        series: used.iter().map(|(number, (name, _))| SeriesStyle::nth(*name, *number)).collect(),
+        bars: rows.iter().map(bar).collect(),
+        bar_px: 72.0,
+        decimals: Some(1),
+        ..StackedChart::default()
+    }
+}
+
+fn columns<'a>() -> Vec<Column<'static, ResultRow<'a>>> {
+    let all = |row: &ResultRow| row.result.clients.iter().map(ClientTraffic::bytes).sum::<u64>();
+    let mut columns = crate::report::columns::pick::<ResultRow>(&[
+        "label",
+        "caches",
+        "order",
+        "frame_mb_per_frame",
+        "texture_share_pct",
+        "reduction_pct",
+        "frame_reduction_pct",
+    ]);
+    columns.extend(RATES_HZ.map(|hz| {
+        Column::real(
+            format!("gb_per_s_{hz}hz"),
+            format!("at {hz} Hz"),
+            "GB/s",
+            2,
+            move |row: &ResultRow| row.mb_per_frame(all(row)) * f64::from(hz) / 1000.0,
+        )
+    }));
+    columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{with_edited, with_report};
+    use super::*;
+
+    #[test]
+    fn a_page_has_a_bar_for_each_order_where_whole_frames_were_counted() {
+        assert!(with_report(|report| section(report).unwrap().is_none()));
+        let traffic = |client, read_bytes| ClientTraffic {
+            client,
+            read_bytes,
+            write_bytes: 1_000_000,
+        };
+        let text = with_edited(
+            |point, result| {
+                let texture = traffic(Client::Texture, 3_000_000 + 1000 * point as u64);
+                result.clients = vec![texture, traffic(Client::Vertex, 500_000), traffic(Client::Colour, 0)];
+            },
+            |report| section(report).unwrap().unwrap().body.into_string(),
+        );
+        for expected in ["textures", "indices and vertices", "colour", "at 90 Hz"] {
+            assert!(text.contains(expected), "{expected}");
+        }
+        // Parts that nothing uses have no entry.
+        assert!(!text.contains("G-buffer") && !text.contains("primitive lists"));
+    }
+}

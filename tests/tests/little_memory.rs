@@ -1,0 +1,84 @@
+//! Too little address space (`ulimit -v`): a message and exit code 2, and no file under its final name.
+
+use parallax_tests::{program, root};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// The command below a limit in MiB.
+fn limited(command: &Command, limit_mib: u32) -> Command {
+    let mut shell = Command::new("sh");
+    let script = format!("ulimit -v {}; exec \"$@\"", limit_mib * 1024);
+    shell.args(["-c", &script, "sh"]).arg(command.get_program());
+    shell.args(command.get_args());
+    shell.env("PARALLAX_CACHE_SIZE", "0");
+    shell
+}
+
+/// Names in a folder but for temporary ones, which an abort leaves as SIGKILL does.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder").flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|name| !name.ends_with(".part")).collect()
+}
+
+/// Runs a command that writes into the folder below each limit; true where one of them was too little.
+fn tell(command: &Command, folder: &Path, limits_mib: &[u32]) -> bool {
+    let mut refused = false;
+    for limit_mib in limits_mib {
+        let output = limited(command, *limit_mib).output().expect("sh starts");
+        let message = String::from_utf8_lossy(&output.stderr);
+        let place = format!("{command:?} below {limit_mib} MiB:\n{message}");
+        match output.status.code() {
+            Some(0) => {}
+            Some(2) => {
+                refused = true;
+                assert!(message.contains("error: "), "{place}");
+                assert!(!message.contains("panicked"), "{place}");
+                assert!(!message.contains("no lavapipe"), "{place}");
+                assert_eq!(names(folder), [""; 0], "{place}");
+            }
+            other => panic!("{other:?}: {place}"),
+        }
+        for name in names(folder) {
+            fs::remove_file(folder.join(name)).expect("removed");
+        }
+    }
+    refused
+}
+
+#[test]
+fn a_replay_without_memory_ends_with_a_message() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = root().join("traces/atrium.textrace");
+    for name in ["run", "paper", "report", "locality"] {
+        let mut command = program("replay");
+        command.arg(name).arg(&trace);
+        match name {
+            "paper" => command.arg("--html").arg(folder.path().join("p.html")),
+            "report" => command.arg("-o").arg(folder.path().join("r.html")),
+            _ => &mut command,
+        };
+        assert!(
+            tell(&command, folder.path(), &[24, 32, 40, 50, 60]),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_capture_without_memory_ends_with_a_message() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, scene, limits_mib) in [
+        ("rays", "teapot", &[34, 40, 50, 60][..]),
+        ("raster", "atrium-plain", &[34, 60, 80, 120, 240, 480]),
+        ("verify", "atrium-plain", &[34, 60, 120, 240, 480]),
+    ] {
+        let mut command = program("tracegen");
+        command.args([name, scene, "--size", "64x64"]);
+        if name != "verify" {
+            command.arg("-o").arg(folder.path().join("trace"));
+        }
+        assert!(tell(&command, folder.path(), limits_mib), "{name}");
+    }
+}

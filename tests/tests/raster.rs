@@ -1,0 +1,140 @@
+//! `tracegen raster`: what its summary counts, passes of scenes that move, what is left out and what is refused.
+
+use parallax_tests::{program, run_ok};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+fn raster(options: &[&str], trace: &Path) -> Command {
+    let mut command = program("tracegen");
+    command.arg("raster").args(options).arg("-o").arg(trace);
+    command
+}
+
+/// What the command says on stderr.
+fn summary(options: &[&str]) -> String {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let output = run_ok(&mut raster(options, &folder.path().join("a.textrace")));
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The number before ` draws` in the line that starts with a stage's name.
+fn draws(summary: &str, stage: &str) -> Option<u64> {
+    let line = summary.lines().find(|line| line.starts_with(stage))?;
+    let before = line.split(" draws").next()?;
+    before.split(' ').next_back()?.parse().ok()
+}
+
+/// The number before a word, anywhere in the summary.
+fn count(summary: &str, word: &str) -> u64 {
+    let before = summary.split(word).next().expect("a text");
+    let number = before.split(' ').next_back().expect("a word");
+    number
+        .parse()
+        .unwrap_or_else(|_| panic!("{word}: {summary}"))
+}
+
+#[test]
+fn each_stage_counts_its_own_draws() {
+    let scene = ["atrium-shadows", "--size", "64x64"];
+    let with_plain = summary(&scene);
+    let without = summary(&[&scene[..], &["--no-plain"]].concat());
+    for stage in ["shadow maps", "with capture"] {
+        let counts = [&with_plain, &without].map(|summary| draws(summary, stage));
+        assert!(counts[0] > Some(0), "{stage}: {with_plain}");
+        assert_eq!(counts[0], counts[1], "{stage}: {with_plain}\n{without}");
+    }
+    assert_eq!(
+        draws(&with_plain, "plain render"),
+        draws(&with_plain, "with capture"),
+        "{with_plain}"
+    );
+    assert_eq!(draws(&without, "plain render"), None, "{without}");
+}
+
+#[test]
+fn passes_of_a_scene_that_moves_are_planned_where_its_draws_stand_in_each_frame() {
+    // The hall's cranes move: with passes planned from draws at rest, these paths have frames with other layers.
+    for (camera, path, split) in [
+        ("pumps", "walk", "least-work:4px"),
+        ("walkway", "walk", "least-work:2px"),
+        ("default", "head", "least-work:4px"),
+    ] {
+        let options = ["--camera", camera, "--path", path, "--far-field", split];
+        let few = [
+            "plant", "--fps", "0.2", "--frames", "12", "--size", "128x128",
+        ];
+        summary(&[&few[..], &options, &["--no-plain"]].concat());
+    }
+}
+
+#[test]
+fn hidden_area_meshes_and_culling_by_distance_leave_out_what_they_say() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("mesh.json");
+    // The lower left half of the left picture, nothing of the right one.
+    let half =
+        r#"{"schema": "parallax.hidden-area/1", "left": [[[0, 0], [1, 0], [0, 1]]], "right": []}"#;
+    fs::write(&mesh, half).expect("a file");
+    let mesh = mesh.to_string_lossy().into_owned();
+    let scene = ["atrium", "--size", "64x64", "--no-plain"];
+    let fragments = |options: &[&str]| {
+        let summary = summary(&[&scene[..], options].concat());
+        (
+            count(&summary, " fragments"),
+            draws(&summary, "with capture"),
+        )
+    };
+    let (all, all_draws) = fragments(&[]);
+    let (half, _) = fragments(&["--hidden-area-mesh", &mesh]);
+    assert!(
+        (0.6..0.9).contains(&(half as f64 / all as f64)),
+        "{half} of {all}"
+    );
+    let (near, near_draws) = fragments(&["--cull-distance", "4"]);
+    assert!(near < all && near_draws < all_draws, "{near} of {all}");
+    let (large, large_draws) = fragments(&["--cull-px", "12"]);
+    assert!(large <= all && large_draws < all_draws, "{large} of {all}");
+}
+
+#[test]
+fn hidden_area_meshes_and_distances_that_cannot_be_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = folder.path().join("a.textrace");
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).expect("a file");
+        path.to_string_lossy().into_owned()
+    };
+    let all = r#"{"schema": "parallax.hidden-area/1", "left": [[[-9, -9], [9, -9], [0, 9]]], "right": []}"#;
+    let far = r#"{"schema": "parallax.hidden-area/1", "left": [[[0, 0], [1e9, 0], [0, 1]]], "right": []}"#;
+    let refused: [(&str, String, &str); 6] = [
+        (
+            "--hidden-area-mesh",
+            file("all", all),
+            "leaves something to see",
+        ),
+        (
+            "--hidden-area-mesh",
+            file("far", far),
+            "coordinates from -16 to 16",
+        ),
+        ("--hidden-area-mesh", file("text", "triangles"), "text"),
+        ("--hidden-area-mesh", file("none", "{}"), "none"),
+        (
+            "--cull-distance",
+            "-1".into(),
+            "cull distance: expected more than 0 metres",
+        ),
+        ("--cull-px", "nan".into(), "cull"),
+    ];
+    for (flag, value, expected) in refused {
+        let value = format!("{flag}={value}");
+        let mut command = raster(&["teapot", "--size", "32x32", &value], &trace);
+        let output = command.output().expect("the program starts");
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{value}: {error}");
+        assert!(error.contains(expected), "{value}: {error}");
+        assert!(!trace.exists(), "{value}");
+    }
+}

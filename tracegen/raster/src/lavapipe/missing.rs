@@ -1,0 +1,84 @@
+//! Why Vulkan lists no device although its driver may be installed.
+
+use libloading::Library;
+use std::path::{Path, PathBuf};
+
+/// Vulkan's loader.
+const LOADER: &str = "libvulkan.so.1";
+
+/// Folders where drivers say which library they are.
+const FOLDERS: [&str; 3] = [
+    "/usr/local/share/vulkan/icd.d",
+    "/etc/vulkan/icd.d",
+    "/usr/share/vulkan/icd.d",
+];
+
+/// Address space that lavapipe needs besides its libraries, about.
+const NEEDED_BYTES: usize = 512 << 20;
+
+/// Why lavapipe, which is installed, does not start; `None` where it is not installed or nothing is known. The
+/// loader passes over a driver that it cannot load, for want of memory for one, without a word.
+pub(super) fn reason() -> Option<String> {
+    let libraries = installed();
+    if libraries.is_empty() {
+        return None;
+    }
+    std::iter::once(PathBuf::from(LOADER))
+        .chain(libraries)
+        .find_map(|library| cannot_load(&library))
+        .or_else(little_memory)
+}
+
+/// Lavapipe's libraries as its description files name them.
+fn installed() -> Vec<PathBuf> {
+    let folders = FOLDERS.iter().filter_map(|f| std::fs::read_dir(f).ok());
+    let files = folders.flatten().flatten().map(|entry| entry.path());
+    let named = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("lvp_icd") && name.ends_with(".json")
+    };
+    let text = |path: PathBuf| std::fs::read_to_string(path).ok();
+    files
+        .filter(named)
+        .filter_map(text)
+        .filter_map(|text| library_of(&text))
+        .collect()
+}
+
+/// The value of `library_path`.
+fn library_of(description: &str) -> Option<PathBuf> {
+    let (_, rest) = description.split_once("\"library_path\"")?;
+    let value = rest.split('"').nth(1)?;
+    Some(PathBuf::from(value))
+}
+
+fn cannot_load(library: &Path) -> Option<String> {
+    // SAFETY: loading runs the initialisers of Vulkan's loader or of Mesa and LLVM, as opening a device does.
+    let loaded = unsafe { Library::new(library) };
+    // The loader's text names the file and the cause, such as "failed to map segment".
+    loaded.err().map(|error| error.to_string())
+}
+
+fn little_memory() -> Option<String> {
+    let refused = Vec::<u8>::new().try_reserve_exact(NEEDED_BYTES).is_err();
+    refused.then(|| {
+        format!(
+            "not enough memory: {} MiB more were refused (the machine's memory, or ulimit -v)",
+            NEEDED_BYTES >> 20
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_driver_names_its_library_and_one_that_cannot_be_loaded_is_told_in_the_loaders_words() {
+        let text = r#"{ "ICD": { "api_version": "1.1.230", "library_path" : "/lib/libx.so" } }"#;
+        assert_eq!(library_of(text), Some(PathBuf::from("/lib/libx.so")));
+        assert_eq!(library_of("{}"), None);
+        let said = cannot_load(Path::new("/lib/no-such-driver.so")).unwrap();
+        assert!(said.contains("no-such-driver.so"), "{said}");
+    }
+}

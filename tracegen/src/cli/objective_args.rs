@@ -1,0 +1,39 @@
+//! What `--auto` makes as small as its budget allows.
+
+use crate::study::auto::{Budget, Objective};
+use anyhow::ensure;
+use clap::Args;
+
+/// The option, shared by `raster` and `techniques`.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct ObjectiveArgs {
+    /// What `--auto` makes as small as an error budget allows: counts, which are the same in every run, or time
+    /// [default: energy].
+    #[arg(
+        long,
+        value_enum,
+        value_name = "NAME",
+        help_heading = "Techniques",
+        requires = "auto"
+    )]
+    objective: Option<Objective>,
+}
+
+impl ObjectiveArgs {
+    /// The objective under a budget.
+    ///
+    /// # Errors
+    /// A budget of time with another objective.
+    pub fn of(self, budget: Option<Budget>) -> anyhow::Result<Objective> {
+        if let Some(Budget::BudgetMs(_)) = budget {
+            let other = self.objective.filter(|other| *other != Objective::Time);
+            ensure!(
+                other.is_none(),
+                "--objective: expected time with --auto budget-ms, found {}",
+                other.map_or("", Objective::name)
+            );
+            return Ok(Objective::Time);
+        }
+        Ok(self.objective.unwrap_or_default())
+    }
+}

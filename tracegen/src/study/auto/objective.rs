@@ -1,0 +1,55 @@
+//! What `--auto` makes as small as a budget allows.
+
+use crate::study::counted::Counted;
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+
+/// The cost of a frame that is made as small as the budget allows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Objective {
+    /// Frame time on this device, which no two runs measure alike.
+    Time,
+    /// Shaded fragments, counted.
+    Fragments,
+    /// Memory traffic, counted: textures, vertices, pictures, uploads.
+    Bytes,
+    /// Energy of the counted traffic, fragments and vertices.
+    #[default]
+    Energy,
+}
+
+impl Objective {
+    /// Name as on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Fragments => "fragments",
+            Self::Bytes => "bytes",
+            Self::Energy => "energy",
+        }
+    }
+
+    /// Unit of its cost.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Time => "s",
+            Self::Fragments => "fragments",
+            Self::Bytes => "bytes",
+            Self::Energy => "mJ",
+        }
+    }
+
+    /// Cost of counts; none where the clock tells it.
+    #[must_use]
+    pub fn counted(self, counts: &Counted) -> Option<f64> {
+        match self {
+            Self::Time => None,
+            Self::Fragments => Some(counts.fragments as f64),
+            Self::Bytes => Some(counts.bytes() as f64),
+            Self::Energy => Some(counts.energy_mj()),
+        }
+    }
+}
