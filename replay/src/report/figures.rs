@@ -260,6 +260,7 @@ mod tests {
                 "layout",
                 "tmu",
                 "dram",
+                "frame",
                 "paper",
                 "functional",
                 "z2_paper"

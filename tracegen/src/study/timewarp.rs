@@ -212,7 +212,8 @@ mod tests {
             ..shown(turned.pictures[0].clone())
         };
         assert!(worst(&by_depth) <= Some(2), "{:?}", worst(&by_depth));
-        assert!(worst(&turned) > Some(40), "{:?}", worst(&turned));
+        // Without depth light is off by up to 0.8 sin(0.25): 0.2 of linear light, over 30 codes of sRGB at mid grey.
+        assert!(worst(&turned) > Some(30), "{:?}", worst(&turned));
     }
 
     #[test]

@@ -55,20 +55,29 @@ pub(super) fn section(report: &PaperReport) -> Result<Option<Section>, PlotError
 
 fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {
     let bytes = |row: &ResultRow, clients: &[Client]| -> u64 {
-        let of = row.result.clients.iter().filter(|c| clients.contains(&c.client));
+        let of = row
+            .result
+            .clients
+            .iter()
+            .filter(|c| clients.contains(&c.client));
         of.map(ClientTraffic::bytes).sum()
     };
     let used: Vec<(usize, (&str, &[Client]))> = (PARTS.into_iter().enumerate())
         .filter(|(_, (_, clients))| rows.iter().any(|row| bytes(row, clients) > 0))
         .collect();
     let bar = |row: &&ResultRow| {
-        let parts = used.iter().map(|(_, (_, clients))| row.mb_per_frame(bytes(row, clients)));
+        let parts = used
+            .iter()
+            .map(|(_, (_, clients))| row.mb_per_frame(bytes(row, clients)));
         (row.point.config.order.title().to_owned(), parts.collect())
     };
     StackedChart {
         title: format!("{scene}: traffic by client"),
         value_label: "MB per frame".to_owned(),
-        series: used.iter().map(|(number, (name, _))| SeriesStyle::nth(*name, *number)).collect(),
+        series: used
+            .iter()
+            .map(|(number, (name, _))| SeriesStyle::nth(*name, *number))
+            .collect(),
         bars: rows.iter().map(bar).collect(),
         bar_px: 72.0,
         decimals: Some(1),
@@ -77,7 +86,13 @@ fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {
 }
 
 fn columns<'a>() -> Vec<Column<'static, ResultRow<'a>>> {
-    let all = |row: &ResultRow| row.result.clients.iter().map(ClientTraffic::bytes).sum::<u64>();
+    let all = |row: &ResultRow| {
+        row.result
+            .clients
+            .iter()
+            .map(ClientTraffic::bytes)
+            .sum::<u64>()
+    };
     let mut columns = crate::report::columns::pick::<ResultRow>(&[
         "label",
         "caches",
@@ -115,7 +130,11 @@ mod tests {
         let text = with_edited(
             |point, result| {
                 let texture = traffic(Client::Texture, 3_000_000 + 1000 * point as u64);
-                result.clients = vec![texture, traffic(Client::Vertex, 500_000), traffic(Client::Colour, 0)];
+                result.clients = vec![
+                    texture,
+                    traffic(Client::Vertex, 500_000),
+                    traffic(Client::Colour, 0),
+                ];
             },
             |report| section(report).unwrap().unwrap().body.into_string(),
         );
