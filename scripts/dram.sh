@@ -1,16 +1,9 @@
 #!/bin/sh
 # What tile orders do to rows of DRAM: `scripts/dram.sh SCENES` writes results/dram-orders.csv, Crytek Sponza, atrium and jungle as the DK2 shows them.
 set -eu
-scenes=$(cd "${1:?the folder with the real scenes}" && pwd)
-cd "$(dirname "$0")/.."
-bin=$(cd "${CARGO_TARGET_DIR:-target}/release" && pwd)
-results=$PWD/results
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-for scene in "$scenes/crytek-sponza/sponza.gltf" atrium jungle; do
-    name=$(basename "${scene%/sponza.gltf}")
-    "$bin/tracegen" raster "$scene" --hmd dk2 --no-plain --quiet -o "$name.textrace"
+. "$(dirname "$0")/captures.sh"
+capture_dk2
+for name in crytek-sponza atrium jungle; do
     for device in lpddr4 gddr6; do
         for order in scanline morton hilbert z2-lrta z2-sta; do
             "$bin/replay" run "$name.textrace" --order $order --dram $device --json 2>/dev/null >"$name,$device,$order.json"

@@ -5,13 +5,7 @@
 #   results/paper-preset.csv    Crytek Sponza as the paper counts
 #   results/open-choices.csv    Crytek Sponza: where textures begin, and the bias of the level of detail
 set -eu
-scenes=$(cd "${1:?the folder with the real scenes}" && pwd)
-cd "$(dirname "$0")/.."
-bin=$(cd "${CARGO_TARGET_DIR:-target}/release" && pwd)
-results=$PWD/results
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
+. "$(dirname "$0")/captures.sh"
 capture() {
     name=$1 scene=$2
     shift 2

@@ -1,16 +1,9 @@
 #!/bin/sh
 # What replacement policies do to texture traffic: `scripts/policies.sh SCENES` writes results/policies.csv, Crytek Sponza, atrium and jungle as the DK2 shows them.
 set -eu
-scenes=$(cd "${1:?the folder with the real scenes}" && pwd)
-cd "$(dirname "$0")/.."
-bin=$(cd "${CARGO_TARGET_DIR:-target}/release" && pwd)
-results=$PWD/results
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-for scene in "$scenes/crytek-sponza/sponza.gltf" atrium jungle; do
-    name=$(basename "${scene%/sponza.gltf}")
-    "$bin/tracegen" raster "$scene" --hmd dk2 --no-plain --quiet -o "$name.textrace"
+. "$(dirname "$0")/captures.sh"
+capture_dk2
+for name in crytek-sponza atrium jungle; do
     for order in morton z2-sta; do
         for policy in lru fifo tree-plru random srrip brrip drrip ship; do
             "$bin/replay" run "$name.textrace" --mode functional --order $order --replacement $policy --json 2>/dev/null >"$name,$order,$policy.json"

@@ -2,13 +2,7 @@
 # All memory traffic of a frame: `scripts/whole-frame.sh SCENES` writes results/whole-frame{,-orders,-bytes}.csv: Crytek Sponza, the black
 # forest and jungle as the DK2 shows them, with shadow cascades, four frames of a head's path, on three machines.
 set -eu
-scenes=$(cd "${1:?the folder with the real scenes}" && pwd)
-cd "$(dirname "$0")/.."
-bin=$(cd "${CARGO_TARGET_DIR:-target}/release" && pwd)
-results=$PWD/results
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
+. "$(dirname "$0")/captures.sh"
 for scene in "$scenes/crytek-sponza/sponza.gltf" "$scenes/stk-black-forest/stk-black-forest.gltf" jungle; do
     name=$(basename "${scene%/sponza.gltf}" .gltf)
     "$bin/tracegen" raster "$scene" --hmd dk2 --shadows --path head --frames 4 --geometry --no-plain --quiet -o "$name.textrace"

@@ -1,5 +1,8 @@
 //! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
 
+mod lower_levels;
+mod prefetch;
+
 use crate::memory::clients::FrameConfig;
 use crate::memory::dram::DramConfig;
 use crate::size::{format_bytes, serde_bytes};
@@ -13,6 +16,8 @@ pub use formats::footprint::{
     AnisotropyModel, FilterOverride, LodFormula, SamplingOptions as SamplingConfig,
 };
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
+pub use lower_levels::{LevelConfig, LowerLevels};
+pub use prefetch::{PrefetchConfig, Prefetching};
 
 /// How time passes in a replay.
 #[derive(
@@ -259,6 +264,12 @@ pub struct RunConfig {
     /// The caches between frames; results name it where it is not the default.
     #[serde(skip_serializing_if = "BetweenFrames::is_default")]
     pub between_frames: BetweenFrames,
+    /// The prefetcher of the L2; without it, only what is requested is fetched.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prefetch: Option<PrefetchConfig>,
+    /// Further cache levels between the L2 and memory, at most four.
+    #[serde(skip_serializing_if = "LowerLevels::is_empty")]
+    pub level: LowerLevels,
     /// The DRAM below the caches; without it, lines that leave the chip are only counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dram: Option<DramConfig>,
@@ -284,6 +295,8 @@ impl Default for RunConfig {
             tile_maps: false,
             hsr: Hsr::EarlyZ,
             between_frames: BetweenFrames::Keep,
+            prefetch: None,
+            level: LowerLevels::default(),
             dram: None,
             frame: None,
         }
@@ -305,7 +318,7 @@ pub enum ConfigError {
         "{level} cache of {size}, {ways} ways, {line_bytes}-byte lines: expected a power-of-two number of sets up to {MOST_SETS}, found {found}"
     )]
     Sets {
-        /// `L1` or `L2`.
+        /// `L1`, `L2`, ...
         level: &'static str,
         /// Size as text.
         size: String,
@@ -321,7 +334,7 @@ pub enum ConfigError {
         "{level} cache of {size}, {line_bytes}-byte lines: expected at most {MOST_LINES} lines in all caches of the level, found {caches} x {found}"
     )]
     Lines {
-        /// `L1` or `L2`.
+        /// `L1`, `L2`, ...
         level: &'static str,
         /// Size as text.
         size: String,
@@ -335,7 +348,7 @@ pub enum ConfigError {
     /// Ways that the policy cannot have.
     #[error("{level} cache with {policy}: expected {expected} ways, found {found}")]
     Ways {
-        /// `L1` or `L2`.
+        /// `L1`, `L2`, ...
         level: &'static str,
         /// Replacement policy.
         policy: &'static str,
@@ -445,7 +458,21 @@ impl RunConfig {
         }
         self.l1.sets("L1", self.line_bytes)?;
         self.l2.sets("L2", self.line_bytes)?;
-        self.l1.check_lines("L1", self.line_bytes, self.cores)
+        self.l1.check_lines("L1", self.line_bytes, self.cores)?;
+        self.level.check(self.line_bytes)?;
+        self.prefetch.as_ref().map_or(Ok(()), PrefetchConfig::check)
+    }
+
+    /// True where the order of the L2's misses matters: they go to further levels or to DRAM, or prefetch others.
+    #[must_use]
+    pub const fn follows_l2_misses(&self) -> bool {
+        self.simulates_below_l2() || self.prefetch.is_some()
+    }
+
+    /// True where the misses of the L2 go to further levels or to DRAM.
+    #[must_use]
+    pub const fn simulates_below_l2(&self) -> bool {
+        self.dram.is_some() || !self.level.is_empty()
     }
 }
 

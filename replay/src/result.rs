@@ -50,6 +50,36 @@ pub struct LevelResult {
     pub counters: LevelCounters,
 }
 
+/// What a prefetcher of the L2 did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PrefetchResult {
+    /// Lines that it fetched.
+    pub lines: u64,
+    /// Those of them that were requested afterwards, while they were there or in flight.
+    pub useful_lines: u64,
+    /// Those of the useful ones that were still in flight then.
+    pub late_lines: u64,
+    /// Prefetched lines that were requested only after they had been evicted.
+    pub evicted_lines: u64,
+}
+
+/// A level below the L2.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LowerLevelResult {
+    /// `L3`, `L4`, ...
+    pub name: String,
+    /// Its line size in bytes.
+    pub line_bytes: u32,
+    /// `line_misses` over `line_lookups`.
+    pub miss_rate: f64,
+    /// Line misses of the level above.
+    pub line_lookups: u64,
+    /// Lines that had to be fetched from below.
+    pub line_misses: u64,
+    /// Look-ups of a line whose fetch was in flight (timed and first-miss mode only).
+    pub secondary_misses: u64,
+}
+
 /// Texture-unit figures of a timed replay, summed over cores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TmuResult {
@@ -64,14 +94,14 @@ pub struct TmuResult {
 }
 
 /// What a replay counts whose threads stop at their first miss: first look-ups of footprints, where
-/// lines on their way are misses, too. Merged requests count, so that no traffic follows from it.
+/// lines in flight are misses, too. Merged requests count, so that no traffic follows from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FirstLookups {
     /// `l1_misses` over footprints.
     pub l1_miss_rate: f64,
     /// `l2_misses` over `l2_lookups`.
     pub l2_miss_rate: f64,
-    /// Footprints whose first look-up found a line absent or on its way.
+    /// Footprints whose first look-up found a line absent or in flight.
     pub l1_misses: u64,
     /// Lines that these did not find.
     pub l2_lookups: u64,
@@ -135,7 +165,7 @@ pub struct RunResult {
     pub l1: LevelResult,
     /// Second level.
     pub l2: LevelResult,
-    /// L2 line misses times the line size.
+    /// Lines that come from memory, prefetched ones included, times the line size of the last level.
     pub external_bytes: u64,
     /// Distinct lines touched: the misses of an infinite cache, a lower bound for L2 misses.
     pub unique_lines: u64,
@@ -148,6 +178,12 @@ pub struct RunResult {
     /// Rates as the Z2 paper very probably counts them; only where threads stop at their first miss.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_lookups: Option<FirstLookups>,
+    /// The prefetcher of the L2, where the configuration has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prefetch: Option<PrefetchResult>,
+    /// The levels below the L2, where the configuration has any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lower_levels: Vec<LowerLevelResult>,
     /// The DRAM below the caches, where the configuration has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dram: Option<DramResult>,

@@ -2,7 +2,10 @@
 //! from the types themselves. `UPDATE_DOCS=1` rewrites the page; review the diff.
 
 use clap::ValueEnum;
-use replay::config::{Allocation, Assign, BetweenFrames, Hsr, Mode, Order, Replacement, RunConfig};
+use replay::config::{
+    Allocation, Assign, BetweenFrames, Hsr, LevelConfig, LowerLevels, Mode, Order, PrefetchConfig,
+    Prefetching, Replacement, RunConfig,
+};
 use replay::memory::clients::{FrameConfig, FrameMachine};
 use replay::memory::dram::{DramConfig, DramPreset, Mapping, PagePolicy};
 use std::fmt::Write as _;
@@ -20,6 +23,9 @@ and all caches of a level together have at most 2^24 lines.
 
     order = \"z2-sta\"
     l1.size_bytes = \"16KiB\"
+    [[level]]                         # an L3; a second table is an L4
+    size_bytes = \"4MiB\"
+    line_bytes = 64
 
 ## Experiment files
 
@@ -104,6 +110,7 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
     match type_name {
         "Order" => of::<Order>(),
         "Replacement" => of::<Replacement>(),
+        "Prefetching" => of::<Prefetching>(),
         "Mode" => of::<Mode>(),
         "Allocation" => of::<Allocation>(),
         "Assign" => of::<Assign>(),
@@ -126,9 +133,11 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
     }
 }
 
-/// The default configuration, with a DRAM below the caches and all clients of memory.
+/// The default configuration, with a prefetcher, an L3 and a DRAM below the caches and all clients of memory.
 fn defaults() -> Table {
     let config = RunConfig {
+        prefetch: Some(PrefetchConfig::default()),
+        level: LowerLevels::of(&[LevelConfig::lru(4 << 20)]).unwrap(),
         dram: Some(DramConfig::default()),
         frame: Some(FrameConfig::default()),
         ..RunConfig::default()
@@ -141,7 +150,10 @@ fn with(key: &str, value: Value) -> Result<RunConfig, String> {
     let mut table = defaults();
     let (mut inner, mut rest) = (&mut table, key);
     while let Some((first, last)) = rest.split_once('.') {
-        inner = inner.get_mut(first).and_then(Value::as_table_mut).unwrap();
+        inner = match inner.get_mut(first).unwrap() {
+            Value::Array(tables) => tables[0].as_table_mut().unwrap(),
+            table => table.as_table_mut().unwrap(),
+        };
         rest = last;
     }
     inner.insert(rest.to_owned(), value);
@@ -185,6 +197,11 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             describe(sources, kind, &format!("{key}."), inner, page);
             continue;
         }
+        if let Some(Value::Array(tables)) = default {
+            let inner = tables[0].as_table().unwrap();
+            describe(sources, "LevelConfig", &format!("{key}."), inner, page);
+            continue;
+        }
         // Keys that the written default leaves out.
         let left_out = match &*key {
             "hsr" => Value::try_from(Hsr::default()).ok(),
@@ -192,7 +209,11 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             _ => None,
         };
         let default = default.or(left_out.as_ref());
-        let default = default.map_or_else(|| "none".to_owned(), |v| format!("`{v}`"));
+        let default = match default {
+            _ if key == "level.size_bytes" => "required".to_owned(),
+            None => "none".to_owned(),
+            Some(value) => format!("`{value}`"),
+        };
         let values = values(sources, kind);
         for (value, _) in &values {
             let read = with(&key, Value::String(value.clone()));
@@ -211,6 +232,8 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
 fn page() -> String {
     let sources: String = [
         "replay/src/config.rs",
+        "replay/src/config/lower_levels.rs",
+        "replay/src/config/prefetch.rs",
         "replay/src/memory/clients.rs",
         "replay/src/memory/dram/mod.rs",
         "replay/src/memory/dram/mapping.rs",
@@ -246,7 +269,10 @@ fn the_page_of_keys_is_what_the_code_reads() {
 #[test]
 fn every_key_has_a_line_that_says_what_it_is() {
     fn count(table: &Table) -> usize {
-        let inner = |value: &Value| value.as_table().map_or(1, count);
+        let inner = |value: &Value| match value {
+            Value::Array(tables) => tables[0].as_table().map_or(1, count),
+            value => value.as_table().map_or(1, count),
+        };
         table.values().map(inner).sum()
     }
     let page = page();
@@ -254,9 +280,9 @@ fn every_key_has_a_line_that_says_what_it_is() {
         .lines()
         .filter(|line| line.starts_with("| `"))
         .collect();
-    // One key has no default, and four are written where they are another.
+    // Two keys have no default, and four are written where they are another.
     let written = count(&defaults());
-    assert_eq!(keys.len(), written + 5);
+    assert_eq!(keys.len(), written + 6);
     for line in keys {
         let about = line.split(" | ").last().unwrap();
         assert!(about.len() > 8, "{line}");

@@ -1,6 +1,6 @@
-//! Caches whose misses arrive later. A line that was asked for and is not there yet is *on its way*
-//! (an entry of a miss status holding register file, without a limit): whoever asks again meanwhile
-//! waits for the same fetch.
+//! Caches whose misses arrive later. A line that was requested and has not arrived is *in flight*
+//! (an entry of a miss status holding register file, without a limit): further requests for it
+//! wait for the same fetch.
 //!
 //! What arrives is filled in the order of arrivals, those of one cycle in the order of their requests.
 //! Cycles never go back from call to call.
@@ -9,40 +9,43 @@ use super::in_flight::InFlight;
 use super::set_order::SetOrder;
 use super::{Cache, FourWayLru};
 
-/// When a line arrives that nobody has asked for.
-pub const NOT_ASKED: u64 = u64::MAX;
+/// The arrival of a line that is not in flight.
+pub const NOT_IN_FLIGHT: u64 = u64::MAX;
 
-/// A cache and what is on its way into it.
+/// A cache and what is in flight into it.
 pub trait DelayedFill: Send {
-    /// Looks up lines, which marks those that are there as used. Of the others it tells the index, in
-    /// order, the line and when it arrives: [`NOT_ASKED`] if nobody has asked for it.
+    /// Looks up lines, which marks those that are there as used. For the others it reports the index, in
+    /// order, the line and its arrival: [`NOT_IN_FLIGHT`] if it was not requested.
     fn look_up_all(&mut self, lines: &[u32], now: u64, missing: impl FnMut(usize, u32, u64));
 
-    /// Looks up a line, which marks it used. When it arrives: 0 if it is there, [`NOT_ASKED`] if nobody
-    /// has asked for it.
+    /// Looks up a line, which marks it used. When it arrives: 0 if it is there, [`NOT_IN_FLIGHT`] if
+    /// it was not requested.
     fn look_up(&mut self, line: u32, now: u64) -> u64;
 
-    /// When a line arrives that is on its way; [`NOT_ASKED`] if it is not.
+    /// When a line arrives that is in flight; [`NOT_IN_FLIGHT`] if it is not.
     fn arrival(&mut self, line: u32, now: u64) -> u64;
 
-    /// Fills a line that is neither there nor on its way: at once, or when it arrives. It was looked up in
-    /// this cycle.
+    /// True if the line is there or in flight. Marks nothing as used.
+    fn holds(&mut self, line: u32, now: u64) -> bool;
+
+    /// Fills a line that is neither there nor in flight: at once, or when it arrives. [`Self::look_up`] or
+    /// [`Self::holds`] was called for it in this cycle.
     fn enter(&mut self, line: u32, now: u64, arrival: u64);
 
-    /// Takes all lines out, and forgets those on their way.
+    /// Empties the cache and drops the lines in flight.
     fn clear(&mut self);
 }
 
 /// A cache that can fill later.
 pub trait Delay {
-    /// It and what is on its way.
+    /// It and what is in flight.
     type Delayed: DelayedFill;
 
     /// An empty cache, into which most lines arrive within `usual_cycles`.
     fn delayed(self, usual_cycles: u64) -> Self::Delayed;
 }
 
-/// Of any policy: filled in the order of time.
+/// Any policy: filled in the order of time.
 impl Delay for Box<dyn Cache> {
     type Delayed = TimeOrder<Self>;
 
@@ -54,7 +57,7 @@ impl Delay for Box<dyn Cache> {
     }
 }
 
-/// No set knows of another, so each is filled when somebody comes to it.
+/// Sets are independent, so each is filled when it is next accessed.
 impl Delay for FourWayLru {
     type Delayed = SetOrder;
 
@@ -77,7 +80,7 @@ impl<C: Cache> DelayedFill for TimeOrder<C> {
         while let Some(index) = self.cache.lookup_all(&lines[start..]) {
             let index = start + index;
             let line = lines[index];
-            let arrival = self.in_flight.arrival(line).unwrap_or(NOT_ASKED);
+            let arrival = self.in_flight.arrival(line).unwrap_or(NOT_IN_FLIGHT);
             missing(index, line, arrival);
             start = index + 1;
         }
@@ -88,12 +91,17 @@ impl<C: Cache> DelayedFill for TimeOrder<C> {
         if self.cache.lookup(line) {
             return 0;
         }
-        self.in_flight.arrival(line).unwrap_or(NOT_ASKED)
+        self.in_flight.arrival(line).unwrap_or(NOT_IN_FLIGHT)
     }
 
     fn arrival(&mut self, line: u32, now: u64) -> u64 {
         self.in_flight.arrive(now, &mut self.cache);
-        self.in_flight.arrival(line).unwrap_or(NOT_ASKED)
+        self.in_flight.arrival(line).unwrap_or(NOT_IN_FLIGHT)
+    }
+
+    fn holds(&mut self, line: u32, now: u64) -> bool {
+        self.in_flight.arrive(now, &mut self.cache);
+        self.cache.contains(line) || self.in_flight.arrival(line).is_some()
     }
 
     fn enter(&mut self, line: u32, now: u64, arrival: u64) {

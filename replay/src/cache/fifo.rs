@@ -26,6 +26,10 @@ impl Fifo {
 
 impl Cache for Fifo {
     fn lookup(&mut self, line: u32) -> bool {
+        self.contains(line)
+    }
+
+    fn contains(&self, line: u32) -> bool {
         let first = (line & self.set_mask) as usize * self.ways;
         self.tags[first..first + self.ways].contains(&line)
     }

@@ -1,5 +1,5 @@
 //! Misses in flight (the entries of a miss status holding register file, without a limit): a line
-//! that was asked for and is not there yet. Whoever asks again meanwhile waits for the same fetch.
+//! that was requested and has not arrived. Further requests for it wait for the same fetch.
 //!
 //! Arrivals lie in a calendar: a list of lines for each of the next cycles, and a bit for each list
 //! that is not empty, so that neither a request nor an arrival searches. What arrives after the
@@ -12,10 +12,10 @@ use std::collections::BinaryHeap;
 /// No entry.
 const NONE: u32 = u32::MAX;
 
-/// Lists by the low bits of the line, to find one that is on its way.
+/// Lists by the low bits of the line, to find one that is in flight.
 const CHAINS: usize = 256;
 
-/// A line on its way. Entries are reused when it has arrived.
+/// A line in flight. Entries are reused when it has arrived.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     line: u32,
@@ -33,7 +33,7 @@ struct Day {
     last: u32,
 }
 
-/// Lines on their way into one cache.
+/// Lines in flight into one cache.
 #[derive(Clone, Debug)]
 pub struct InFlight {
     entries: Vec<Entry>,
@@ -73,12 +73,12 @@ impl InFlight {
         }
     }
 
-    /// Forgets all that is on its way.
+    /// Forgets all that is in flight.
     pub fn clear(&mut self) {
         *self = Self::new(self.days.len() as u64 - 1);
     }
 
-    /// When the line arrives, if it is on its way.
+    /// When the line arrives, if it is in flight.
     #[inline(always)]
     #[must_use]
     pub fn arrival(&self, line: u32) -> Option<u64> {
@@ -93,7 +93,7 @@ impl InFlight {
         None
     }
 
-    /// The line, which is not on its way yet, will arrive at `cycle`, after `now`. All that arrives
+    /// The line, which is not in flight yet, will arrive at `cycle`, after `now`. All that arrives
     /// up to `now` has been taken by [`Self::arrive`].
     pub fn request(&mut self, line: u32, now: u64, cycle: u64) {
         let entry = Entry {
@@ -269,6 +269,10 @@ mod tests {
 
     impl Cache for Fills {
         fn lookup(&mut self, line: u32) -> bool {
+            self.0.contains(&line)
+        }
+
+        fn contains(&self, line: u32) -> bool {
             self.0.contains(&line)
         }
 

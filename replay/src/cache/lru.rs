@@ -186,6 +186,12 @@ impl<W: Ways> Cache for Lru<W> {
     }
 
     #[inline(always)]
+    fn contains(&self, line: u32) -> bool {
+        let ways = self.ways.ways();
+        let first = line.set(self.set_mask) * ways;
+        self.tags[first..first + ways].contains(&line)
+    }
+
     fn fill(&mut self, line: u32) {
         let set = self.set(line);
         for way in (1..set.len()).rev() {

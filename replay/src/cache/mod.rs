@@ -4,25 +4,30 @@
 //! missing line arrives only after the miss penalty: [`Cache::lookup`] when it is wanted,
 //! [`Cache::fill`] when it is there.
 
+mod below;
 mod delayed;
 mod fifo;
 mod forest;
 mod in_flight;
 mod levels;
 mod lru;
-mod on_the_way;
+mod mshr;
+mod prefetch;
 mod random;
 mod reserved;
 mod rrip;
 mod set_order;
+mod shared;
 mod ship;
 mod tree_plru;
 
-pub use delayed::{Delay, DelayedFill, NOT_ASKED};
+pub use delayed::{Delay, DelayedFill, NOT_IN_FLIGHT};
 pub use forest::Forest;
 pub use levels::Levels;
 pub use lru::{AnyWays, FourWayLru, Lru, WaysOf};
+pub use prefetch::Prefetching;
 pub use reserved::AllocateOnMiss;
+pub use shared::{Answer, MissPath, MissPathResult, SharedLevel};
 
 use crate::config::{CacheConfig, ConfigError};
 use crate::registry::{Named, registry};
@@ -107,6 +112,9 @@ pub trait Cache: Send {
     /// True if the line is there; marks it used.
     fn lookup(&mut self, line: u32) -> bool;
 
+    /// True if the line is there. Changes nothing.
+    fn contains(&self, line: u32) -> bool;
+
     /// Looks up lines one after another until one is not there: its index.
     fn lookup_all(&mut self, lines: &[u32]) -> Option<usize> {
         lines.iter().position(|&line| !self.lookup(line))
@@ -137,6 +145,10 @@ pub trait Cache: Send {
 impl Cache for Box<dyn Cache> {
     fn lookup(&mut self, line: u32) -> bool {
         (**self).lookup(line)
+    }
+
+    fn contains(&self, line: u32) -> bool {
+        (**self).contains(line)
     }
 
     fn lookup_all(&mut self, lines: &[u32]) -> Option<usize> {

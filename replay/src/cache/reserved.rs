@@ -5,8 +5,8 @@
 //! same; later ones miss. (Hardware that never replaces a line in flight has to stall instead.)
 
 use super::Cache;
-use super::delayed::{Delay, DelayedFill, NOT_ASKED};
-use super::on_the_way::OnTheWay;
+use super::delayed::{Delay, DelayedFill, NOT_IN_FLIGHT};
+use super::mshr::Mshrs;
 
 /// A cache that is to allocate on a miss.
 pub struct AllocateOnMiss(pub Box<dyn Cache>);
@@ -17,7 +17,7 @@ impl Delay for AllocateOnMiss {
     fn delayed(self, _usual_cycles: u64) -> Reserved {
         Reserved {
             cache: self.0,
-            in_flight: OnTheWay::new(),
+            in_flight: Mshrs::new(),
         }
     }
 }
@@ -25,7 +25,7 @@ impl Delay for AllocateOnMiss {
 /// A cache whose lines may still be in flight.
 pub struct Reserved {
     cache: Box<dyn Cache>,
-    in_flight: OnTheWay,
+    in_flight: Mshrs,
 }
 
 impl DelayedFill for Reserved {
@@ -41,13 +41,17 @@ impl DelayedFill for Reserved {
     fn look_up(&mut self, line: u32, now: u64) -> u64 {
         let allocated = self.cache.lookup(line);
         match self.in_flight.arrival(line, now) {
-            NOT_ASKED if allocated => 0,
+            NOT_IN_FLIGHT if allocated => 0,
             arrival => arrival,
         }
     }
 
     fn arrival(&mut self, line: u32, now: u64) -> u64 {
         self.in_flight.arrival(line, now)
+    }
+
+    fn holds(&mut self, line: u32, now: u64) -> bool {
+        self.cache.contains(line) || self.in_flight.arrival(line, now) != NOT_IN_FLIGHT
     }
 
     fn enter(&mut self, line: u32, now: u64, arrival: u64) {

@@ -74,6 +74,12 @@ impl Sets {
         first + predictions.iter().position(|&p| p == DISTANT).unwrap_or(0)
     }
 
+    /// True if the line is there.
+    pub(super) fn contains(&self, line: u32) -> bool {
+        let first = self.set(line) * self.ways;
+        self.tags[first..first + self.ways].contains(&line)
+    }
+
     /// The line at a place, [`EMPTY`] where there is none.
     pub(super) fn line(&self, place: usize) -> u32 {
         self.tags[place]
@@ -154,6 +160,10 @@ impl Rrip {
 impl Cache for Rrip {
     fn lookup(&mut self, line: u32) -> bool {
         self.sets.lookup(line).is_some()
+    }
+
+    fn contains(&self, line: u32) -> bool {
+        self.sets.contains(line)
     }
 
     fn fill(&mut self, line: u32) {

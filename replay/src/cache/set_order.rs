@@ -1,30 +1,30 @@
 //! An LRU cache of four ways whose sets are filled one by one.
 //!
 //! What a fill does to a set depends on this set alone, so it need not be done when the line arrives,
-//! but when somebody comes to the set next. Each set keeps what is on its way into it: no calendar.
+//! but when the set is next accessed. Each set keeps what is in flight into it: no calendar.
 
 use super::EMPTY;
-use super::delayed::{DelayedFill, NOT_ASKED};
+use super::delayed::{DelayedFill, NOT_IN_FLIGHT};
 use super::lru::look_up;
-use super::on_the_way::OnTheWay;
+use super::mshr::Mshrs;
 
-/// A line on its way.
+/// A line in flight.
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
     cycle: u64,
     line: u32,
 }
 
-/// A set. What is on its way into it first lies with it.
+/// A set. What is in flight into it first lies with it.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 struct Set {
     /// In order of last use, most recent first.
     tags: [u32; 4],
-    /// When the first line arrives; the end of time if none is on its way.
+    /// When the first line arrives; the end of time if none is in flight.
     due: u64,
     first: u32,
-    /// Lines on their way after it, in [`SetOrder::later`].
+    /// Lines in flight after it, in [`SetOrder::later`].
     later: u32,
 }
 
@@ -35,7 +35,7 @@ const EMPTY_SET: Set = Set {
     later: 0,
 };
 
-/// An LRU cache of four ways and what is on its way into its sets.
+/// An LRU cache of four ways and what is in flight into its sets.
 #[derive(Clone, Debug)]
 pub struct SetOrder {
     /// A power of two.
@@ -43,7 +43,7 @@ pub struct SetOrder {
     /// By set.
     later: Vec<Later>,
     /// All of them.
-    on_the_way: OnTheWay,
+    mshrs: Mshrs,
 }
 
 /// What arrives in a set after its first line.
@@ -55,7 +55,7 @@ struct Later {
 }
 
 impl Later {
-    /// Most arrive after all that are on their way.
+    /// Most arrive after all that are in flight.
     #[inline(always)]
     fn enter(&mut self, new: Arrival) {
         let all = self.arrivals.len();
@@ -107,7 +107,7 @@ impl SetOrder {
         Self {
             sets: vec![EMPTY_SET; sets as usize],
             later: vec![Later::default(); sets as usize],
-            on_the_way: OnTheWay::new(),
+            mshrs: Mshrs::new(),
         }
     }
 
@@ -149,14 +149,14 @@ impl Set {
 
     /// When a line arrives that the set does not hold.
     #[inline(always)]
-    fn arrival(&self, on_the_way: &OnTheWay, line: u32, now: u64) -> u64 {
+    fn arrival(&self, mshrs: &Mshrs, line: u32, now: u64) -> u64 {
         if self.first == line {
             return self.due;
         }
         if self.later == 0 {
-            return NOT_ASKED;
+            return NOT_IN_FLIGHT;
         }
-        on_the_way.arrival(line, now)
+        mshrs.arrival(line, now)
     }
 }
 
@@ -172,7 +172,7 @@ impl DelayedFill for SetOrder {
                 set.settle(&mut laters[index], now);
             }
             if !look_up(&mut set.tags, line) {
-                missing(at, line, set.arrival(&self.on_the_way, line, now));
+                missing(at, line, set.arrival(&self.mshrs, line, now));
             }
         }
     }
@@ -184,14 +184,20 @@ impl DelayedFill for SetOrder {
             return 0;
         }
         let set = *set;
-        set.arrival(&self.on_the_way, line, now)
+        set.arrival(&self.mshrs, line, now)
     }
 
     #[inline(always)]
     fn arrival(&mut self, line: u32, now: u64) -> u64 {
         let (set, _) = self.settled(line, now);
         let set = *set;
-        set.arrival(&self.on_the_way, line, now)
+        set.arrival(&self.mshrs, line, now)
+    }
+
+    fn holds(&mut self, line: u32, now: u64) -> bool {
+        let (set, _) = self.settled(line, now);
+        let set = *set;
+        set.tags.contains(&line) || set.arrival(&self.mshrs, line, now) != NOT_IN_FLIGHT
     }
 
     #[inline(always)]
@@ -219,13 +225,13 @@ impl DelayedFill for SetOrder {
             });
             set.later += 1;
         }
-        self.on_the_way.enter(line, now, arrival);
+        self.mshrs.enter(line, now, arrival);
     }
 
     fn clear(&mut self) {
         self.sets.fill(EMPTY_SET);
         self.later.iter_mut().for_each(Later::clear);
-        self.on_the_way.clear();
+        self.mshrs.clear();
     }
 }
 
@@ -239,7 +245,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(256))]
 
-        /// Sets with many lines on their way; lines that arrive at once, in one cycle, out of order.
+        /// Sets with many lines in flight; lines that arrive at once, in one cycle, out of order.
         #[test]
         fn sets_filled_one_by_one_equal_a_cache_filled_in_the_order_of_time(
             steps in prop::collection::vec(
@@ -264,11 +270,11 @@ mod tests {
                 general.look_up_all(&lines, now, |index, line, arrival| expected.push((index, line, arrival)));
                 prop_assert_eq!(&found, &expected);
                 prop_assert!(found.iter().all(|(index, line, _)| lines[*index] == *line));
-                let absent = found.iter().filter(|(.., arrival)| *arrival == NOT_ASKED);
+                let absent = found.iter().filter(|(.., arrival)| *arrival == NOT_IN_FLIGHT);
                 for &(_, line, _) in absent {
                     // Somebody before it in the list may have asked for it just now.
                     prop_assert_eq!(sets.look_up(line, now), general.look_up(line, now));
-                    if sets.arrival(line, now) == NOT_ASKED && sets.look_up(line, now) != 0 {
+                    if sets.arrival(line, now) == NOT_IN_FLIGHT && sets.look_up(line, now) != 0 {
                         sets.enter(line, now, now + latency);
                         general.enter(line, now, now + latency);
                     }

@@ -52,6 +52,10 @@ impl Cache for Ship {
         found.is_some()
     }
 
+    fn contains(&self, line: u32) -> bool {
+        self.sets.contains(line)
+    }
+
     fn fill(&mut self, line: u32) {
         let place = self.sets.victim(self.sets.set(line));
         let victim = self.sets.line(place);

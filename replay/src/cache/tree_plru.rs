@@ -58,6 +58,11 @@ impl Cache for TreePlru {
         way.is_some()
     }
 
+    fn contains(&self, line: u32) -> bool {
+        let first = (line & self.set_mask) as usize * self.ways;
+        self.tags[first..first + self.ways].contains(&line)
+    }
+
     fn fill(&mut self, line: u32) {
         let set = (line & self.set_mask) as usize;
         let first = set * self.ways;

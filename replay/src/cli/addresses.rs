@@ -5,7 +5,7 @@ use super::experiment_args::parse_caches;
 use crate::addresses::{self, KindSet};
 use crate::config::RunConfig;
 use crate::report::addresses as report;
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use formats::interop::plain::{AccessKind, AddressFile, AddressForm};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -117,6 +117,18 @@ fn only_with_addresses(flags: &[(&str, bool)]) -> Result<()> {
     }
 }
 
+/// Refuses a configuration with more than an L1 and an L2, which `place` cannot simulate.
+///
+/// # Errors
+/// The configuration has `[prefetch]`, `[[level]]`, `[dram]` or `[frame]`.
+pub fn two_levels_only(config: &RunConfig, place: &str) -> Result<()> {
+    ensure!(
+        !config.follows_l2_misses() && config.frame.is_none(),
+        "{place}: expected an L1 and an L2 only, found [prefetch], [[level]], [dram] or [frame]"
+    );
+    Ok(())
+}
+
 /// What plain addresses are called.
 #[must_use]
 pub fn name_of(path: &Path) -> String {
@@ -160,6 +172,7 @@ impl AddressArgs {
     /// # Errors
     /// Wrong cache sizes, unreadable input.
     pub fn run(&self, path: &Path, config: &RunConfig, json: bool) -> Result<ExitCode> {
+        two_levels_only(config, "--addresses")?;
         let configs = self.configs(config)?;
         let kinds = self.input.kinds();
         let start = Instant::now();

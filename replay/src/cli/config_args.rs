@@ -2,7 +2,7 @@
 
 use crate::config::{
     Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr,
-    LodFormula, Mode, Order, Replacement, RunConfig, TextureOrder,
+    LodFormula, Mode, Order, Prefetching, Replacement, RunConfig, TextureOrder,
 };
 use crate::memory::clients::FrameMachine;
 use crate::memory::dram::DramPreset;
@@ -42,7 +42,10 @@ pub struct ConfigArgs {
     /// Size of the shared L2
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     l2: Option<u64>,
-    /// Associativity of both levels
+    /// Size of an L3 below the L2, 16 ways unless a `[[level]]` of --config says otherwise
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    l3: Option<u64>,
+    /// Associativity of L1 and L2
     #[arg(long, value_name = "N")]
     ways: Option<u32>,
     /// Associativity of the L1
@@ -51,10 +54,10 @@ pub struct ConfigArgs {
     /// Associativity of the L2
     #[arg(long, value_name = "N")]
     l2_ways: Option<u32>,
-    /// Replacement policy of both levels
+    /// Replacement policy of L1 and L2
     #[arg(long)]
     replacement: Option<Replacement>,
-    /// Line size of both levels
+    /// Line size of L1 and L2
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     line: Option<u64>,
     /// Shader cores
@@ -74,6 +77,9 @@ pub struct ConfigArgs {
     #[arg(long)]
     between_frames: Option<BetweenFrames>,
 
+    /// Prefetcher of the L2, of 4 lines unless `[prefetch]` of --config says otherwise
+    #[arg(long, value_name = "PREFETCHER")]
+    prefetch: Option<Prefetching>,
     /// DRAM below the caches, with two channels unless `[dram]` of --config says otherwise: lpddr4, lpddr5, ddr4, gddr6
     #[arg(long, value_name = "DEVICE", value_parser = named::<DramPreset>)]
     dram: Option<DramPreset>,
@@ -208,6 +214,8 @@ impl ConfigArgs {
             ("--assign", self.assign.is_some()),
             ("--between-frames", self.between_frames.is_some()),
             ("--hsr", self.hsr.is_some()),
+            ("--l3", self.l3.is_some()),
+            ("--prefetch", self.prefetch.is_some()),
             ("--dram", self.dram.is_some()),
             ("--frame", self.frame.is_some()),
             ("--filter", self.filter.is_some()),
@@ -262,6 +270,12 @@ impl ConfigArgs {
         set(&mut config.seed, self.seed);
         set(&mut config.hsr, self.hsr);
         set(&mut config.between_frames, self.between_frames);
+        if let Some(size_bytes) = self.l3 {
+            config.level.l3(size_bytes);
+        }
+        if let Some(prefetcher) = self.prefetch {
+            config.prefetch.get_or_insert_default().prefetcher = prefetcher;
+        }
         if let Some(preset) = self.dram {
             config.dram.get_or_insert_default().preset = preset;
         }

@@ -1,7 +1,7 @@
 //! `replay locality`: reuse distances and what follows from them, order beside order.
 
 use super::ConfigArgs;
-use super::addresses::{AddressInput, name_of};
+use super::addresses::{AddressInput, name_of, two_levels_only};
 use super::experiment_args::{page_outputs, parse_orders, write_page};
 use super::subjects::Traces;
 use crate::config::{Order, RunConfig};
@@ -65,6 +65,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.threads.start()?;
     let config = args.machine.resolve()?;
+    two_levels_only(&config, "locality")?;
     ensure!(
         config.order == RunConfig::default().order,
         "--order is varied here; use --orders"

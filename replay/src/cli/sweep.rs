@@ -213,7 +213,7 @@ impl<'a> Sweep<'a> {
             "shard {}/{}: {}",
             shard.number,
             shard.count,
-            work.told(tasks.len())
+            work.summary(tasks.len())
         ));
         Ok(())
     }

@@ -7,14 +7,13 @@
 use super::counts::CacheCounts;
 use super::first_miss::FirstMiss;
 use super::functional::Functional;
-use super::in_turn::{Stage, in_turn};
 use super::one_pass::{LevelGeometry, OnePass, geometry};
+use super::scheduler::{Stage, run_within_memory};
 use super::timed::Timed;
 use super::wave::Wave;
 use super::{Machine, ReplayError};
-use crate::cache::{Delay, Levels};
+use crate::cache::{Delay, Levels, MissPath, MissPathResult};
 use crate::config::{Allocation, CacheConfig, Mode, RunConfig, TmuConfig};
-use crate::memory::dram::{Dram, DramResult};
 use crate::result::{RunResult, TmuResult};
 use crate::stream::{Expander, LineMemory, TileSource};
 use crate::tmu::PipelineStats;
@@ -48,9 +47,9 @@ impl Work {
         self.expansions += other.expansions;
     }
 
-    /// What was shared and skipped of so many points, for whoever waited for them.
+    /// What was shared and skipped of so many points, as a line for the user.
     #[must_use]
-    pub fn told(&self, points: usize) -> String {
+    pub fn summary(&self, points: usize) -> String {
         let Self {
             replays,
             passes,
@@ -74,8 +73,8 @@ pub struct Outcome {
     pub tmu: Option<TmuResult>,
     /// Cycles until the last core was done; none in functional mode.
     pub cycles: Option<u64>,
-    /// The DRAM, where there is one.
-    pub dram: Option<DramResult>,
+    /// What was counted beside and below the L2.
+    pub path: MissPathResult,
 }
 
 impl Outcome {
@@ -96,7 +95,7 @@ impl Outcome {
                 loops: sum.loops,
             }),
             cycles: Some(cycles),
-            dram: None,
+            path: MissPathResult::default(),
         }
     }
 }
@@ -107,7 +106,7 @@ impl From<CacheCounts> for Outcome {
             counts,
             tmu: None,
             cycles: None,
-            dram: None,
+            path: MissPathResult::default(),
         }
     }
 }
@@ -119,7 +118,7 @@ pub struct Job<'a> {
     pub trace: &'a dyn TileSource,
     /// The configurations.
     pub configs: &'a [RunConfig],
-    /// Is told each result, by the index of its configuration, as soon as it is there.
+    /// Called with each result and the index of its configuration, as soon as it is complete.
     pub finished: &'a (dyn Fn(usize, RunResult) + Sync),
 }
 
@@ -176,21 +175,21 @@ pub fn replay_jobs(
     let enough = Expander::CHUNK * rayon::current_num_threads();
     let failed = Mutex::new(Vec::new());
     let run = |(index, job, passes): (usize, usize, Vec<Pass<'_>>),
-               comes_to: &(dyn Fn(Stage) + Sync)| {
+               report_stage: &(dyn Fn(Stage) + Sync)| {
         let first = passes[0].points[0];
         let wave = Wave {
             job: jobs[job],
             memory,
-            comes_to,
+            report_stage,
         };
         if let Err(error) = wave.run(passes) {
             let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);
             failed.push((index, job, first, error));
         }
     };
-    in_turn(waves, enough, || memory.half_is_left(), run);
+    run_within_memory(waves, enough, || memory.half_is_left(), run);
     let mut failed = failed.into_inner().unwrap_or_else(PoisonError::into_inner);
-    // The first of a job is what is told.
+    // Each job reports its first failure.
     failed.sort_by_key(|(index, ..)| std::cmp::Reverse(*index));
     for (_, job, first, error) in failed {
         answers[job] = Err((first, error));
@@ -275,6 +274,8 @@ fn stream_key(config: &RunConfig) -> RunConfig {
         cores: usual.cores,
         assign: usual.assign,
         between_frames: usual.between_frames,
+        prefetch: None,
+        level: usual.level,
         dram: None,
         ..pass_key(config)
     }
@@ -305,8 +306,7 @@ pub(super) struct Pass<'a> {
 fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
     let shared = |index: &usize| {
         let config = &configs[*index];
-        // A shared pass does not see the misses of one cache in their order.
-        config.mode == Mode::Functional && config.dram.is_none() && geometry(config).is_some()
+        shares_passes(config) && geometry(config).is_some()
     };
     let (together, alone): (Vec<usize>, Vec<usize>) = stream.into_iter().partition(shared);
     let mut groups: Vec<Vec<usize>> = alone.into_iter().map(|index| vec![index]).collect();
@@ -347,9 +347,7 @@ impl Pass<'_> {
         let config = self.config();
         let bins = expander.bins();
         let counts = || CacheCounts::new(bins, config.tile_maps);
-        let geometries = self
-            .geometries()
-            .filter(|_| config.mode == Mode::Functional && config.dram.is_none());
+        let geometries = self.geometries().filter(|_| shares_passes(config));
         if let Some(geometries) = geometries {
             let maps = self.points.iter().any(|&p| self.configs[p].tile_maps);
             return Ok(Box::new(OnePass::new(
@@ -360,24 +358,31 @@ impl Pass<'_> {
             )));
         }
         let levels = Levels::build(config)?;
+        let path = MissPath::build(config)?;
         if config.mode == Mode::Functional {
             return Ok(match levels.all_four_way() {
-                Ok(levels) => Box::new(Functional::new(levels, counts(), dram(config))),
-                Err(levels) => Box::new(Functional::new(levels, counts(), dram(config))),
+                Ok(levels) => Box::new(Functional::new(levels, counts(), path)),
+                Err(levels) => Box::new(Functional::new(levels, counts(), path)),
             });
         }
         if config.tmu.allocation == Allocation::OnMiss {
-            return Ok(with_latencies(config, levels.allocate_on_miss(), counts()));
+            return Ok(with_latencies(
+                config,
+                levels.allocate_on_miss(),
+                counts(),
+                path,
+            ));
         }
         Ok(match levels.all_four_way() {
-            Ok(levels) => with_latencies(config, levels, counts()),
-            Err(levels) => with_latencies(config, levels, counts()),
+            Ok(levels) => with_latencies(config, levels, counts(), path),
+            Err(levels) => with_latencies(config, levels, counts(), path),
         })
     }
 }
 
-fn dram(config: &RunConfig) -> Option<Dram> {
-    (config.dram.as_ref()).map(|dram| Dram::new(dram, config.line_bytes))
+/// A shared pass does not see the misses of one L2 in their order.
+const fn shares_passes(config: &RunConfig) -> bool {
+    matches!(config.mode, Mode::Functional) && !config.follows_l2_misses()
 }
 
 /// The machine of a configuration where time passes.
@@ -385,12 +390,13 @@ fn with_latencies<C: Delay>(
     config: &RunConfig,
     levels: Levels<C>,
     counts: CacheCounts,
+    path: MissPath,
 ) -> Box<dyn Machine>
 where
     C::Delayed: 'static,
 {
     match config.mode {
-        Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts, dram(config))),
-        _ => Box::new(Timed::new(levels, config.tmu, counts, dram(config))),
+        Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts, path)),
+        _ => Box::new(Timed::new(levels, config.tmu, counts, path)),
     }
 }

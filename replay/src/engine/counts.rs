@@ -9,7 +9,7 @@ pub struct Misses {
     pub footprints: u64,
     /// Lines that had to be fetched.
     pub lines: u64,
-    /// Lines that were on their way already (timed mode only).
+    /// Lines that were in flight already (timed mode only).
     pub secondary: u64,
 }
 
@@ -36,11 +36,11 @@ pub struct TileMisses {
 pub struct FootprintMisses {
     /// Lines that the L1 fetched.
     pub l1_lines: u32,
-    /// Lines on their way into the L1.
+    /// Lines in flight into the L1.
     pub l1_secondary: u32,
     /// Lines that the L2 fetched.
     pub l2_lines: u32,
-    /// Lines on their way into the L2.
+    /// Lines in flight into the L2.
     pub l2_secondary: u32,
 }
 
@@ -49,7 +49,7 @@ pub struct FootprintMisses {
 pub struct CacheCounts {
     /// By cell, see [`Bins`].
     pub cells: Vec<CellMisses>,
-    /// By tile; empty where nobody asked for them.
+    /// By tile; empty unless requested.
     pub tiles: Vec<TileMisses>,
 }
 
@@ -64,7 +64,7 @@ impl CacheCounts {
         }
     }
 
-    /// Counts lines of footprints that were on their way into the L1.
+    /// Counts lines of footprints that were in flight into the L1.
     #[inline]
     pub fn secondary(&mut self, cell: usize, lines: u32) {
         self.cells[cell].l1.secondary += u64::from(lines);

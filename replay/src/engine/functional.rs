@@ -3,27 +3,26 @@
 use super::Machine;
 use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
-use crate::cache::{Cache, Levels};
+use crate::cache::{Cache, Levels, MissPath, SharedLevel};
 use crate::config::{Assign, RunConfig};
-use crate::memory::dram::Dram;
 use crate::order::Phase;
 use crate::stream::{Consumer, Cores, QuadLines, StreamError, interleave};
 
 /// L1 caches over a shared L2.
 pub struct Functional<C> {
-    levels: Levels<C>,
+    l1: Vec<C>,
+    l2: SharedLevel<C>,
     /// What missed.
     pub counts: CacheCounts,
-    dram: Option<Dram>,
 }
 
 impl<C: Cache> Functional<C> {
     /// Empty caches.
-    pub fn new(levels: Levels<C>, counts: CacheCounts, dram: Option<Dram>) -> Self {
+    pub fn new(levels: Levels<C>, counts: CacheCounts, path: MissPath) -> Self {
         Self {
-            levels,
+            l1: levels.l1,
+            l2: SharedLevel::new(levels.l2, path),
             counts,
-            dram,
         }
     }
 
@@ -35,11 +34,7 @@ impl<C: Cache> Functional<C> {
             ..FootprintMisses::default()
         };
         for &line in lines {
-            let is_miss = !self.levels.l2.access(line);
-            misses.l2_lines += u32::from(is_miss);
-            if is_miss && let Some(dram) = &mut self.dram {
-                dram.read(line, None);
-            }
+            misses.l2_lines += u32::from(!self.l2.access(line));
         }
         self.counts.footprint(cell, tile, &misses);
     }
@@ -47,7 +42,7 @@ impl<C: Cache> Functional<C> {
 
 impl<C: Cache> Consumer for Functional<C> {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
-        let safe_lines = self.levels.l1[core].repeat_safe_lines() as usize;
+        let safe_lines = self.l1[core].repeat_safe_lines() as usize;
         for footprint in quad.footprints() {
             // Repeats that would find everything there need no simulation.
             let repeats_are_idle = footprint.lines.len() <= safe_lines;
@@ -57,7 +52,7 @@ impl<C: Cache> Consumer for Functional<C> {
                 footprint.repeats
             };
             for _ in 0..=repeats {
-                let l1 = &mut self.levels.l1[core];
+                let l1 = &mut self.l1[core];
                 let (mut missing, mut count) = ([0; 4], 0);
                 for &line in footprint.lines {
                     if !l1.access(line) {
@@ -84,13 +79,13 @@ impl<C: Cache> Machine for Functional<C> {
     }
 
     fn flush(&mut self) {
-        self.levels.l1.iter_mut().for_each(Cache::clear);
-        self.levels.l2.clear();
+        self.l1.iter_mut().for_each(Cache::clear);
+        self.l2.empty();
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
         Outcome {
-            dram: self.dram.as_ref().map(Dram::result),
+            path: self.l2.result(),
             ..self.counts.clone().into()
         }
     }

@@ -4,9 +4,9 @@ mod batch;
 mod counts;
 mod first_miss;
 mod functional;
-mod in_turn;
 mod items;
 mod one_pass;
+mod scheduler;
 mod summary;
 #[cfg(test)]
 mod tests;

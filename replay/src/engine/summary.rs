@@ -57,6 +57,8 @@ pub fn summary(
         tmu: None,
         cycles: None,
         first_lookups: None,
+        prefetch: None,
+        lower_levels: Vec::new(),
         dram: None,
         clients: Vec::new(),
         geometry: None,

@@ -2,7 +2,7 @@ use super::counts::CacheCounts;
 use super::functional::Functional;
 use super::summary::summary;
 use super::*;
-use crate::cache::{AnyCache, Levels};
+use crate::cache::{AnyCache, Levels, MissPath};
 use crate::config::{BetweenFrames, CacheConfig, Mode, Order, Replacement};
 use crate::order::{self, WorkItem};
 use crate::result::LevelCounters;
@@ -286,7 +286,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
 
 #[test]
 fn misses_in_flight_are_merged_and_counted_apart() {
-    // Two quads at the same place: the second wants the lines that the first has on the way.
+    // Two quads at the same place: the second wants the lines that the first has in flight.
     let trace = MemoryTrace {
         tables: testing::tables(&[[64, 64]]),
         tiles: vec![
@@ -392,7 +392,11 @@ fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
     };
     let bins = Bins::new(&trace.tables).unwrap();
     let counts = CacheCounts::new(&bins, config.tile_maps);
-    alone(trace, config, &mut Functional::new(levels, counts, None))
+    alone(
+        trace,
+        config,
+        &mut Functional::new(levels, counts, MissPath::build(config).unwrap()),
+    )
 }
 
 /// SplitMix64.
@@ -513,7 +517,8 @@ fn caches_take_lines_that_no_trace_sent() {
     let config = functional(Order::MORTON);
     let bins = Bins::new(&testing::tables(&[[64, 64]])).unwrap();
     let levels = Levels::build(&config).unwrap().all_four_way().ok().unwrap();
-    let mut caches = Functional::new(levels, CacheCounts::new(&bins, false), None);
+    let path = MissPath::build(&config).unwrap();
+    let mut caches = Functional::new(levels, CacheCounts::new(&bins, false), path);
     let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
     let (mut l1_lines, mut l2_lines) = (0, 0);
     for step in 0..10_000_u64 {
@@ -530,6 +535,7 @@ fn caches_take_lines_that_no_trace_sent() {
     assert!(l1_lines > l2_lines && l2_lines > 1009);
 }
 
+mod below;
 mod one_pass;
 mod plain_first_miss;
 mod plain_timed;

@@ -1,9 +1,10 @@
 //! The passes of one stream, frame after frame.
 
 use super::batch::{Job, Pass};
-use super::in_turn::Stage;
+use super::scheduler::Stage;
 use super::summary::summary;
 use super::{Machine, ReplayError};
+use crate::cache::MissPathResult;
 use crate::config::{BetweenFrames, Mode, Order, RunConfig};
 use crate::order::{self, Phase};
 use crate::result::RunResult;
@@ -17,8 +18,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub(super) struct Wave<'a> {
     pub(super) job: Job<'a>,
     pub(super) memory: &'a LineMemory,
-    /// Is told when a frame's lines are in memory, and when no pass waits for a thread any more.
-    pub(super) comes_to: &'a (dyn Fn(Stage) + Sync),
+    /// Called when a frame's lines are loaded and again when the last replay has started.
+    pub(super) report_stage: &'a (dyn Fn(Stage) + Sync),
 }
 
 impl Wave<'_> {
@@ -39,13 +40,13 @@ impl Wave<'_> {
                 Some(frame) => frame,
                 None => expander.frame(number, self.memory, &mut counts)?,
             };
-            (self.comes_to)(Stage::Grown);
+            (self.report_stage)(Stage::Loaded);
             let plans = orders.plans(trace_passes, number);
             let waiting = AtomicUsize::new(passes.len());
             let is_last = index + 1 == frames.len();
             let replay = |pass: &mut Pass<'_>, frame: &Frame<'_>| {
                 if waiting.fetch_sub(1, Ordering::Relaxed) == 1 && is_last {
-                    (self.comes_to)(Stage::Ending);
+                    (self.report_stage)(Stage::LastReplayStarted);
                 }
                 let config = *pass.config();
                 let mut machine = match pass.machine.take() {
@@ -61,7 +62,7 @@ impl Wave<'_> {
                 machine.run(&mut cores, orders.plan(&plans, &config), config.assign)?;
                 Ok::<_, ReplayError>(machine)
             };
-            // The last pass gives the frame's memory back, whatever this thread does then.
+            // The last pass frees the frame's memory, also while this thread is busy.
             let frame = Arc::new(frame);
             let share = |pass| (pass, Arc::clone(&frame));
             let all: Vec<_> = passes.iter_mut().map(share).collect();
@@ -108,13 +109,21 @@ impl Wave<'_> {
             let config = &self.job.configs[index];
             let outcome = machine.outcome(config);
             let (tmu, cycles) = (outcome.tmu, outcome.cycles);
+            let MissPathResult { below, prefetch } = outcome.path;
             let mut result = RunResult {
                 tmu,
                 cycles,
-                dram: outcome.dram,
+                dram: below.dram,
+                prefetch,
+                lower_levels: below.levels,
                 first_lookups: machine.first_lookups(),
                 ..summary(tables, expander.bins(), counts, &outcome.counts, config)
             };
+            if let Some(last) = result.lower_levels.last() {
+                result.external_bytes = last.line_misses * u64::from(last.line_bytes);
+            } else if let Some(prefetch) = &result.prefetch {
+                result.external_bytes += prefetch.lines * u64::from(config.line_bytes);
+            }
             if let Some(machine) = &config.frame {
                 let whole = traffic(self.job.trace, config, machine, result.external_bytes)?;
                 (result.clients, result.geometry) = (whole.clients, Some(whole.geometry));

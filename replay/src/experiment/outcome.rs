@@ -75,7 +75,7 @@ impl<'a> Outcome<'a> {
     /// What the results share, for whoever waited for them.
     #[must_use]
     pub fn shared(&self) -> String {
-        self.work.told(self.results.len())
+        self.work.summary(self.results.len())
     }
 
     /// A row for every point of every trace, in that order.

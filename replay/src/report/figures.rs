@@ -38,7 +38,7 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
         Figure::real("reduction_pct", "saved", "% of Morton", 1, |r| r.saved_pct(r.morton))
             .about("external traffic saved against Morton order, everything else the same"),
         Figure::real("external_bytes", "external", "bytes", 0, |r| r.result.external_bytes)
-            .about("line misses of the L2 times the line size, all frames"),
+            .about("lines from memory times the line size of the last level, all frames"),
         Figure::real("external_mb_per_frame", "external", "MB/frame", 2, |r| r.mb_per_frame(r.result.external_bytes))
             .about("external texture traffic"),
         Figure::real("bound_mb_per_frame", "bound", "MB/frame", 2, |r| r.mb_per_frame(r.bound_bytes()))
@@ -48,13 +48,21 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
         Figure::real("over_base", "external", "\u{d7} base", 3, |r| over(r.result.external_bytes, r.unchanged?.external_bytes))
             .about("external traffic over that of the same settings without the change"),
         Figure::real("first_l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.result))
-            .about("footprints whose first look-up found a line absent or on its way"),
+            .about("footprints whose first look-up found a line absent or in flight"),
         Figure::real("first_l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.result))
             .about("lines of these look-ups that the L2 had not, merged requests counted"),
         Figure::real("closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.result))
             .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.result))
             .about("simulated utilisation less the one that the Z2 paper's table implies for the rates of first look-ups"),
+        Figure::real("prefetched_lines", "prefetched", "", 0, |r| Some(r.result.prefetch?.lines))
+            .about("lines that the prefetcher of the L2 fetched"),
+        Figure::real("prefetch_accuracy_pct", "useful", "% of prefetched", 1, |r| { let p = r.result.prefetch?; Some(100.0 * over(p.useful_lines, p.lines)?) })
+            .about("prefetched lines that were requested while they were there or in flight"),
+        Figure::real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.misses)?) })
+            .about("useful prefetches over these and the line misses of the L2"),
+        Figure::real("last_level_miss_pct", "last level", "%", 2, |r| Some(100.0 * r.result.lower_levels.last()?.miss_rate))
+            .about("line look-ups of the last level below the L2 that miss"),
         Figure::real("dram_row_hit_pct", "row hits", "%", 2, |r| Some(100.0 * r.result.dram.as_ref()?.row_hit_rate))
             .about("reads of DRAM whose row was open"),
         Figure::real("dram_activates", "activates", "", 0, |r| Some(r.result.dram.as_ref()?.activates))
@@ -126,7 +134,7 @@ fn functional<'a>() -> Vec<Figure<'a>> {
 fn z2_paper<'a>() -> Vec<Figure<'a>> {
     vec![
         Figure::real("z2_paper.l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.z2_paper?))
-            .about("footprints whose first look-up found a line absent or on its way"),
+            .about("footprints whose first look-up found a line absent or in flight"),
         Figure::real("z2_paper.l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.z2_paper?))
             .about("lines of these look-ups that the L2 had not, merged requests counted"),
         Figure::real("z2_paper.tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.z2_paper?))
@@ -259,6 +267,7 @@ mod tests {
                 "sampling",
                 "layout",
                 "tmu",
+                "prefetch",
                 "dram",
                 "frame",
                 "paper",

@@ -88,6 +88,23 @@ pub fn text(row: &ResultRow) -> String {
         "quads {}, covered pixels {}, access hash {}\n",
         result.quads, result.lanes, result.access_hash,
     );
+    if let Some(prefetch) = &result.prefetch {
+        text += &format!(
+            "prefetched {} lines: {} useful ({} of them late), {} evicted before their use\n",
+            prefetch.lines, prefetch.useful_lines, prefetch.late_lines, prefetch.evicted_lines
+        );
+    }
+    for level in &result.lower_levels {
+        text += &format!(
+            "{}, {}-byte lines: {} look-ups, {} misses ({:.2} %), {} merged\n",
+            level.name,
+            level.line_bytes,
+            level.line_lookups,
+            level.line_misses,
+            100.0 * level.miss_rate,
+            level.secondary_misses
+        );
+    }
     if let Some(dram) = &result.dram {
         text += &dram.to_string();
     }

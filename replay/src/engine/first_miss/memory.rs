@@ -3,9 +3,10 @@
 
 use super::super::counts::{CacheCounts, CellMisses};
 use super::thread::{FETCHES_UNTIL_KEPT, Thread};
-use crate::cache::{Delay, DelayedFill, Levels, NOT_ASKED};
+use crate::cache::{
+    Answer, Delay, DelayedFill, Levels, MissPath, MissPathResult, NOT_IN_FLIGHT, SharedLevel,
+};
 use crate::config::TmuConfig;
-use crate::memory::dram::Dram;
 use crate::result::FirstLookups;
 
 /// What a footprint finds in its core's own cache.
@@ -20,11 +21,9 @@ pub enum Seen {
 /// L1 caches over a shared L2.
 pub struct Memory<D> {
     l1: Vec<D>,
-    l2: D,
+    l2: SharedLevel<D>,
     l1_penalty_cycles: u64,
-    l2_penalty_cycles: u64,
     counts: CacheCounts,
-    dram: Option<Dram>,
     /// Lines of the footprint looked up last that were not there, by core: index and arrival.
     missing: Vec<Vec<(usize, u64)>>,
     first: FirstLookups,
@@ -38,7 +37,7 @@ impl<D: DelayedFill> Memory<D> {
         levels: Levels<C>,
         tmu: &TmuConfig,
         counts: CacheCounts,
-        dram: Option<Dram>,
+        path: MissPath,
     ) -> Self {
         let [l1_penalty_cycles, l2_penalty_cycles] =
             [tmu.l1_penalty_cycles, tmu.l2_penalty_cycles].map(u64::from);
@@ -47,19 +46,17 @@ impl<D: DelayedFill> Memory<D> {
         Self {
             missing: vec![Vec::with_capacity(4); l1.len()],
             l1,
-            l2,
+            l2: SharedLevel::new(l2, path),
             l1_penalty_cycles,
-            l2_penalty_cycles,
             counts,
-            dram,
             first: FirstLookups::default(),
             forwarded: 0,
         }
     }
 
-    /// The memory below the caches.
-    pub fn dram(&self) -> Option<&Dram> {
-        self.dram.as_ref()
+    /// What was counted beside and below the L2.
+    pub fn path_result(&self) -> MissPathResult {
+        self.l2.result()
     }
 
     /// Primary misses.
@@ -76,7 +73,7 @@ impl<D: DelayedFill> Memory<D> {
         .over(footprints)
     }
 
-    /// Empties all caches. Nobody waits for what is on its way.
+    /// Empties all caches and drops the lines in flight.
     pub fn flush(&mut self) {
         self.l1.iter_mut().for_each(D::clear);
         self.l2.clear();
@@ -99,7 +96,7 @@ impl<D: DelayedFill> Memory<D> {
     }
 
     /// The footprint that was looked up last asks for the lines that it did not find, unless they
-    /// are on their way.
+    /// are in flight.
     pub fn ask(&mut self, core: usize, now: u64, thread: &mut Thread) {
         let Some(footprint) = thread.footprint() else {
             return;
@@ -116,38 +113,31 @@ impl<D: DelayedFill> Memory<D> {
         let (mut fetched, mut from_memory, mut latest) = (0_u32, 0_u32, now);
         for &(index, arrival) in &self.missing[core] {
             let line = footprint.lines[index];
-            let known = arrival != NOT_ASKED;
-            // A line on its way into the L1 is a miss of the L2 until memory has sent it.
-            let in_l2 = match known {
-                true => match self.l2.arrival(line, now) {
-                    NOT_ASKED => 0,
-                    arrival => arrival,
-                },
-                false => self.l2.look_up(line, now),
-            };
-            if first {
-                self.first.l2_lookups += 1;
-                self.first.l2_misses += u64::from(in_l2 > 0);
-                l1.secondary += u64::from(known);
-            }
-            if known {
+            if arrival != NOT_IN_FLIGHT {
+                if first {
+                    // A line in flight into the L1 is a miss of the L2 until memory has sent it.
+                    let in_l2 = self.l2.cache.arrival(line, now);
+                    self.first.l2_lookups += 1;
+                    self.first.l2_misses += u64::from(in_l2 != NOT_IN_FLIGHT);
+                    l1.secondary += 1;
+                }
                 latest = latest.max(arrival);
                 continue;
             }
             fetched += 1;
-            let there = match in_l2 {
-                0 => now,
-                NOT_ASKED => {
-                    from_memory += 1;
-                    if let Some(dram) = &mut self.dram {
-                        dram.read(line, Some(now));
-                    }
-                    let arrival = now + self.l2_penalty_cycles;
-                    self.l2.enter(line, now, arrival);
+            let answer = self.l2.request(line, now);
+            if first {
+                self.first.l2_lookups += 1;
+                self.first.l2_misses += u64::from(answer != Answer::Hit);
+            }
+            let there = match answer {
+                Answer::Hit => now,
+                Answer::InFlight(arrival) => {
+                    l2.secondary += 1;
                     arrival
                 }
-                arrival => {
-                    l2.secondary += 1;
+                Answer::Miss(arrival) => {
+                    from_memory += 1;
                     arrival
                 }
             };

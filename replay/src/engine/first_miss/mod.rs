@@ -13,9 +13,8 @@ use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
 use super::items::Items;
-use crate::cache::{Delay, DelayedFill, Levels};
+use crate::cache::{Delay, DelayedFill, Levels, MissPath};
 use crate::config::{Assign, RunConfig, TmuConfig};
-use crate::memory::dram::Dram;
 use crate::order::{Phase, WorkItem};
 use crate::result::FirstLookups;
 use crate::stream::{Cores, StreamError, furthest_behind};
@@ -86,11 +85,11 @@ impl<D: DelayedFill> FirstMiss<D> {
         levels: Levels<C>,
         tmu: TmuConfig,
         counts: CacheCounts,
-        dram: Option<Dram>,
+        path: MissPath,
     ) -> Self {
         let cores = levels.l1.len();
         Self {
-            memory: Memory::new(levels, &tmu, counts, dram),
+            memory: Memory::new(levels, &tmu, counts, path),
             units: (0..cores).map(|_| Unit::default()).collect(),
             tmu,
             cycles: 0,
@@ -208,7 +207,7 @@ impl<D: DelayedFill> Machine for FirstMiss<D> {
     fn outcome(&self, _config: &RunConfig) -> Outcome {
         let stats = self.units.iter().map(|unit| unit.stats);
         Outcome {
-            dram: self.memory.dram().map(Dram::result),
+            path: self.memory.path_result(),
             ..Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
         }
     }

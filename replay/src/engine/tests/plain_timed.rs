@@ -11,7 +11,7 @@ use crate::result::TmuResult;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
-/// Lines on their way into one cache.
+/// Lines in flight into one cache.
 #[derive(Default)]
 struct PlainInFlight {
     lines: HashMap<u32, u64>,
@@ -290,7 +290,7 @@ impl Machine for PlainTimed {
                 loops: sum(|unit| unit.loops),
             }),
             cycles: Some(self.cycles),
-            dram: None,
+            path: crate::cache::MissPathResult::default(),
         }
     }
 }
@@ -365,7 +365,12 @@ fn compiled_and_general_caches_agree() {
         l2: l2.into_box(),
     };
     let counts = CacheCounts::new(&Bins::new(&trace.tables).unwrap(), false);
-    let mut general = Timed::new(pointers, config.tmu, counts, None);
+    let mut general = Timed::new(
+        pointers,
+        config.tmu,
+        counts,
+        crate::cache::MissPath::build(&config).unwrap(),
+    );
     assert_eq!(
         alone(&trace, &config, &mut general),
         replay(&trace, &config).unwrap()

@@ -1,15 +1,14 @@
-//! A thread asks for the lines that nobody has asked for: in the order of its footprints, so many in each
+//! A thread requests the lines that are neither there nor in flight: in the order of its footprints, so many in each
 //! trip.
 
 use super::super::counts::{CacheCounts, FootprintMisses};
-use crate::cache::{DelayedFill, NOT_ASKED};
+use crate::cache::{Answer, DelayedFill, NOT_IN_FLIGHT, SharedLevel};
 use crate::config::TmuConfig;
-use crate::memory::dram::Dram;
 use crate::stream::{QuadLines, Use};
 use crate::tmu::{Pending, Waiting};
 use std::hint::select_unpredictable;
 
-/// A line that nobody has asked for, and who uses it.
+/// A line that is neither there nor in flight, and its uses.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Absent {
     pub line: u32,
@@ -26,10 +25,9 @@ pub struct Trips {
 /// A thread that asks for its lines.
 pub struct Asking<'m, D> {
     pub l1: &'m mut D,
-    pub l2: &'m mut D,
+    pub l2: &'m mut SharedLevel<D>,
     pub tmu: &'m TmuConfig,
     pub counts: &'m mut CacheCounts,
-    pub dram: Option<&'m mut Dram>,
     pub waiting: &'m mut Waiting,
     pub now: u64,
     pub trips: Trips,
@@ -66,10 +64,10 @@ impl<D: DelayedFill> Asking<'_, D> {
                 // Another segment, or another cell of this one, may have asked for it just now.
                 let known = match of.may_be_listed() {
                     true => self.l1.arrival(line, self.now),
-                    false => NOT_ASKED,
+                    false => NOT_IN_FLIGHT,
                 };
                 let cell = quad.cell_of(of);
-                let ready = if known == NOT_ASKED {
+                let ready = if known == NOT_IN_FLIGHT {
                     let mut misses = FootprintMisses {
                         l1_lines: 1,
                         l1_secondary: users.count_ones() - 1,
@@ -99,7 +97,7 @@ impl<D: DelayedFill> Asking<'_, D> {
                 let mut latest = now;
                 for &line in footprint.lines {
                     let ready = match self.l1.look_up(line, now) {
-                        NOT_ASKED => {
+                        NOT_IN_FLIGHT => {
                             misses.l1_lines += 1;
                             self.fetch(line, &mut misses)
                         }
@@ -121,7 +119,7 @@ impl<D: DelayedFill> Asking<'_, D> {
         }
     }
 
-    /// Asks the L2 for a line that is not on its way into the L1; says when it arrives there.
+    /// Asks the L2 for a line that is not in flight into the L1; says when it arrives there.
     #[inline(always)]
     fn fetch(&mut self, line: u32, misses: &mut FootprintMisses) -> u64 {
         let (now, tmu) = (self.now, self.tmu);
@@ -133,18 +131,13 @@ impl<D: DelayedFill> Asking<'_, D> {
         } else {
             u64::from(trip) * u64::from(tmu.loop_cycles)
         };
-        let in_l2 = match self.l2.look_up(line, now) {
-            0 => now,
-            NOT_ASKED => {
+        let in_l2 = match self.l2.request(line, now) {
+            Answer::Hit => now,
+            Answer::Miss(arrival) => {
                 misses.l2_lines += 1;
-                if let Some(dram) = &mut self.dram {
-                    dram.read(line, Some(now));
-                }
-                let arrival = now + u64::from(tmu.l2_penalty_cycles);
-                self.l2.enter(line, now, arrival);
                 arrival
             }
-            arrival => {
+            Answer::InFlight(arrival) => {
                 misses.l2_secondary += 1;
                 arrival
             }

@@ -1,16 +1,17 @@
 //! The caches as texture units see them: a thread's first trip looks up every footprint's tags, and
 //! what is missing is fetched.
 //!
-//! While a thread is looked up nothing arrives, so each of its distinct lines is there, on its way or
+//! While a thread is looked up nothing arrives, so each of its distinct lines is there, in flight or
 //! neither, once for all its footprints; and what its look-ups leave behind in the L1 depends only on
 //! the order of each line's last one. So the distinct lines are looked up, in that order, and
 //! footprints only where one of them was not there.
 
 use super::super::counts::CacheCounts;
 use super::asking::{Absent, Asking, Trips};
-use crate::cache::{Delay, DelayedFill, Levels, NOT_ASKED};
+use crate::cache::{
+    Delay, DelayedFill, Levels, MissPath, MissPathResult, NOT_IN_FLIGHT, SharedLevel,
+};
 use crate::config::TmuConfig;
-use crate::memory::dram::Dram;
 use crate::stream::{QuadLines, Use};
 use crate::tmu::{Pending, Waiting};
 use std::ops::Range;
@@ -18,9 +19,9 @@ use std::ops::Range;
 /// A core's L1, and the thread that was looked up last.
 struct First<D> {
     cache: D,
-    /// For what it waits.
+    /// The arrivals that it waits for.
     waiting: Waiting,
-    /// Its distinct lines that nobody has asked for, segment by segment.
+    /// Its distinct lines that are neither there nor in flight, segment by segment.
     absent: Vec<Absent>,
     /// Where those of each segment end, if there are several.
     segments: Vec<usize>,
@@ -31,20 +32,19 @@ struct First<D> {
 pub enum Found {
     /// All its lines.
     All,
-    /// Lines that are not there, but on their way.
-    OnTheirWay,
-    /// Lines that it has to ask the L2 for.
+    /// Lines that are not there, but in flight.
+    InFlight,
+    /// Lines that it has to request from the L2.
     NotAll,
 }
 
 /// L1 caches over a shared L2.
 pub struct Memory<D> {
     l1: Vec<First<D>>,
-    l2: D,
+    l2: SharedLevel<D>,
     tmu: TmuConfig,
     counts: CacheCounts,
-    dram: Option<Dram>,
-    /// Of a segment the lines that nobody has asked for, by first use.
+    /// The lines of a segment that are neither there nor in flight, by first use.
     by_first_use: [Absent; Use::FIRST_LINES],
 }
 
@@ -54,7 +54,7 @@ impl<D: DelayedFill> Memory<D> {
         levels: Levels<C>,
         tmu: TmuConfig,
         counts: CacheCounts,
-        dram: Option<Dram>,
+        path: MissPath,
     ) -> Self {
         let memory_cycles = u64::from(tmu.l1_penalty_cycles) + u64::from(tmu.l2_penalty_cycles);
         // Later trips of threads that miss many lines included.
@@ -68,10 +68,9 @@ impl<D: DelayedFill> Memory<D> {
         };
         Self {
             l1: l1.into_iter().map(first).collect(),
-            l2,
+            l2: SharedLevel::new(l2, path),
             tmu,
             counts,
-            dram,
             by_first_use: [Absent::default(); Use::FIRST_LINES],
         }
     }
@@ -81,19 +80,19 @@ impl<D: DelayedFill> Memory<D> {
         &self.counts
     }
 
-    /// The memory below the caches.
-    pub fn dram(&self) -> Option<&Dram> {
-        self.dram.as_ref()
+    /// What was counted beside and below the L2.
+    pub fn path_result(&self) -> MissPathResult {
+        self.l2.result()
     }
 
-    /// Empties all caches. Nobody waits for what is on its way.
+    /// Empties all caches and drops the lines in flight.
     pub fn flush(&mut self) {
         self.l1.iter_mut().for_each(|first| first.cache.clear());
         self.l2.clear();
     }
 
-    /// Looks up all lines of a thread that enters `now`, in its core's own cache. If nobody has asked for
-    /// some of them, [`Self::ask`] is to be called.
+    /// Looks up all lines of a thread that enters `now`, in its core's own cache. If some are
+    /// neither there nor in flight, the caller must call [`Self::ask`].
     #[inline(always)]
     pub fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> Found {
         let First {
@@ -113,7 +112,7 @@ impl<D: DelayedFill> Memory<D> {
             let uses = &quad.uses[lines.clone()];
             cache.look_up_all(&quad.distinct[lines], now, |index, line, arrival| {
                 let of = uses[index];
-                if arrival == NOT_ASKED {
+                if arrival == NOT_IN_FLIGHT {
                     absent.push(Absent { line, of });
                 } else {
                     counts.secondary(quad.cell_of(of), of.footprints().count_ones());
@@ -135,7 +134,7 @@ impl<D: DelayedFill> Memory<D> {
         }
         match (absent.is_empty(), waiting.is_empty()) {
             (false, _) => Found::NotAll,
-            (true, false) => Found::OnTheirWay,
+            (true, false) => Found::InFlight,
             (true, true) => Found::All,
         }
     }
@@ -146,8 +145,8 @@ impl<D: DelayedFill> Memory<D> {
         &mut self.l1[core].waiting
     }
 
-    /// Asks for the lines that nobody has asked for, once it is the core's turn at the L2: what the
-    /// thread's footprints wait for.
+    /// Requests the lines that are neither there nor in flight, when it is the core's turn at the L2. Returns what
+    /// the thread's footprints wait for.
     #[inline(never)]
     pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Waiting {
         let first = &mut self.l1[core];
@@ -156,7 +155,6 @@ impl<D: DelayedFill> Memory<D> {
             l2: &mut self.l2,
             tmu: &self.tmu,
             counts: &mut self.counts,
-            dram: self.dram.as_mut(),
             waiting: &mut first.waiting,
             now,
             trips: Trips::default(),

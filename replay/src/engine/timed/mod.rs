@@ -8,9 +8,8 @@ use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
 use super::items::Items;
-use crate::cache::{Delay, DelayedFill, Levels};
+use crate::cache::{Delay, DelayedFill, Levels, MissPath};
 use crate::config::{Assign, RunConfig, TmuConfig};
-use crate::memory::dram::Dram;
 use crate::order::{Phase, WorkItem};
 use crate::stream::{Cores, StreamError, furthest_behind};
 use crate::tmu::{Pipeline, Turn};
@@ -30,11 +29,11 @@ impl<D: DelayedFill> Timed<D> {
         levels: Levels<C>,
         tmu: TmuConfig,
         counts: CacheCounts,
-        dram: Option<Dram>,
+        path: MissPath,
     ) -> Self {
         let cores = levels.l1.len();
         Self {
-            memory: Memory::new(levels, tmu, counts, dram),
+            memory: Memory::new(levels, tmu, counts, path),
             units: vec![Pipeline::new(tmu); cores],
             cycles: 0,
         }
@@ -73,7 +72,7 @@ impl<D: DelayedFill> Timed<D> {
                                 continue;
                             }
                             match self.memory.look_up(core, now, &quad) {
-                                Found::All | Found::OnTheirWay => {
+                                Found::All | Found::InFlight => {
                                     unit.start(quad.footprints, self.memory.waiting(core));
                                 }
                                 Found::NotAll if now > until => {
@@ -124,7 +123,7 @@ impl<D: DelayedFill> Machine for Timed<D> {
     fn outcome(&self, _config: &RunConfig) -> Outcome {
         let stats = self.units.iter().map(Pipeline::stats);
         Outcome {
-            dram: self.memory.dram().map(Dram::result),
+            path: self.memory.path_result(),
             ..Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
         }
     }

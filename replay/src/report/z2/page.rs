@@ -173,7 +173,7 @@ fn as_the_paper_counts(table: &Table) -> Markup {
     html! {
         p {
             "The same frames on the machine of " code { "--preset z2-paper" } ": a thread stops at its first miss, and rates are of first "
-            "look-ups, where lines on their way are misses, too. Merged requests never leave the chip, so the product of these rates is "
+            "look-ups, where lines in flight are misses, too. Merged requests never leave the chip, so the product of these rates is "
             "no traffic; what memory sends stands to the right. The settings were found by search."
         }
         (table.markup())

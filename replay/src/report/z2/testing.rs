@@ -116,6 +116,8 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
             ..TmuResult::default()
         }),
         cycles: Some(30_000_000),
+        prefetch: None,
+        lower_levels: Vec::new(),
         dram: None,
         clients: Vec::new(),
         geometry: None,

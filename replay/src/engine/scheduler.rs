@@ -1,35 +1,34 @@
-//! What is in work at the same time: as much as there is memory for.
+//! Starts as many traces and streams at a time as memory allows.
 //!
-//! A frame's lines stay in memory while anything reads them. Were all traces and streams in work at once, that
-//! memory would run out, and tiles would be expanded again for every pass; were it one at a time, threads would
-//! wait for its last passes. So the next one starts when there is memory for it, or threads would wait.
+//! A frame's lines stay in memory while a replay reads them. Replaying all traces at once would exhaust memory, so that
+//! tiles are expanded again for every replay; one at a time would leave threads idle at its end. So the next one starts
+//! when there is memory for it, or when threads would be idle.
 
 use rayon::Scope;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What waits and what is in work.
+/// Items that wait, and counts of those that run.
 struct State<T> {
     waiting: std::vec::IntoIter<T>,
-    /// In work, and not yet ending.
+    /// Running items whose last replay has not started.
     busy: usize,
-    /// Of those, which have not said yet that they hold what they need: their weight.
-    growing: usize,
+    /// Weight of those that have not loaded their lines yet.
+    loading: usize,
 }
 
-/// How far an item in work has come.
+/// What an item reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// It holds the memory that it needs for now.
-    Grown,
-    /// All that is left of it is in somebody's hands.
-    Ending,
+    /// A frame's lines are in memory.
+    Loaded,
+    /// No replay of the item waits for a thread any more.
+    LastReplayStarted,
 }
 
-/// Calls `work` on all items; each says how far it has come by the function that `work` is given. The next
-/// one is started when all before it have grown and `room` says that there is more memory; or when all
-/// before it are ending, so that there is something else to do. Items lighter than `enough`, by their weight,
-/// grow at the same time.
-pub fn in_turn<T: Send>(
+/// Calls `work` on all items; each reports its stages to the function that `work` gets. The next item starts when all
+/// before it are loaded and `room` returns true, or when the last replays of all before it have started. Items load at
+/// the same time while their weights add up to less than `enough`.
+pub fn run_within_memory<T: Send>(
     items: Vec<(usize, T)>,
     enough: usize,
     room: impl Fn() -> bool + Sync,
@@ -38,59 +37,59 @@ pub fn in_turn<T: Send>(
     let state = Mutex::new(State {
         waiting: items.into_iter(),
         busy: 0,
-        growing: 0,
+        loading: 0,
     });
-    let turns = Turns {
+    let scheduler = Scheduler {
         state,
         enough,
         room,
         work,
     };
-    rayon::scope(|scope| turns.start(scope));
+    rayon::scope(|scope| scheduler.start(scope));
 }
 
-struct Turns<T, R, W> {
+struct Scheduler<T, R, W> {
     state: Mutex<State<(usize, T)>>,
     enough: usize,
     room: R,
     work: W,
 }
 
-impl<T, R, W> Turns<T, R, W>
+impl<T, R, W> Scheduler<T, R, W>
 where
     T: Send,
     R: Fn() -> bool + Sync,
     W: Fn(T, &(dyn Fn(Stage) + Sync)) + Sync,
 {
-    /// Starts what may be started.
+    /// Starts the items that may start.
     fn start<'s>(&'s self, scope: &Scope<'s>) {
         let mut state = self.state();
-        while state.busy == 0 || (state.growing < self.enough && (self.room)()) {
+        while state.busy == 0 || (state.loading < self.enough && (self.room)()) {
             let Some((weight, item)) = state.waiting.next() else {
                 return;
             };
             state.busy += 1;
-            state.growing += weight;
+            state.loading += weight;
             scope.spawn(move |scope| self.work(weight, item, scope));
         }
     }
 
     fn work<'s>(&'s self, weight: usize, item: T, scope: &Scope<'s>) {
-        // What it adds to `growing` and to `busy`.
+        // The item's share of `loading` and `busy`.
         let own = Mutex::new((weight, 1));
-        let comes_to = |stage| {
+        let report_stage = |stage| {
             let mut own = own.lock().unwrap_or_else(PoisonError::into_inner);
-            let (growing, busy) = &mut *own;
+            let (loading, busy) = &mut *own;
             let mut state = self.state();
-            state.growing -= std::mem::take(growing);
-            if stage == Stage::Ending {
+            state.loading -= std::mem::take(loading);
+            if stage == Stage::LastReplayStarted {
                 state.busy -= std::mem::take(busy);
             }
             drop(state);
             self.start(scope);
         };
-        (self.work)(item, &comes_to);
-        comes_to(Stage::Ending);
+        (self.work)(item, &report_stage);
+        report_stage(Stage::LastReplayStarted);
     }
 
     fn state(&self) -> MutexGuard<'_, State<(usize, T)>> {
@@ -108,17 +107,17 @@ mod tests {
         let (taken, most, done) = Default::default();
         let (taken, most, done): (AtomicUsize, AtomicUsize, AtomicUsize) = (taken, most, done);
         let room = || 2 * taken.load(Ordering::SeqCst) <= limit;
-        let work = |size, comes_to: &(dyn Fn(Stage) + Sync)| {
+        let work = |size, report_stage: &(dyn Fn(Stage) + Sync)| {
             let now = size + taken.fetch_add(size, Ordering::SeqCst);
             most.fetch_max(now, Ordering::SeqCst);
-            comes_to(Stage::Grown);
+            report_stage(Stage::Loaded);
             std::thread::sleep(std::time::Duration::from_micros(100));
             taken.fetch_sub(size, Ordering::SeqCst);
             done.fetch_add(1, Ordering::SeqCst);
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let items = sizes.iter().map(|&size| (1, size)).collect();
-        let run = || in_turn(items, enough, room, work);
+        let run = || run_within_memory(items, enough, room, work);
         pool.unwrap().install(run);
         assert_eq!(done.load(Ordering::SeqCst), sizes.len());
         most.load(Ordering::SeqCst)
@@ -141,14 +140,14 @@ mod tests {
     fn light_items_grow_together() {
         let (now, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let together = std::sync::Barrier::new(4);
-        let work = |(), comes_to: &(dyn Fn(Stage) + Sync)| {
+        let work = |(), report_stage: &(dyn Fn(Stage) + Sync)| {
             most.fetch_max(1 + now.fetch_add(1, Ordering::SeqCst), Ordering::SeqCst);
             together.wait();
             now.fetch_sub(1, Ordering::SeqCst);
-            comes_to(Stage::Grown);
+            report_stage(Stage::Loaded);
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(4).build();
-        let run = || in_turn(vec![(2, ()); 4], 8, || true, work);
+        let run = || run_within_memory(vec![(2, ()); 4], 8, || true, work);
         pool.unwrap().install(run);
         assert_eq!(most.load(Ordering::SeqCst), 4);
     }
@@ -156,13 +155,13 @@ mod tests {
     #[test]
     fn the_next_item_starts_while_the_one_before_is_ending() {
         let together = std::sync::Barrier::new(2);
-        let work = |(), comes_to: &(dyn Fn(Stage) + Sync)| {
-            comes_to(Stage::Ending);
+        let work = |(), report_stage: &(dyn Fn(Stage) + Sync)| {
+            report_stage(Stage::LastReplayStarted);
             // Two of them are here at the same time, or this never ends.
             together.wait();
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
-        let run = || in_turn(vec![(1, ()); 6], 1, || false, work);
+        let run = || run_within_memory(vec![(1, ()); 6], 1, || false, work);
         pool.unwrap().install(run);
     }
 }

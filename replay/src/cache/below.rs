@@ -1,0 +1,175 @@
+//! What answers the misses of the L2: further levels, if the configuration has any, then memory.
+
+use super::mshr::Mshrs;
+use super::{AnyCache, Cache, NOT_IN_FLIGHT};
+use crate::config::{ConfigError, RunConfig};
+use crate::memory::dram::{Dram, DramResult};
+use crate::result::LowerLevelResult;
+
+/// The levels below the L2, and memory.
+pub struct Below {
+    levels: Vec<Level>,
+    dram: Option<Dram>,
+    memory_cycles: u64,
+}
+
+/// What was counted below the L2.
+#[derive(Clone, Debug, Default)]
+pub struct BelowResult {
+    /// Levels, the L3 first.
+    pub levels: Vec<LowerLevelResult>,
+    /// The DRAM, where the configuration has one.
+    pub dram: Option<DramResult>,
+}
+
+/// One level. A line that misses takes its way at once (allocation on a miss).
+struct Level {
+    name: &'static str,
+    cache: Box<dyn Cache>,
+    in_flight: Mshrs,
+    line_bytes: u32,
+    /// Its lines are so much longer than the L2's: the number of bits that a line number loses.
+    shift: u32,
+    hit_cycles: u64,
+    look_ups: u64,
+    misses: u64,
+    secondary_misses: u64,
+}
+
+impl Below {
+    /// Empty levels and closed rows; none where the L2's misses are only counted. Each level has a seed of its own.
+    ///
+    /// # Errors
+    /// A geometry that cannot be built.
+    pub fn build(config: &RunConfig) -> Result<Option<Self>, ConfigError> {
+        if !config.simulates_below_l2() {
+            return Ok(None);
+        }
+        let mut levels = Vec::new();
+        let mut line_bytes = config.line_bytes;
+        for (number, (name, level, own_line_bytes)) in
+            (1..).zip(config.level.named(config.line_bytes))
+        {
+            line_bytes = own_line_bytes;
+            let seed = config.seed.wrapping_sub(number);
+            levels.push(Level {
+                name,
+                cache: AnyCache::build(&level.cache(), name, line_bytes, seed)?.into_box(),
+                in_flight: Mshrs::new(),
+                line_bytes,
+                shift: line_bytes.ilog2() - config.line_bytes.ilog2(),
+                hit_cycles: level.hit_cycles.into(),
+                look_ups: 0,
+                misses: 0,
+                secondary_misses: 0,
+            });
+        }
+        let dram = config.dram.as_ref();
+        Ok(Some(Self {
+            levels,
+            dram: dram.map(|dram| Dram::new(dram, line_bytes)),
+            memory_cycles: config.tmu.l2_penalty_cycles.into(),
+        }))
+    }
+
+    /// Reads a line that the L2 has not, where time does not pass.
+    pub fn read(&mut self, line: u32) {
+        for level in &mut self.levels {
+            if level.access(line) {
+                return;
+            }
+        }
+        let line = self.line_of_memory(line);
+        if let Some(dram) = &mut self.dram {
+            dram.read(line, None);
+        }
+    }
+
+    /// Reads a line that the L2 has not: the cycle in which it arrives there. `now` never goes back.
+    ///
+    /// A level that holds the line sends it after its `hit_cycles`, or when the line arrives there, whichever is later.
+    pub fn read_at(&mut self, line: u32, now: u64) -> u64 {
+        let mut missed = 0;
+        let mut arrival = None;
+        for level in &mut self.levels {
+            if level.access(line) {
+                arrival = Some(level.arrival(line, now));
+                break;
+            }
+            missed += 1;
+        }
+        let arrival = arrival.unwrap_or_else(|| {
+            let line = self.line_of_memory(line);
+            if let Some(dram) = &mut self.dram {
+                dram.read(line, Some(now));
+            }
+            now + self.memory_cycles
+        });
+        for level in &mut self.levels[..missed] {
+            level.enter(line, now, arrival);
+        }
+        arrival
+    }
+
+    fn line_of_memory(&self, line: u32) -> u32 {
+        line >> self.levels.last().map_or(0, |level| level.shift)
+    }
+
+    /// Empties the levels. Rows of the DRAM stay open.
+    pub fn clear(&mut self) {
+        for level in &mut self.levels {
+            level.cache.clear();
+            level.in_flight.clear();
+        }
+    }
+
+    /// What was counted, all requests answered.
+    #[must_use]
+    pub fn result(&self) -> BelowResult {
+        let level = |level: &Level| LowerLevelResult {
+            name: level.name.to_owned(),
+            line_bytes: level.line_bytes,
+            miss_rate: level.misses as f64 / level.look_ups.max(1) as f64,
+            line_lookups: level.look_ups,
+            line_misses: level.misses,
+            secondary_misses: level.secondary_misses,
+        };
+        BelowResult {
+            levels: self.levels.iter().map(level).collect(),
+            dram: self.dram.as_ref().map(Dram::result),
+        }
+    }
+}
+
+impl Level {
+    /// Looks up the line that holds a line of the L2; fills it on a miss. True for a hit.
+    fn access(&mut self, line: u32) -> bool {
+        self.look_ups += 1;
+        let hit = self.cache.access(line >> self.shift);
+        self.misses += u64::from(!hit);
+        hit
+    }
+
+    /// When a line that the level holds, or is waiting for, is in the L2.
+    fn arrival(&mut self, line: u32, now: u64) -> u64 {
+        let sent = now + self.hit_cycles;
+        match self.in_flight.arrival(line >> self.shift, now) {
+            NOT_IN_FLIGHT => sent,
+            arrival => {
+                self.secondary_misses += 1;
+                arrival.max(sent)
+            }
+        }
+    }
+
+    /// A line that missed arrives later. One that was evicted in flight and is asked for again arrives with its first fetch.
+    fn enter(&mut self, line: u32, now: u64, arrival: u64) {
+        let line = line >> self.shift;
+        if arrival > now && self.in_flight.arrival(line, now) == NOT_IN_FLIGHT {
+            self.in_flight.enter(line, now, arrival);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
