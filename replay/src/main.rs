@@ -1,6 +1,6 @@
 //! `replay`: trace to answer.
 
-/// Memory that ends is told with exit code 2.
+/// Running out of memory is reported and ends with exit code 2.
 #[global_allocator]
 static ALLOCATOR: shell::Allocator = shell::Allocator;
 

@@ -245,7 +245,7 @@ impl Cluster {
 
 impl Drop for Cluster {
     fn drop(&mut self) {
-        // Jobs first: their own processes are no children of ours.
+        // Jobs first: their processes are not children of this one.
         if !self.jobs().trim().is_empty() {
             self.ask("scancel", &["--full", "--user", "root"]);
             wait_for(|| self.jobs().trim().is_empty());

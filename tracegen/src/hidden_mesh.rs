@@ -1,6 +1,6 @@
 //! Files of hidden-area meshes: this project's own, and those that hmdq records from a headset's runtime.
 //!
-//! Coordinates are parts of the picture's width and height. They count from the left and, unless a file of ours
+//! Coordinates are parts of the picture's width and height. They count from the left and, unless a file in this project's form
 //! says `"origin": "top-left"`, upwards, as OpenVR's do.
 
 use anyhow::{Context, bail, ensure};

@@ -1,6 +1,6 @@
 //! `tracegen`: scene to trace.
 
-/// Memory that ends is told with exit code 2.
+/// Running out of memory is reported and ends with exit code 2.
 #[global_allocator]
 static ALLOCATOR: shell::Allocator = shell::Allocator;
 

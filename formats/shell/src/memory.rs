@@ -44,7 +44,7 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
-/// Turns an abort or a panic for want of memory into a message and exit code 2; any other one stays what it is.
+/// Turns an abort or a panic caused by a lack of memory into a message and exit code 2; any other one is passed on.
 ///
 /// # Errors
 /// The system refuses the handler.

@@ -156,7 +156,7 @@ impl ExperimentArgs {
                 EmbeddedPicture::open(label, Path::new(path))
             })
             .collect();
-        // The first error in the order of the arguments is what is told.
+        // Report the first error in the order of the arguments.
         pictures.into_iter().collect()
     }
 }

@@ -30,7 +30,7 @@ pub enum RunError {
     Store(anyhow::Error),
 }
 
-/// Replays every point on every trace, in parallel, taking what the store has; `done` is told how
+/// Replays every point on every trace, in parallel, taking what the store has; `done` is called with how
 /// many points are done with each step.
 ///
 /// # Errors

@@ -86,7 +86,7 @@ pub struct OrderFigures {
 }
 
 /// Analyses a trace in every order, in parallel. Of `config` the order and latencies do not matter.
-/// `done` is told of every frame of every order.
+/// `done` is called for every frame of every order.
 ///
 /// # Errors
 /// An impossible configuration, or a trace that cannot be read.

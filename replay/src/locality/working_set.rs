@@ -125,7 +125,7 @@ impl WorkingSet {
     }
 }
 
-/// The gaps of all that is told apart.
+/// The gaps of each kind that is counted apart.
 #[derive(Clone, Debug, Default)]
 pub(super) struct WorkingSets {
     any: Gaps,

@@ -1,6 +1,6 @@
 //! Published figures, to be set beside measured ones, and the scenes that stand for the papers'.
 //!
-//! The papers' scenes are not free. A scene of ours stands for one of them when its short name is
+//! The papers' scenes are not free. A stand-in scene takes the place of one of them when its short name is
 //! in the paper's table, or when the command line says so; nothing is guessed from parts of names.
 
 pub mod score;

@@ -47,7 +47,7 @@ struct Compared {
 
 const EYES: [Eye; 2] = [Eye::Left, Eye::Right];
 
-/// Compares every picture of every row with the baseline's; `done` is told how many pictures are
+/// Compares every picture of every row with the baseline's; `done` is called with how many pictures are
 /// done with each step. One a row, in the manifest's order.
 ///
 /// # Errors

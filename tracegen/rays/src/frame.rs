@@ -90,7 +90,7 @@ struct TileResult {
 }
 
 /// Traces the tiles of both eyes and appends them to a trace; one batch is written while the next
-/// is traced. The result does not depend on the number of threads. `progress` is told the tiles
+/// is traced. The result does not depend on the number of threads. `progress` is called with the tiles
 /// traced after each batch.
 ///
 /// # Errors

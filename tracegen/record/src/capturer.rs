@@ -1,4 +1,4 @@
-//! What a capturer promises: the joint at which another driver can take the place of ours.
+//! The contract of a capturer, through which another driver can be added.
 
 use crate::{RawRecords, RecordError};
 

@@ -229,7 +229,7 @@ impl VerifyArgs {
     }
 }
 
-/// llvmpipe filters some formats in 8 bits unless it is told not to, which is not what is checked.
+/// llvmpipe filters some formats in 8 bits unless an option turns that off. Such filtering is not what is checked.
 fn filter_in_single_precision() {
     if std::env::var_os("GALLIVM_PERF").is_none() {
         // SAFETY: as in `prepare_environment`: no thread reads the environment meanwhile.

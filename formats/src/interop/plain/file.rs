@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Cursor, IsTerminal, Read};
 use std::path::Path;
 
-/// Bytes that a form is told from.
+/// Bytes that a form is recognised by.
 const HEAD_BYTES: usize = 4096;
 
 /// Bytes that are read at once.

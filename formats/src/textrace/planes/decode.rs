@@ -405,7 +405,7 @@ fn add(record: &mut QuadRecord, expected: &Quad, departure: &Quad) {
     record.cross = sum(cross, by_cross);
 }
 
-/// What is to be added where residuals are wide, or where their classes are told as numbers; the classes; and
+/// What is to be added where residuals are wide, or where their classes are coded as numbers; the classes; and
 /// the reader after it.
 #[inline(never)]
 fn special<'a>(

@@ -38,7 +38,7 @@ impl Sink for BitWriter {
     }
 }
 
-/// A plane, and how its quads are told.
+/// A plane, and how its quads are coded.
 #[derive(Clone, Copy)]
 struct Choice {
     mode: Mode,
@@ -317,7 +317,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
         bits
     }
 
-    /// How the widths of a first quad's pairs are told: those of dx and uv, then those of dy and cross.
+    /// How the widths of a first quad's pairs are coded: those of dx and uv, then those of dy and cross.
     fn first_widths(&self, pairs: &[Pair; 4]) -> (Chosen<2>, Chosen<2>) {
         let [dx, dy, cross, uv] = *pairs;
         let first = self.codes.choices().first.choose(&[dx, uv]);
@@ -367,7 +367,7 @@ fn put_numbers(sink: &mut impl Sink, pair: [i32; 2], width: u32) {
     }
 }
 
-/// What is told of a first quad: dx, dy, cross and uv less what is expected.
+/// What is coded of a first quad: dx, dy, cross and uv less their predictions.
 fn first_pairs(quad: &Quad, expected: &Expected) -> [Pair; 4] {
     let [uv, dx, dy, cross] = *quad;
     let [of_dx, of_dy] = expected.slopes();

@@ -1,10 +1,10 @@
 //! Encoding 3: a plane for each primitive, and what quads leave over.
 //!
 //! A primitive's texture coordinates are a plane seen in perspective ([`plane`]). Its first quad
-//! is told exactly, as a difference from what an earlier primitive's plane says there ([`parents`]);
+//! is coded exactly, as a difference from what an earlier primitive's plane says there ([`parents`]);
 //! then how finely the plane through that quad is corrected, and the correction. Every other quad is
 //! what the plane says and a residual, mostly 0 or 1 of a fixed-point step ([`mode`], [`residual`]).
-//! Sizes of residuals and of a first quad's numbers ([`widths`]), and steps and masks ([`places`]), are told by
+//! Sizes of residuals and of a first quad's numbers ([`widths`]), and steps and masks ([`places`]), are coded by
 //! prefix codes with fixed lengths ([`lengths`]).
 //!
 //! A tile is written run by run, from both ends: runs and places from the front, planes and residuals from

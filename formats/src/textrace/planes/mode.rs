@@ -4,7 +4,7 @@
 use super::plane::Quad;
 use super::residual::{Pair, sum};
 
-/// How a run's residuals are told, whichever is smallest.
+/// How a run's residuals are coded, whichever is smallest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Mode {
     /// Departures of uv, dx, dy and cross.

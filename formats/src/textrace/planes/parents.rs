@@ -1,5 +1,5 @@
 //! What the planes of a tile have to do with each other, in both directions alike: a group's first quad
-//! in a run is told as it differs from the plane of an earlier run, its parent.
+//! in a run is coded as its difference from the plane of an earlier run, its parent.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::GROUPS;

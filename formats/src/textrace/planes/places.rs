@@ -233,7 +233,7 @@ impl Places {
     }
 
     /// The next quad, if another one is expected: nothing but step and mask; nothing is to be remembered of
-    /// groups. `None` where it is told otherwise and [`Self::read`] must read it.
+    /// groups. `None` where it is coded otherwise and [`Self::read`] must read it.
     #[inline(always)]
     pub fn read_next_quad(
         &mut self,

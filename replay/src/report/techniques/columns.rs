@@ -209,7 +209,7 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
 pub type GainFigure<'a> = Column<'a, OrderGain<'a>>;
 
 /// The table of orders with and without each technique. `gain` is the order whose saving over
-/// `against` is told.
+/// `against` is shown.
 #[must_use]
 #[rustfmt::skip]
 pub fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -> Vec<GainFigure<'a>> {

@@ -69,7 +69,7 @@ struct SceneFacts<'a> {
 }
 
 impl<'a> TechniquesReport<'a> {
-    /// The order whose gain is told, and the one that it is over.
+    /// The order whose saving is shown, and the order that it is measured against.
     #[must_use]
     pub fn gain_orders(&self) -> (Order, Order) {
         let own = self.config.order;

@@ -6,7 +6,7 @@ use crate::report::plots::lines::{Axis, LineChart, LineSeries, Mark};
 use crate::report::plots::scatter::{NamedPoint, ScatterChart};
 use crate::techniques::{Measured, Measures, Spread};
 
-/// At most so many lines are told apart.
+/// Most lines that a chart can show apart.
 const MOST_LINES: usize = 6;
 
 /// Longest name in a plot; tables have them whole.

@@ -17,7 +17,7 @@ const FOLDERS: [&str; 3] = [
 const NEEDED_BYTES: usize = 512 << 20;
 
 /// Why lavapipe, which is installed, does not start; `None` where it is not installed or nothing is known. The
-/// loader passes over a driver that it cannot load, for want of memory for one, without a word.
+/// loader silently skips a driver that it cannot load, for example when memory runs out.
 pub(super) fn reason() -> Option<String> {
     let libraries = installed();
     if libraries.is_empty() {
