@@ -258,6 +258,9 @@ pub struct RunConfig {
     pub tmu: TmuConfig,
     /// Also count by tile.
     pub tile_maps: bool,
+    /// Also record which core works on which tiles when (timed mode, `--timeline`); no key of a file.
+    #[serde(skip)]
+    pub timeline: bool,
     /// Hidden-surface removal; results name it where it is not the default.
     #[serde(skip_serializing_if = "Hsr::is_default")]
     pub hsr: Hsr,
@@ -293,6 +296,7 @@ impl Default for RunConfig {
             layout: LayoutConfig::default(),
             tmu: TmuConfig::default(),
             tile_maps: false,
+            timeline: false,
             hsr: Hsr::EarlyZ,
             between_frames: BetweenFrames::Keep,
             prefetch: None,

@@ -80,6 +80,46 @@ pub struct LowerLevelResult {
     pub secondary_misses: u64,
 }
 
+/// A tile of a pass, by its numbers in the trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TileAt {
+    /// Index of the pass.
+    pub pass: u32,
+    /// Tile number, row by row.
+    pub tile: u32,
+}
+
+/// A core's time on a work item.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TimelineItem {
+    /// Number of the core.
+    pub core: u32,
+    /// Cycle in which it takes the item.
+    pub start_cycle: u64,
+    /// Cycle in which it takes the next one, or is done.
+    pub end_cycle: u64,
+    /// Cycles in which a footprint left the texture unit.
+    pub useful_cycles: u64,
+    /// Issue slots of footprints whose lines were not there.
+    pub wasted_cycles: u64,
+    /// Its tiles.
+    pub tiles: Vec<TileAt>,
+}
+
+/// A timed replay over time.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Timeline {
+    /// Work items, by start and core.
+    pub items: Vec<TimelineItem>,
+    /// Lines that the L2 fetches, prefetched ones included, in each interval of [`Self::INTERVAL_CYCLES`].
+    pub fetched_lines: Vec<u32>,
+}
+
+impl Timeline {
+    /// Cycles of an interval.
+    pub const INTERVAL_CYCLES: u64 = 1024;
+}
+
 /// Texture-unit figures of a timed replay, summed over cores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TmuResult {
@@ -193,6 +233,9 @@ pub struct RunResult {
     /// What vertex processing did there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<GeometryCounts>,
+    /// The replay over time, only when asked for (`--timeline`). It is not stored.
+    #[serde(skip)]
+    pub timeline: Option<Timeline>,
     /// By view.
     pub by_view: Vec<Part>,
     /// By texture, in table order.

@@ -65,14 +65,19 @@ fn items(sources: &str, name: &str) -> Vec<Item> {
     let start = head.iter().find_map(|h| Some(sources.find(h)? + h.len()));
     let body = &sources[start.unwrap_or_else(|| panic!("no type {name}"))..];
     let (mut items, mut about, mut renamed) = (Vec::new(), String::new(), None);
+    let mut is_key = true;
     for line in body.lines().map(str::trim).take_while(|line| *line != "}") {
         if let Some(text) = line.strip_prefix("///") {
             about += text;
+        } else if line == "#[serde(skip)]" {
+            is_key = false;
         } else if line.starts_with("#[") {
             let quoted = line.strip_prefix("#[serde(rename = \"");
             renamed = quoted
                 .and_then(|rest| Some(rest.split_once('"')?.0.to_owned()))
                 .or(renamed);
+        } else if !std::mem::replace(&mut is_key, true) {
+            about.clear();
         } else if !line.is_empty() {
             items.push(Item {
                 about: std::mem::take(&mut about).trim().to_owned(),

@@ -5,7 +5,7 @@ use super::delayed::{DelayedFill, NOT_IN_FLIGHT};
 use super::prefetch::{Demand, Prefetcher};
 use super::{Cache, EMPTY};
 use crate::config::{ConfigError, PrefetchConfig, RunConfig};
-use crate::result::PrefetchResult;
+use crate::result::{PrefetchResult, Timeline};
 use std::collections::HashSet;
 
 /// What a configuration has beside and below the L2.
@@ -13,6 +13,8 @@ pub struct MissPath {
     below: Option<Below>,
     prefetch: Option<Prefetch>,
     memory_cycles: u64,
+    /// Fetches by interval of time, where they are recorded.
+    fetched_lines: Option<Vec<u32>>,
 }
 
 /// What was counted beside and below the L2.
@@ -34,12 +36,20 @@ impl MissPath {
             below: Below::build(config)?,
             prefetch: config.prefetch.as_ref().map(Prefetch::new),
             memory_cycles: config.tmu.l2_penalty_cycles.into(),
+            fetched_lines: config.timeline.then(Vec::new),
         })
     }
 
     /// When a line that the L2 requests `now` is there.
     #[inline(always)]
     fn fetch(&mut self, line: u32, now: u64) -> u64 {
+        if let Some(fetched_lines) = &mut self.fetched_lines {
+            let interval = (now / Timeline::INTERVAL_CYCLES) as usize;
+            if fetched_lines.len() <= interval {
+                fetched_lines.resize(interval + 1, 0);
+            }
+            fetched_lines[interval] += 1;
+        }
         match &mut self.below {
             None => now + self.memory_cycles,
             Some(below) => below.read_at(line, now),
@@ -120,6 +130,12 @@ impl<C> SharedLevel<C> {
             below: (self.path.below.as_ref()).map_or_else(BelowResult::default, Below::result),
             prefetch: self.path.prefetch.as_ref().map(|prefetch| prefetch.counts),
         }
+    }
+
+    /// Fetches by interval of time; nothing where they are not recorded.
+    #[must_use]
+    pub fn fetched_lines(&self) -> &[u32] {
+        self.path.fetched_lines.as_deref().unwrap_or_default()
     }
 
     fn clear_path(&mut self) {

@@ -3,9 +3,12 @@
 use super::ConfigArgs;
 use super::addresses::AddressArgs;
 use super::subjects::Traces;
+use crate::config::Mode;
 use crate::experiment::{self, Plan};
+use crate::files;
 use crate::report::run as report;
-use anyhow::Result;
+use anyhow::{Result, ensure};
+use shell::Output;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -16,6 +19,8 @@ use std::time::Instant;
   replay run c.textrace --order z2-sta
   replay run c.textrace --order z2-lrta --l1 16KiB --l2 256KiB --json
   replay run c.textrace --mode functional --order morton --block-order morton
+  replay run c.textrace --l3 4MiB --prefetch next-line --dram lpddr4
+  replay run c.textrace --order z2-sta --timeline c.perfetto.json
   replay run c.textrace --print-config > machine.toml
   replay run --addresses gcc.din.gz --l1 32KiB --l2 256KiB --line 64 --ways 8
   replay convert c.textrace --to u32 | replay run --addresses - --address-form u32 --caches 8/128,16/256")]
@@ -33,6 +38,9 @@ pub struct Args {
     /// Also count by tile (in the JSON)
     #[arg(long, requires = "json", conflicts_with = "addresses")]
     tiles: bool,
+    /// Also write which core works on which tiles when, for ui.perfetto.dev (timed mode)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["addresses", "compare_modes", "print_config"])]
+    timeline: Option<PathBuf>,
     /// Replay in both modes and print the difference
     #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"])]
     compare_modes: bool,
@@ -41,6 +49,16 @@ pub struct Args {
     print_config: bool,
     #[command(flatten)]
     threads: shell::Threads,
+}
+
+/// What the command writes, standard output included.
+fn outputs(args: &Args) -> Vec<Output> {
+    let timeline = args.timeline.iter();
+    let mut outputs: Vec<Output> = timeline
+        .map(|path| Output::text("--timeline", path))
+        .collect();
+    outputs.extend(args.json.then(|| Output::result("--json")));
+    outputs
 }
 
 /// Runs the subcommand.
@@ -54,13 +72,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return args.addresses.run(path, &config, args.json);
     }
     config.tile_maps |= args.tiles;
+    config.timeline = args.timeline.is_some();
+    ensure!(
+        !config.timeline || config.mode == Mode::Timed,
+        "--timeline: expected --mode timed: only there time passes as on the texture units"
+    );
     let Some(path) = args.trace.clone().filter(|_| !args.print_config) else {
         super::print(&toml::to_string(&config)?)?;
         return Ok(ExitCode::SUCCESS);
     };
     if args.compare_modes {
-        config.mode = crate::config::Mode::Timed;
+        config.mode = Mode::Timed;
     }
+    let inputs = std::iter::once(path.as_path()).chain(args.machine.file());
+    let prints = files::check_outputs(&outputs(args), inputs)?;
     let plan = Plan::single(config, args.compare_modes)?;
     args.threads.start()?;
     let traces = Traces::open(&[path])?;
@@ -77,6 +102,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         "{:.1} M footprints/s ({footprints} footprints in {seconds:.3} s, decoding included)",
         footprints as f64 / seconds / 1e6,
     ));
+    if let (Some(file), [row, ..]) = (&args.timeline, rows.as_slice())
+        && let Some(timeline) = &row.result.timeline
+    {
+        let tables = row.subject.source.tables();
+        let text = crate::report::timeline::json(timeline, tables, config.line_bytes)?;
+        files::write_atomically(file, text.as_bytes())?;
+    }
+    if !prints {
+        return Ok(ExitCode::SUCCESS);
+    }
     super::print(&match (rows.as_slice(), args.json) {
         ([timed, functional], true) => report::modes_json(timed, functional)?,
         ([timed, functional], false) => report::modes_text(timed, functional),

@@ -14,7 +14,7 @@ use super::wave::Wave;
 use super::{Machine, ReplayError};
 use crate::cache::{Delay, Levels, MissPath, MissPathResult};
 use crate::config::{Allocation, CacheConfig, Mode, RunConfig, TmuConfig};
-use crate::result::{RunResult, TmuResult};
+use crate::result::{RunResult, Timeline, TmuResult};
 use crate::stream::{Expander, LineMemory, TileSource};
 use crate::tmu::PipelineStats;
 use crate::whole_frame;
@@ -75,6 +75,8 @@ pub struct Outcome {
     pub cycles: Option<u64>,
     /// What was counted beside and below the L2.
     pub path: MissPathResult,
+    /// The replay over time, where it was recorded.
+    pub timeline: Option<Timeline>,
 }
 
 impl Outcome {
@@ -96,6 +98,7 @@ impl Outcome {
             }),
             cycles: Some(cycles),
             path: MissPathResult::default(),
+            timeline: None,
         }
     }
 }
@@ -107,6 +110,7 @@ impl From<CacheCounts> for Outcome {
             tmu: None,
             cycles: None,
             path: MissPathResult::default(),
+            timeline: None,
         }
     }
 }
@@ -397,6 +401,6 @@ where
 {
     match config.mode {
         Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts, path)),
-        _ => Box::new(Timed::new(levels, config.tmu, counts, path)),
+        _ => Box::new(Timed::new(levels, config.tmu, counts, path).with_timeline(config.timeline)),
     }
 }

@@ -58,6 +58,7 @@ pub fn summary(
         cycles: None,
         first_lookups: None,
         prefetch: None,
+        timeline: None,
         lower_levels: Vec::new(),
         dram: None,
         clients: Vec::new(),

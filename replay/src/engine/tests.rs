@@ -539,6 +539,7 @@ mod below;
 mod one_pass;
 mod plain_first_miss;
 mod plain_timed;
+mod timeline;
 
 /// The same frame several times over.
 fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {

@@ -115,6 +115,7 @@ impl Wave<'_> {
                 cycles,
                 dram: below.dram,
                 prefetch,
+                timeline: outcome.timeline,
                 lower_levels: below.levels,
                 first_lookups: machine.first_lookups(),
                 ..summary(tables, expander.bins(), counts, &outcome.counts, config)

@@ -147,7 +147,16 @@ mod tests {
             let key = line.strip_prefix("| `")?;
             Some(key.split_once('`')?.0)
         });
-        let documented: Vec<&str> = documented.collect();
+        // All levels below the L2 are one column.
+        let column = |key: &'static str| {
+            if key.starts_with("level.") {
+                "level"
+            } else {
+                key
+            }
+        };
+        let mut documented: Vec<&str> = documented.map(column).collect();
+        documented.dedup();
         let columns = config();
         let keys: Vec<&str> = columns.iter().map(|c| c.heading.key.as_ref()).collect();
         assert!(keys.len() > 30);

@@ -20,4 +20,5 @@ pub mod sweep_plan;
 pub mod table;
 pub mod techniques;
 pub mod theme;
+pub mod timeline;
 pub mod z2;

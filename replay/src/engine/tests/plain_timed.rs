@@ -291,6 +291,7 @@ impl Machine for PlainTimed {
             }),
             cycles: Some(self.cycles),
             path: crate::cache::MissPathResult::default(),
+            timeline: None,
         }
     }
 }

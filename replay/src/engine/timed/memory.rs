@@ -85,6 +85,11 @@ impl<D: DelayedFill> Memory<D> {
         self.l2.result()
     }
 
+    /// Fetches of the L2 by interval of time, where they are recorded.
+    pub fn fetched_lines(&self) -> &[u32] {
+        self.l2.fetched_lines()
+    }
+
     /// Empties all caches and drops the lines in flight.
     pub fn flush(&mut self) {
         self.l1.iter_mut().for_each(|first| first.cache.clear());

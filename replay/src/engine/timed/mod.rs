@@ -3,6 +3,7 @@
 
 mod asking;
 mod memory;
+mod timeline;
 
 use super::Machine;
 use super::batch::Outcome;
@@ -14,6 +15,7 @@ use crate::order::{Phase, WorkItem};
 use crate::stream::{Cores, StreamError, furthest_behind};
 use crate::tmu::{Pipeline, Turn};
 use memory::{Found, Memory};
+use timeline::Recorder;
 
 /// Texture units, and the caches that they share.
 pub struct Timed<D> {
@@ -21,6 +23,8 @@ pub struct Timed<D> {
     units: Vec<Pipeline>,
     /// Cycles until the last core was done.
     cycles: u64,
+    /// What `--timeline` shows.
+    recorder: Option<Recorder>,
 }
 
 impl<D: DelayedFill> Timed<D> {
@@ -36,7 +40,14 @@ impl<D: DelayedFill> Timed<D> {
             memory: Memory::new(levels, tmu, counts, path),
             units: vec![Pipeline::new(tmu); cores],
             cycles: 0,
+            recorder: None,
         }
+    }
+
+    /// Also records which core works on which tiles when.
+    pub fn with_timeline(mut self, is_wanted: bool) -> Self {
+        self.recorder = is_wanted.then(|| Recorder::new(self.units.len()));
+        self
     }
 
     /// What the cores share, the L2 and the list of items, sees them in the order of time: it is
@@ -87,6 +98,9 @@ impl<D: DelayedFill> Timed<D> {
                         } else if now > until {
                             break now;
                         } else if let Some(item) = items.next(core) {
+                            if let Some(recorder) = &mut self.recorder {
+                                recorder.start(core, now, unit.stats(), item);
+                            }
                             work.load(core, item)?;
                         } else {
                             unit.drain();
@@ -111,6 +125,11 @@ impl<D: DelayedFill> Machine for Timed<D> {
             let cycles = self.cycles;
             self.units.iter_mut().for_each(|unit| unit.resume(cycles));
             self.run_phase(work, phase, assign)?;
+            if let Some(recorder) = &mut self.recorder {
+                for (core, unit) in self.units.iter().enumerate() {
+                    recorder.end(core, unit.clock(), unit.stats());
+                }
+            }
             self.cycles = self.units.iter().map(Pipeline::clock).max().unwrap_or(0);
         }
         Ok(())
@@ -124,6 +143,8 @@ impl<D: DelayedFill> Machine for Timed<D> {
         let stats = self.units.iter().map(Pipeline::stats);
         Outcome {
             path: self.memory.path_result(),
+            timeline: (self.recorder.as_ref())
+                .map(|recorder| recorder.timeline(self.memory.fetched_lines())),
             ..Outcome::timed(self.memory.counts().clone(), stats, self.cycles)
         }
     }

@@ -73,6 +73,14 @@ pub struct Device {
     pub background_mw: f64,
 }
 
+impl Device {
+    /// Energy of reading a byte, where every second burst opens a row; standing by and refresh are left out.
+    #[must_use]
+    pub fn pj_per_byte(&self) -> f64 {
+        1000.0 * (self.read_nj + 0.5 * self.activate_nj) / f64::from(self.burst_bytes)
+    }
+}
+
 impl DramPreset {
     /// The device.
     #[must_use]

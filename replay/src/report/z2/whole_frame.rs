@@ -48,7 +48,7 @@ pub(super) fn section(report: &PaperReport) -> Result<Option<Section>, PlotError
         (figures(&charts))
         p.note { "Bars are those of the first cache configuration. An order changes what textures and shaded vertices read, nothing else." }
         (table.without_empty_columns().markup())
-        p.note { "GB/s are 10\u{2079} bytes per second, reads and writes of all clients together." }
+        p.note { "GB/s are 10\u{2079} bytes per second, reads and writes of all clients together. mW are what these bytes take in the DRAM of the configuration (LPDDR4 where it has none): writes count as reads, every second burst opens a row, standing by and refresh are left out." }
     };
     Ok(Some(Section::new("Where the traffic goes", body)))
 }
@@ -111,6 +111,19 @@ fn columns<'a>() -> Vec<Column<'static, ResultRow<'a>>> {
             move |row: &ResultRow| row.mb_per_frame(all(row)) * f64::from(hz) / 1000.0,
         )
     }));
+    columns.extend(RATES_HZ.map(|hz| {
+        Column::real(
+            format!("dram_mw_{hz}hz"),
+            format!("at {hz} Hz"),
+            "mW",
+            0,
+            move |row: &ResultRow| {
+                let dram = row.point.config.dram.unwrap_or_default();
+                let pj_per_byte = dram.preset.device().pj_per_byte();
+                row.mb_per_frame(all(row)) * f64::from(hz) * pj_per_byte * 1e-3
+            },
+        )
+    }));
     columns
 }
 
@@ -138,7 +151,13 @@ mod tests {
             },
             |report| section(report).unwrap().unwrap().body.into_string(),
         );
-        for expected in ["textures", "indices and vertices", "colour", "at 90 Hz"] {
+        for expected in [
+            "textures",
+            "indices and vertices",
+            "colour",
+            "at 90 Hz",
+            "mW",
+        ] {
             assert!(text.contains(expected), "{expected}");
         }
         // Parts that nothing uses have no entry.
