@@ -2,6 +2,7 @@
 # Measures run time against error on built-in scenes, from capture to technique, and writes tables,
 # charts and one page. The table of errors that reports show is errors.csv of such a run.
 #   SIZE=WxH       pixels an eye (480x540)
+#   RESULTS=1      also write results/accuracy-times.csv and results/accuracy-rays.csv
 #   TECHNIQUES=DIR a folder of `tracegen techniques` (default: a small run of its own)
 set -eu
 cd "$(dirname "$0")/.."
@@ -62,3 +63,50 @@ set -- "$@" --techniques "$techniques"
 say "measure"
 "$bin/replay" accuracy -q "$@" --seconds "$seconds" -o "$out" > "$out/accuracy.txt"
 say "done: $out/accuracy.html"
+[ -n "${RESULTS:-}" ] || exit 0
+python3 - "$out" <<'PYTHON'
+import csv, sys
+
+COMMAND = "# command: RESULTS=1 make accuracy\n"
+DEFAULT = "depth=0.02+row=0.02+object+opaque+triangles"
+
+
+def rows(name):
+    with open(f"{sys.argv[1]}/{name}.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def write(name, heading, table):
+    with open(f"results/{name}.csv", "w", newline="") as file:
+        file.write(COMMAND)
+        csv.writer(file, lineterminator="\n").writerows([heading, *table])
+
+
+times = {(row["study"], row["choice"], row["scene"]): float(row["time_ratio"]) for row in rows("times")}
+SHOWN = [
+    ("capture", "llvmpipe", "capture by llvmpipe", "reference in double precision"),
+    ("capture", "softpipe", "capture by softpipe", "reference in double precision"),
+    ("encoding", "delta", "delta encoding", "raw records"),
+    ("encoding", "planes", "plane encoding", "raw records"),
+    ("mode", "functional", "functional replay", "timed replay"),
+    ("model", "first miss", "first-miss model", "timed replay"),
+    ("lod", "fast logarithm, per quad", "fast logarithm, a level per quad", "exact logarithm, a level per lane"),
+    ("sets", "1/4 of the sets", "a quarter of the sets", "all sets"),
+    ("tiles", "1/4 of the tiles", "a quarter of the tiles", "all tiles"),
+    ("frames", "1/4 of the frames, cold", "a quarter of 16 frames, each from empty caches", "all frames"),
+    ("frames", "1/4 of the frames, warmed", "a quarter of 16 frames, each after the one before it", "all frames"),
+]
+table = []
+for study, choice, title, over in SHOWN:
+    cells = [times.get((study, choice, scene)) for scene in ("atrium", "jungle", "frames")]
+    table.append([title, over, *("-" if cell is None else f"{cell:.2f}" for cell in cells)])
+write("accuracy-times", ["choice", "time over that of", "atrium", "jungle", "16 frames of atrium"], table)
+
+figures = {(row["study"], row["choice"], row["scene"], row["figure"]): float(row["value"]) for row in rows("choices")}
+table = []
+for rule in ("none", DEFAULT, "depth=0.02+object+opaque+silhouette+triangle"):
+    for scene in ("chess", "music-box"):
+        of = lambda figure: figures["rules", rule, scene, figure]
+        table.append([rule, scene, f"{times['rules', rule, scene]:.3f}", f"{of('flip_mean'):.4f}", f"{of('reused_pct'):.1f}"])
+write("accuracy-rays", ["rule", "scene", "time over both eyes in full", "FLIP, mean", "right pixels reused %"], table)
+PYTHON

@@ -27,9 +27,16 @@ FRAMES, HERTZ = 4, 90
 COMMAND = "# command: scripts/whole-frame.sh SCENES  (tracegen raster SCENE --hmd dk2 --shadows --path head --frames 4 --geometry, replay run TRACE --mode functional --order ORDER --frame MACHINE)\n"
 
 
+def clients(scene, machine, order):
+    return json.load(open(f"{scene},{machine},{order}.json"))["result"]["clients"]
+
+
 def traffic(scene, machine, order):
-    clients = json.load(open(f"{scene},{machine},{order}.json"))["result"]["clients"]
-    return {c["client"]: c["read_bytes"] + c["write_bytes"] for c in clients}
+    return {c["client"]: c["read_bytes"] + c["write_bytes"] for c in clients(scene, machine, order)}
+
+
+def milliwatts(scene, machine, order):
+    return sum(c["energy_mj"] for c in clients(scene, machine, order)) / FRAMES * HERTZ
 
 
 def save(name, head, rows):
@@ -53,8 +60,10 @@ for scene in SCENES:
         saved = lambda own, base: f"{100 * (1 - own / base):.1f}"
         orders.append([scene, machine, saved(sta["texture"], morton["texture"]),
                        saved(sta["shaded-vertex"], morton["shaded-vertex"]) if "shaded-vertex" in morton else "-",
-                       saved(total_sta, total), f"{total / FRAMES * HERTZ / 1e9:.2f}", f"{total_sta / FRAMES * HERTZ / 1e9:.2f}"])
+                       saved(total_sta, total), f"{total / FRAMES * HERTZ / 1e9:.2f}", f"{total_sta / FRAMES * HERTZ / 1e9:.2f}",
+                       *(f"{milliwatts(scene, machine, order):.0f}" for order in ("morton", "z2-sta"))])
 save("whole-frame-bytes", ["scene", "texture samples, MB", "meshes, MB", "primitive lists of 4 frames, MB"], sizes)
 save("whole-frame", ["scene", "machine"] + CLIENTS + ["all, MB per frame", "texture % of all"], shares)
-save("whole-frame-orders", ["scene", "machine", "texture saved %", "shaded vertices saved %", "all saved %", "Morton GB/s at 90 Hz", "Z2 STA GB/s at 90 Hz"], orders)
+save("whole-frame-orders", ["scene", "machine", "texture saved %", "shaded vertices saved %", "all saved %", "Morton GB/s at 90 Hz", "Z2 STA GB/s at 90 Hz",
+                            "Morton mW at 90 Hz", "Z2 STA mW at 90 Hz"], orders)
 PYTHON

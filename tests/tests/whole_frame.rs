@@ -144,6 +144,17 @@ fn clients_add_up_and_an_order_changes_only_what_tiles_read() {
     }
     assert_eq!(client(&sta, "colour")["write_bytes"], 2 * 160 * 144 * 4);
     assert_eq!(client(&sta, "depth")["write_bytes"], 4 * 2048 * 2048 * 4);
+    // LPDDR4 reads 32 bytes with 1.3 nJ and opens a row with 1.5 nJ; GDDR6 is another device.
+    let colour = f64::from(2 * 160 * 144 * 4);
+    let energy_mj = |found: &Value| {
+        client(found, "colour")["energy_mj"]
+            .as_f64()
+            .expect("energy")
+    };
+    let expected = colour / 32.0 * (1.3 + 0.5 * 1.5) * 1e-6;
+    assert!((energy_mj(&sta) / expected - 1.0).abs() < 1e-9);
+    let gddr6 = replayed(&trace, &["--frame", "tile-based", "--dram", "gddr6"]);
+    assert!(energy_mj(&gddr6) != energy_mj(&sta));
     let written = |found: &Value| client(found, "shaded-vertex")["write_bytes"].clone();
     assert_eq!(written(&morton), written(&sta));
     let multiview = folder.path().join("multiview.toml");

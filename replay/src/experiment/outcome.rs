@@ -157,8 +157,14 @@ impl ResultRow<'_> {
     /// Bytes of all frames as MB (10^6 bytes) a frame.
     #[must_use]
     pub fn mb_per_frame(&self, bytes: u64) -> f64 {
+        self.per_frame(bytes as f64 / 1e6)
+    }
+
+    /// A sum over all frames as a mean per frame.
+    #[must_use]
+    pub fn per_frame(&self, sum: f64) -> f64 {
         let frames = frame_count(self.subject.source.tables()).max(1);
-        bytes as f64 / 1e6 / f64::from(frames)
+        sum / f64::from(frames)
     }
 
     /// Traffic of an infinite cache, bytes.

@@ -58,7 +58,7 @@ impl Client {
 }
 
 /// Traffic of a client between chip and memory, over all frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClientTraffic {
     /// Who.
     pub client: Client,
@@ -66,6 +66,10 @@ pub struct ClientTraffic {
     pub read_bytes: u64,
     /// Bytes written.
     pub write_bytes: u64,
+    /// Energy of these bytes in the DRAM, millijoules ([`Device::pj_per_byte`]).
+    ///
+    /// [`Device::pj_per_byte`]: super::dram::Device::pj_per_byte
+    pub energy_mj: f64,
 }
 
 impl ClientTraffic {

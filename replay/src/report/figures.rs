@@ -85,6 +85,8 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("bytes that all clients of memory write, all frames"),
         Figure::real("frame_mb_per_frame", "all traffic", "MB/frame", 2, |r| Some(r.mb_per_frame(whole(r.result, ClientTraffic::bytes)?)))
             .about("traffic of all clients of memory"),
+        Figure::real("frame_energy_mj_per_frame", "all traffic", "mJ/frame", 3, |r| Some(r.per_frame(whole_mj(r.result)?)))
+            .about("DRAM energy of the traffic of all clients"),
         Figure::real("texture_share_pct", "texture", "% of all", 1, |r| Some(100.0 * r.result.external_bytes as f64 / whole(r.result, ClientTraffic::bytes)? as f64))
             .about("texture reads over the traffic of all clients"),
         Figure::real("frame_reduction_pct", "saved of all", "% of Morton", 1, |r| whole_saved_pct(r))
@@ -98,6 +100,12 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
 fn whole(result: &RunResult, of: impl Fn(&ClientTraffic) -> u64) -> Option<u64> {
     let clients = &result.clients;
     (!clients.is_empty()).then(|| clients.iter().map(of).sum())
+}
+
+/// DRAM energy of all clients over all frames, millijoules.
+pub fn whole_mj(result: &RunResult) -> Option<f64> {
+    let clients = &result.clients;
+    (!clients.is_empty()).then(|| clients.iter().map(|c| c.energy_mj).sum())
 }
 
 fn whole_saved_pct(row: &ResultRow) -> Option<f64> {

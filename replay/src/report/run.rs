@@ -128,7 +128,7 @@ pub fn text(row: &ResultRow) -> String {
 
 /// Traffic by client of memory, and all of it.
 fn clients(row: &ResultRow) -> Table {
-    type Line = (&'static str, [u64; 2], f64);
+    type Line = (&'static str, [u64; 2], f64, f64);
     let clients = &row.result.clients;
     let sum: u64 = clients.iter().map(ClientTraffic::bytes).sum();
     let share = |bytes: u64| 100.0 * bytes as f64 / sum.max(1) as f64;
@@ -138,17 +138,26 @@ fn clients(row: &ResultRow) -> Table {
                 c.client.name(),
                 [c.read_bytes, c.write_bytes],
                 share(c.bytes()),
+                c.energy_mj,
             )
         })
         .collect();
     let all = [0, 1].map(|kind: usize| lines.iter().map(|line| line.1[kind]).sum());
-    lines.push(("all", all, share(sum)));
+    let energy_mj = clients.iter().map(|c| c.energy_mj).sum();
+    lines.push(("all", all, share(sum), energy_mj));
     let frames = |kind: usize| move |l: &Line| row.mb_per_frame(l.1[kind]);
     let columns = [
         Column::text("client", "", |l: &Line| l.0),
         Column::real("read_mb_per_frame", "read", "MB/frame", 3, frames(0)),
         Column::real("write_mb_per_frame", "written", "MB/frame", 3, frames(1)),
         Column::real("share_pct", "of all", "%", 1, |l: &Line| l.2),
+        Column::real(
+            "energy_mj_per_frame",
+            "DRAM energy",
+            "mJ/frame",
+            3,
+            |l: &Line| row.per_frame(l.3),
+        ),
     ];
     Table::new(&columns, &lines)
 }

@@ -21,7 +21,7 @@ use formats::textrace::geometry::{Geometry, ViewTarget};
 use vertices::{Reuse, ShadedView};
 
 /// Traffic by client, and what vertex processing did.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct WholeFrame {
     /// Traffic of each client that has any.
     pub clients: Vec<ClientTraffic>,
@@ -73,6 +73,8 @@ pub fn traffic(
         }
         attachments::count(&views, passes, machine, &mut traffic);
     }
+    let dram = config.dram.unwrap_or_default();
+    let pj_per_byte = dram.preset.device().pj_per_byte();
     let clients = Client::ALL.into_iter().zip(traffic.0);
     Ok(WholeFrame {
         clients: clients
@@ -80,6 +82,7 @@ pub fn traffic(
                 client,
                 read_bytes,
                 write_bytes,
+                energy_mj: (read_bytes + write_bytes) as f64 * pj_per_byte * 1e-9,
             })
             .filter(|client| client.bytes() > 0)
             .collect(),

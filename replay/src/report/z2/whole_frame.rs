@@ -5,6 +5,7 @@ use super::model::PaperReport;
 use crate::experiment::ResultRow;
 use crate::memory::clients::{Client, ClientTraffic};
 use crate::report::columns::Column;
+use crate::report::figures::whole_mj;
 use crate::report::html::{Section, figures};
 use crate::report::plots::stacked::StackedChart;
 use crate::report::plots::{PlotError, SeriesStyle};
@@ -117,11 +118,7 @@ fn columns<'a>() -> Vec<Column<'static, ResultRow<'a>>> {
             format!("at {hz} Hz"),
             "mW",
             0,
-            move |row: &ResultRow| {
-                let dram = row.point.config.dram.unwrap_or_default();
-                let pj_per_byte = dram.preset.device().pj_per_byte();
-                row.mb_per_frame(all(row)) * f64::from(hz) * pj_per_byte * 1e-3
-            },
+            move |row: &ResultRow| Some(row.per_frame(whole_mj(row.result)?) * f64::from(hz)),
         )
     }));
     columns
@@ -139,6 +136,7 @@ mod tests {
             client,
             read_bytes,
             write_bytes: 1_000_000,
+            energy_mj: 1.0,
         };
         let text = with_edited(
             |point, result| {

@@ -385,7 +385,9 @@ impl Footprints {
         let Level { base_bytes, u, v } = &kind.levels[level as usize];
         let base = base_bytes + kind.skew_bytes;
         let line = |offset: u32| (base + offset) >> self.line_shift;
-        let [us, vs] = [0, 1].map(|axis| uv.map(|lane| lane[axis]));
+        // An array of closures over `axis` is not always inlined.
+        let us = uv.map(|[u, _]| u);
+        let vs = uv.map(|[_, v]| v);
         let mut last = [0; 4];
         match filter {
             Filter::Linear => {
