@@ -40,6 +40,8 @@ and all caches of a level together have at most 2^24 lines.
     [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
     layout.block_order = [\"morton\", \"tiled\"]
 
+A number in a key is an index into a list of tables: `level.0.size_bytes = [\"1MiB\", \"4MiB\"]` varies the L3, and adds one where `[base]` has none.
+
 At most 100000 points; a point that no machine can have is refused before any is replayed. A sweep that was
 stopped goes on where it stopped: each point's result is a row of a file under `points/` in the output folder.
 [many-machines.md](many-machines.md) tells how to split one over machines.

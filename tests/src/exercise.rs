@@ -8,8 +8,9 @@ use formats::layout::{Layout, LayoutConfig};
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
 use formats::view::Eye;
-use replay::config::{Hsr, Mode, RunConfig};
+use replay::config::{Hsr, LevelConfig, LowerLevels, Mode, PrefetchConfig, RunConfig};
 use replay::memory::clients::{FrameConfig, FrameMachine};
+use replay::memory::dram::DramConfig;
 use replay::sgrt::compose::Reuse;
 use replay::sgrt::config::SgrtConfig;
 use replay::sgrt::loaded::LoadedTrace;
@@ -49,6 +50,9 @@ pub fn exercise(bytes: Vec<u8>) -> bool {
                     mode,
                     hsr,
                     frame: trace.geometry().map(|_| machine),
+                    prefetch: (mode != Mode::Functional).then(PrefetchConfig::default),
+                    level: LowerLevels::of(&[LevelConfig::lru(64 << 10)]).unwrap_or_default(),
+                    dram: (mode == Mode::Timed).then(DramConfig::default),
                     ..RunConfig::default()
                 };
                 // Textures may be too large for a layout, which is an error and no panic.

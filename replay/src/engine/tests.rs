@@ -399,6 +399,12 @@ fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
     )
 }
 
+/// Random machines that a twin is held against: `MACHINES=1000` for many.
+fn machines(usual: u32) -> u32 {
+    let many = std::env::var("MACHINES").ok();
+    many.map_or(usual, |many| many.parse().expect("MACHINES: a number"))
+}
+
 /// SplitMix64.
 struct Random(u64);
 

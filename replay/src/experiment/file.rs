@@ -216,6 +216,11 @@ fn to_value(value: &DeValue) -> Result<Value, String> {
             .map(|i| to_value(i.get_ref()))
             .collect::<Result<_, _>>()
             .map(Value::Array),
+        DeValue::Table(table) => table
+            .iter()
+            .map(|(key, value)| Ok((key.get_ref().to_string(), to_value(value.get_ref())?)))
+            .collect::<Result<_, _>>()
+            .map(Value::Table),
         other => Err(format!(
             "expected text, a number or a list, found {}",
             other.type_str()
@@ -223,7 +228,8 @@ fn to_value(value: &DeValue) -> Result<Value, String> {
     }
 }
 
-/// Sets a dotted key, making the tables on its way.
+/// Sets a dotted key, and makes the tables that it goes through. A number is an index into a list of tables, or that of
+/// a table after the last one: `level.0.size_bytes`.
 pub(super) fn set(table: &mut Table, key: &str, value: Value) {
     match key.split_once('.') {
         None => {
@@ -233,6 +239,12 @@ pub(super) fn set(table: &mut Table, key: &str, value: Value) {
             let inner = table
                 .entry(first)
                 .or_insert_with(|| Value::Table(Table::new()));
+            if let Some((index, rest)) = rest.split_once('.')
+                && let Ok(index) = index.parse::<usize>()
+                && let Some(item) = item_of(inner, index)
+            {
+                return set(item, rest, value);
+            }
             if !inner.is_table() {
                 *inner = Value::Table(Table::new());
             }
@@ -241,6 +253,18 @@ pub(super) fn set(table: &mut Table, key: &str, value: Value) {
             }
         }
     }
+}
+
+/// A table of a list, which is made where there is none.
+fn item_of(list: &mut Value, index: usize) -> Option<&mut Table> {
+    if !list.is_array() {
+        *list = Value::Array(Vec::new());
+    }
+    let items = list.as_array_mut()?;
+    if items.len() == index {
+        items.push(Value::Table(Table::new()));
+    }
+    items.get_mut(index)?.as_table_mut()
 }
 
 fn to_table(config: &RunConfig) -> Table {

@@ -364,7 +364,7 @@ fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
     let mut random = Random(3);
     let orders: Vec<Order> = Order::all().collect();
     let (mut forwarded, mut merged, mut idle) = (0, 0, 0);
-    for step in 0..40 {
+    for step in 0..machines(40) {
         let trace = &traces[random.below(2) as usize];
         let mut cache = |most_sets_log2: u64| {
             let ways = random.of(&[1, 2, 4, 4]);

@@ -313,7 +313,7 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
     let orders: Vec<Order> = Order::all().collect();
     let policies: Vec<Replacement> = Replacement::all().collect();
     let mut loops = 0;
-    for step in 0..200 {
+    for step in 0..machines(200) {
         let trace = &traces[random.below(2) as usize];
         let (mut l1, mut l2) = (random.cache(32), random.cache(256));
         if random.below(2) == 0 {
