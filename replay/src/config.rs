@@ -1,5 +1,6 @@
 //! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
 
+mod inclusion;
 mod lower_levels;
 mod prefetch;
 
@@ -16,6 +17,7 @@ pub use formats::footprint::{
     AnisotropyModel, FilterOverride, LodFormula, SamplingOptions as SamplingConfig,
 };
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
+pub use inclusion::Inclusion;
 pub use lower_levels::{LevelConfig, LowerLevels};
 pub use prefetch::{PrefetchConfig, Prefetching};
 
@@ -102,11 +104,42 @@ pub struct CacheConfig {
     /// Replacement policy.
     #[serde(default)]
     pub replacement: Replacement,
+    /// Lines that share a tag (a sectored cache); a miss fetches one of them.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub sectors: u32,
+    /// Lines of a fully associative victim cache beside it.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub victim_lines: u32,
+    /// Whether it holds what the caches above hold (L2 only).
+    #[serde(default, skip_serializing_if = "Inclusion::is_none")]
+    pub inclusion: Inclusion,
+}
+
+const fn one() -> u32 {
+    1
+}
+
+fn is_one(value: &u32) -> bool {
+    *value == 1
+}
+
+fn is_zero(value: &u32) -> bool {
+    *value == 0
 }
 
 impl CacheConfig {
     const fn default_ways() -> u32 {
         4
+    }
+
+    /// True for LRU and one line per tag, alone: what stack distances describe.
+    #[must_use]
+    pub fn is_plain_lru(&self) -> bool {
+        *self
+            == Self {
+                ways: self.ways,
+                ..Self::lru(self.size_bytes)
+            }
     }
 
     /// A four-way LRU cache of this size.
@@ -116,6 +149,9 @@ impl CacheConfig {
             size_bytes,
             ways: Self::default_ways(),
             replacement: Replacement::LRU,
+            sectors: 1,
+            victim_lines: 0,
+            inclusion: Inclusion::None,
         }
     }
 
@@ -133,7 +169,8 @@ impl CacheConfig {
                 found: self.ways,
             });
         }
-        let bytes_per_set = u64::from(self.ways) * u64::from(line_bytes);
+        self.check_parts(level)?;
+        let bytes_per_set = u64::from(self.ways) * u64::from(line_bytes) * u64::from(self.sectors);
         let sets = self.size_bytes / bytes_per_set;
         let is_whole = self.size_bytes.is_multiple_of(bytes_per_set);
         if !is_whole || !sets.is_power_of_two() || sets > MOST_SETS {
@@ -206,6 +243,9 @@ pub struct TmuConfig {
     pub fetches_per_trip: u32,
     /// When a line that misses gets its way in a cache; without effect where time does not pass (functional mode).
     pub allocation: Allocation,
+    /// Misses of the L2 in flight at most (MSHRs), further ones wait; 0: any number. Without effect in functional mode.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub l2_mshrs: u32,
 }
 
 impl TmuConfig {
@@ -226,6 +266,7 @@ impl Default for TmuConfig {
             retry_footprints: 4,
             fetches_per_trip: 2,
             allocation: Allocation::OnFill,
+            l2_mshrs: 0,
         }
     }
 }
@@ -454,6 +495,12 @@ impl RunConfig {
                 count.to_string(),
             )?;
         }
+        range(
+            tmu.l2_mshrs <= 65_536,
+            "tmu.l2_mshrs",
+            "0 to 65536",
+            tmu.l2_mshrs.to_string(),
+        )?;
         for (key, cycles) in [
             ("tmu.l1_penalty_cycles", tmu.l1_penalty_cycles),
             ("tmu.l2_penalty_cycles", tmu.l2_penalty_cycles),
@@ -463,14 +510,21 @@ impl RunConfig {
         self.l1.sets("L1", self.line_bytes)?;
         self.l2.sets("L2", self.line_bytes)?;
         self.l1.check_lines("L1", self.line_bytes, self.cores)?;
-        self.level.check(self.line_bytes)?;
+        self.level.check(self.line_bytes, &self.l2)?;
         self.prefetch.as_ref().map_or(Ok(()), PrefetchConfig::check)
     }
 
     /// True where the order of the L2's misses matters: they go to further levels or to DRAM, or prefetch others.
     #[must_use]
-    pub const fn follows_l2_misses(&self) -> bool {
-        self.simulates_below_l2() || self.prefetch.is_some()
+    pub fn follows_l2_misses(&self) -> bool {
+        self.simulates_below_l2() || self.prefetch.is_some() || self.levels_depend_on_evictions()
+    }
+
+    /// True where a level holds, or does not hold, a line because another one does.
+    #[must_use]
+    pub fn levels_depend_on_evictions(&self) -> bool {
+        let mut levels = self.level.iter().map(|level| level.inclusion);
+        !self.l2.inclusion.is_none() || levels.any(|inclusion| !inclusion.is_none())
     }
 
     /// True where the misses of the L2 go to further levels or to DRAM.
@@ -562,9 +616,9 @@ mod tests {
         ] {
             let config = RunConfig {
                 l2: CacheConfig {
-                    size_bytes: 3 << 16,
                     ways,
                     replacement,
+                    ..CacheConfig::lru(3 << 16)
                 },
                 ..RunConfig::default()
             };

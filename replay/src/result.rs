@@ -50,6 +50,21 @@ pub struct LevelResult {
     pub counters: LevelCounters,
 }
 
+/// The MSHRs of the L2, where their number is limited.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MshrResult {
+    /// In use at most.
+    pub peak: u64,
+    /// Misses that found all of them in use.
+    pub stalled_misses: u64,
+    /// Cycles that these waited, together.
+    pub stall_cycles: u64,
+}
+
+fn is_zero(value: &u64) -> bool {
+    *value == 0
+}
+
 /// What a prefetcher of the L2 did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PrefetchResult {
@@ -57,6 +72,9 @@ pub struct PrefetchResult {
     pub lines: u64,
     /// Those of them that were requested afterwards, while they were there or in flight.
     pub useful_lines: u64,
+    /// Lines that were to be prefetched while all MSHRs were in use, and were not.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub dropped_lines: u64,
     /// Those of the useful ones that were still in flight then.
     pub late_lines: u64,
     /// Prefetched lines that were requested only after they had been evicted.
@@ -221,6 +239,12 @@ pub struct RunResult {
     /// The prefetcher of the L2, where the configuration has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prefetch: Option<PrefetchResult>,
+    /// The MSHRs of the L2, where their number is limited.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub l2_mshrs: Option<MshrResult>,
+    /// Lines that inclusive levels invalidated in L1 caches and in the L2, where levels depend on what others evict.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub invalidated_lines: Option<u64>,
     /// The levels below the L2, where the configuration has any.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lower_levels: Vec<LowerLevelResult>,

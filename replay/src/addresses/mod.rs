@@ -19,7 +19,7 @@ pub use lines::{KindSet, LineBlock, Totals, for_line_blocks, for_lines};
 pub use result::{LevelCounts, Outcome, Point};
 
 use crate::cache::Levels;
-use crate::config::{ConfigError, Replacement, RunConfig};
+use crate::config::{ConfigError, RunConfig};
 use formats::FormatError;
 use formats::interop::plain::AddressFile;
 use hierarchy::Hierarchy;
@@ -109,7 +109,7 @@ pub fn replay(
 
 /// True if one stack answers for both levels.
 fn is_lru(config: &RunConfig) -> bool {
-    [config.l1, config.l2].map(|cache| cache.replacement) == [Replacement::LRU; 2]
+    config.l1.is_plain_lru() && config.l2.is_plain_lru()
 }
 
 /// One pass for all configurations that are LRU, if there are several; a hierarchy for each of the

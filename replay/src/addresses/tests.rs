@@ -1,5 +1,5 @@
 use super::*;
-use crate::config::CacheConfig;
+use crate::config::{CacheConfig, Replacement};
 use formats::interop::plain::{AccessKind, AddressForm, PlainAccess, PlainForm, PlainWriter};
 use std::collections::{HashSet, VecDeque};
 
@@ -38,9 +38,9 @@ fn file(accesses: &[PlainAccess]) -> AddressFile<'static> {
 
 fn config(line_bytes: u32, l1: (u64, u32), l2: (u64, u32), policy: Replacement) -> RunConfig {
     let cache = |(size_bytes, ways)| CacheConfig {
-        size_bytes,
         ways,
         replacement: policy,
+        ..CacheConfig::lru(size_bytes)
     };
     RunConfig {
         line_bytes,

@@ -1,16 +1,19 @@
 //! What answers the misses of the L2: further levels, if the configuration has any, then memory.
 
 use super::mshr::Mshrs;
-use super::{AnyCache, Cache, NOT_IN_FLIGHT};
-use crate::config::{ConfigError, RunConfig};
+use super::{AnyCache, Cache, EMPTY, NOT_IN_FLIGHT};
+use crate::config::{ConfigError, Inclusion, RunConfig};
 use crate::memory::dram::{Dram, DramResult};
 use crate::result::LowerLevelResult;
+use std::ops::RangeInclusive;
 
 /// The levels below the L2, and memory.
 pub struct Below {
     levels: Vec<Level>,
     dram: Option<Dram>,
     memory_cycles: u64,
+    /// Lines of the L2 that inclusive levels have evicted.
+    invalidated: Vec<RangeInclusive<u32>>,
 }
 
 /// What was counted below the L2.
@@ -30,6 +33,7 @@ struct Level {
     line_bytes: u32,
     /// Its lines are so much longer than the L2's: the number of bits that a line number loses.
     shift: u32,
+    inclusion: Inclusion,
     hit_cycles: u64,
     look_ups: u64,
     misses: u64,
@@ -58,6 +62,7 @@ impl Below {
                 in_flight: Mshrs::new(),
                 line_bytes,
                 shift: line_bytes.ilog2() - config.line_bytes.ilog2(),
+                inclusion: level.inclusion,
                 hit_cycles: level.hit_cycles.into(),
                 look_ups: 0,
                 misses: 0,
@@ -69,46 +74,96 @@ impl Below {
             levels,
             dram: dram.map(|dram| Dram::new(dram, line_bytes)),
             memory_cycles: config.tmu.l2_penalty_cycles.into(),
+            invalidated: Vec::new(),
         }))
     }
 
     /// Reads a line that the L2 has not, where time does not pass.
     pub fn read(&mut self, line: u32) {
-        for level in &mut self.levels {
-            if level.access(line) {
-                return;
+        let missed = self.look_up(line);
+        if missed == self.levels.len() {
+            let line = self.line_of_memory(line);
+            if let Some(dram) = &mut self.dram {
+                dram.read(line, None);
             }
         }
-        let line = self.line_of_memory(line);
-        if let Some(dram) = &mut self.dram {
-            dram.read(line, None);
-        }
+        self.fill(missed, line);
     }
 
     /// Reads a line that the L2 has not: the cycle in which it arrives there. `now` never goes back.
     ///
     /// A level that holds the line sends it after its `hit_cycles`, or when the line arrives there, whichever is later.
     pub fn read_at(&mut self, line: u32, now: u64) -> u64 {
-        let mut missed = 0;
-        let mut arrival = None;
-        for level in &mut self.levels {
-            if level.access(line) {
-                arrival = Some(level.arrival(line, now));
-                break;
-            }
-            missed += 1;
-        }
-        let arrival = arrival.unwrap_or_else(|| {
+        let missed = self.look_up(line);
+        let arrival = if let Some(level) = self.levels.get_mut(missed) {
+            level.arrival(line, now)
+        } else {
             let line = self.line_of_memory(line);
             if let Some(dram) = &mut self.dram {
                 dram.read(line, Some(now));
             }
             now + self.memory_cycles
-        });
+        };
+        self.fill(missed, line);
         for level in &mut self.levels[..missed] {
             level.enter(line, now, arrival);
         }
         arrival
+    }
+
+    /// The first level that holds a line; their number if none does. A line that an exclusive level holds leaves it.
+    fn look_up(&mut self, line: u32) -> usize {
+        let hit = self.levels.iter_mut().position(|level| level.look_up(line));
+        hit.unwrap_or(self.levels.len())
+    }
+
+    /// Fills a line into the first levels, which missed it; exclusive ones hold only what the level above evicts.
+    fn fill(&mut self, missed: usize, line: u32) {
+        for index in 0..missed {
+            if self.levels[index].inclusion != Inclusion::Exclusive {
+                self.fill_level(index, line);
+            }
+        }
+    }
+
+    fn fill_level(&mut self, index: usize, line: u32) {
+        let level = &mut self.levels[index];
+        let (shift, inclusion) = (level.shift, level.inclusion);
+        let evicted = level.cache.fill(line >> shift);
+        if evicted == EMPTY {
+            return;
+        }
+        let first = evicted << shift;
+        let lines = first..=first | ((1 << shift) - 1);
+        if inclusion == Inclusion::Inclusive {
+            for above in &mut self.levels[..index] {
+                for line in lines.clone().step_by(1 << above.shift) {
+                    above.cache.remove(line >> above.shift);
+                }
+            }
+            self.invalidated.push(lines);
+        }
+        self.take_evicted(index + 1, first);
+    }
+
+    /// A level, if it is exclusive, takes a line that the level above it has evicted.
+    fn take_evicted(&mut self, index: usize, line: u32) {
+        if let Some(level) = self.levels.get(index)
+            && level.inclusion == Inclusion::Exclusive
+            && !level.cache.contains(line >> level.shift)
+        {
+            self.fill_level(index, line);
+        }
+    }
+
+    /// The L3, if it is exclusive, takes a line that the L2 has evicted.
+    pub fn take_evicted_by_l2(&mut self, line: u32) {
+        self.take_evicted(0, line);
+    }
+
+    /// Lines of the L2 that an inclusive level has evicted since the last call.
+    pub fn take_invalidated(&mut self) -> Vec<RangeInclusive<u32>> {
+        std::mem::take(&mut self.invalidated)
     }
 
     fn line_of_memory(&self, line: u32) -> u32 {
@@ -142,10 +197,14 @@ impl Below {
 }
 
 impl Level {
-    /// Looks up the line that holds a line of the L2; fills it on a miss. True for a hit.
-    fn access(&mut self, line: u32) -> bool {
+    /// Looks up the line that holds a line of the L2. True for a hit.
+    fn look_up(&mut self, line: u32) -> bool {
+        let line = line >> self.shift;
         self.look_ups += 1;
-        let hit = self.cache.access(line >> self.shift);
+        let hit = match self.inclusion {
+            Inclusion::Exclusive => self.cache.remove(line),
+            _ => self.cache.lookup(line),
+        };
         self.misses += u64::from(!hit);
         hit
     }

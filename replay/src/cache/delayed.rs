@@ -32,6 +32,12 @@ pub trait DelayedFill: Send {
     /// [`Self::holds`] was called for it in this cycle.
     fn enter(&mut self, line: u32, now: u64, arrival: u64);
 
+    /// Takes a line out that has arrived; one in flight still arrives. True if it was there.
+    fn remove(&mut self, line: u32, now: u64) -> bool;
+
+    /// Appends the lines that were evicted since the last call, where the cache keeps a list of them.
+    fn take_evicted(&mut self, _lines: &mut Vec<u32>) {}
+
     /// Empties the cache and drops the lines in flight.
     fn clear(&mut self);
 }
@@ -110,6 +116,15 @@ impl<C: Cache> DelayedFill for TimeOrder<C> {
         } else {
             self.in_flight.request(line, now, arrival);
         }
+    }
+
+    fn remove(&mut self, line: u32, now: u64) -> bool {
+        self.in_flight.arrive(now, &mut self.cache);
+        self.cache.remove(line)
+    }
+
+    fn take_evicted(&mut self, lines: &mut Vec<u32>) {
+        self.cache.take_evicted(lines);
     }
 
     fn clear(&mut self) {

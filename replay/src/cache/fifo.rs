@@ -34,15 +34,33 @@ impl Cache for Fifo {
         self.tags[first..first + self.ways].contains(&line)
     }
 
-    fn fill(&mut self, line: u32) {
+    fn fill(&mut self, line: u32) -> u32 {
         let set = (line & self.set_mask) as usize;
         let oldest = &mut self.oldest[set];
-        self.tags[set * self.ways + usize::from(*oldest)] = line;
+        let tag = &mut self.tags[set * self.ways + usize::from(*oldest)];
+        let evicted = std::mem::replace(tag, line);
         *oldest = if usize::from(*oldest) + 1 == self.ways {
             0
         } else {
             *oldest + 1
         };
+        evicted
+    }
+
+    /// Older lines move up, so that the way that is replaced next is the empty one.
+    fn remove(&mut self, line: u32) -> bool {
+        let set = (line & self.set_mask) as usize;
+        let tags = &mut self.tags[set * self.ways..][..self.ways];
+        let Some(mut way) = tags.iter().position(|&tag| tag == line) else {
+            return false;
+        };
+        while way != usize::from(self.oldest[set]) {
+            let older = way.checked_sub(1).unwrap_or(self.ways - 1);
+            tags[way] = tags[older];
+            way = older;
+        }
+        tags[way] = EMPTY;
+        true
     }
 
     fn clear(&mut self) {

@@ -276,8 +276,13 @@ mod tests {
             self.0.contains(&line)
         }
 
-        fn fill(&mut self, line: u32) {
+        fn fill(&mut self, line: u32) -> u32 {
             self.0.push(line);
+            u32::MAX
+        }
+
+        fn remove(&mut self, _line: u32) -> bool {
+            false
         }
 
         fn clear(&mut self) {

@@ -37,7 +37,10 @@ impl Levels<AnyCache> {
             l1: (1..=config.cores)
                 .map(|core| build(&config.l1, "L1", core))
                 .collect::<Result<_, _>>()?,
-            l2: build(&config.l2, "L2", 0)?,
+            l2: match build(&config.l2, "L2", 0)? {
+                l2 if config.levels_depend_on_evictions() => l2.watched(),
+                l2 => l2,
+            },
         })
     }
 

@@ -192,12 +192,26 @@ impl<W: Ways> Cache for Lru<W> {
         self.tags[first..first + ways].contains(&line)
     }
 
-    fn fill(&mut self, line: u32) {
+    fn fill(&mut self, line: u32) -> u32 {
         let set = self.set(line);
+        let evicted = set.last().copied().unwrap_or(EMPTY);
         for way in (1..set.len()).rev() {
             set[way] = set[way - 1];
         }
         set[0] = line;
+        evicted
+    }
+
+    fn remove(&mut self, line: u32) -> bool {
+        let set = self.set(line);
+        let Some(way) = set.iter().position(|&tag| tag == line) else {
+            return false;
+        };
+        set[way..].rotate_left(1);
+        if let Some(last) = set.last_mut() {
+            *last = EMPTY;
+        }
+        true
     }
 
     fn clear(&mut self) {

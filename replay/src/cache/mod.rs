@@ -9,17 +9,22 @@ mod delayed;
 mod fifo;
 mod forest;
 mod in_flight;
+mod inclusion;
 mod levels;
+mod limited_mshrs;
 mod lru;
 mod mshr;
 mod prefetch;
 mod random;
 mod reserved;
 mod rrip;
+mod sectored;
 mod set_order;
 mod shared;
 mod ship;
 mod tree_plru;
+mod victim;
+mod watched;
 
 pub use delayed::{Delay, DelayedFill, NOT_IN_FLIGHT};
 pub use forest::Forest;
@@ -34,8 +39,11 @@ use crate::registry::{Named, registry};
 use fifo::Fifo;
 use random::RandomReplacement;
 use rrip::{Insertion, Rrip};
+use sectored::Sectored;
 use ship::Ship;
 use tree_plru::TreePlru;
+use victim::WithVictimCache;
+use watched::Watched;
 
 registry! { PolicyRow:
     // constant   name          help                    ways that it can have                          built by
@@ -120,8 +128,14 @@ pub trait Cache: Send {
         lines.iter().position(|&line| !self.lookup(line))
     }
 
-    /// Puts in a line that is not there, in place of the set's victim.
-    fn fill(&mut self, line: u32);
+    /// Puts in a line that is not there: the line that it evicts, or [`EMPTY`].
+    fn fill(&mut self, line: u32) -> u32;
+
+    /// Takes a line out. True if it was there.
+    fn remove(&mut self, line: u32) -> bool;
+
+    /// Appends the lines that were evicted since the last call, where a cache keeps a list of them.
+    fn take_evicted(&mut self, _lines: &mut Vec<u32>) {}
 
     /// Takes all lines out.
     fn clear(&mut self);
@@ -155,8 +169,16 @@ impl Cache for Box<dyn Cache> {
         (**self).lookup_all(lines)
     }
 
-    fn fill(&mut self, line: u32) {
-        (**self).fill(line);
+    fn fill(&mut self, line: u32) -> u32 {
+        (**self).fill(line)
+    }
+
+    fn remove(&mut self, line: u32) -> bool {
+        (**self).remove(line)
+    }
+
+    fn take_evicted(&mut self, lines: &mut Vec<u32>) {
+        (**self).take_evicted(lines);
     }
 
     fn clear(&mut self) {
@@ -201,7 +223,20 @@ impl AnyCache {
             ways: config.ways,
             seed,
         };
-        Ok((config.replacement.row().build)(geometry))
+        let mut cache = (config.replacement.row().build)(geometry);
+        if config.victim_lines > 0 {
+            cache = boxed(WithVictimCache::new(cache.into_box(), config.victim_lines));
+        }
+        if config.sectors > 1 {
+            cache = boxed(Sectored::new(cache.into_box(), config.sectors));
+        }
+        Ok(cache)
+    }
+
+    /// The cache with a list of the lines that it evicts.
+    #[must_use]
+    fn watched(self) -> Self {
+        boxed(Watched::new(self.into_box()))
     }
 
     /// The cache behind a pointer, whatever its kind.

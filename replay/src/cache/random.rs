@@ -34,7 +34,7 @@ impl Cache for RandomReplacement {
         self.tags[first..first + self.ways].contains(&line)
     }
 
-    fn fill(&mut self, line: u32) {
+    fn fill(&mut self, line: u32) -> u32 {
         let first = (line & self.set_mask) as usize * self.ways;
         let set = &mut self.tags[first..first + self.ways];
         let way = set.iter().position(|&tag| tag == EMPTY).unwrap_or_else(|| {
@@ -44,7 +44,17 @@ impl Cache for RandomReplacement {
             // The high bits, scaled: xorshift's low bits are its weak ones.
             (((self.state >> 32) * set.len() as u64) >> 32) as usize
         });
-        set[way] = line;
+        std::mem::replace(&mut set[way], line)
+    }
+
+    fn remove(&mut self, line: u32) -> bool {
+        let first = (line & self.set_mask) as usize * self.ways;
+        let tags = &mut self.tags[first..first + self.ways];
+        let way = tags.iter().position(|&tag| tag == line);
+        if let Some(way) = way {
+            tags[way] = EMPTY;
+        }
+        way.is_some()
     }
 
     fn clear(&mut self) {

@@ -61,6 +61,14 @@ impl DelayedFill for Reserved {
         }
     }
 
+    fn remove(&mut self, line: u32, _now: u64) -> bool {
+        self.cache.remove(line)
+    }
+
+    fn take_evicted(&mut self, lines: &mut Vec<u32>) {
+        self.cache.take_evicted(lines);
+    }
+
     fn clear(&mut self) {
         self.cache.clear();
         self.in_flight.clear();

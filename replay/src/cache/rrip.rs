@@ -93,6 +93,22 @@ impl Sets {
         self.newest[set] = (place - set * self.ways) as u8;
     }
 
+    /// Takes a line out. True if it was there.
+    pub(super) fn remove(&mut self, line: u32) -> bool {
+        let set = self.set(line);
+        let first = set * self.ways;
+        let tags = &self.tags[first..first + self.ways];
+        let Some(way) = tags.iter().position(|&tag| tag == line) else {
+            return false;
+        };
+        self.tags[first + way] = EMPTY;
+        self.predictions[first + way] = DISTANT;
+        if usize::from(self.newest[set]) == way {
+            self.newest[set] = u8::MAX;
+        }
+        true
+    }
+
     /// Takes all lines out.
     pub(super) fn clear(&mut self) {
         self.tags.fill(EMPTY);
@@ -166,7 +182,7 @@ impl Cache for Rrip {
         self.sets.contains(line)
     }
 
-    fn fill(&mut self, line: u32) {
+    fn fill(&mut self, line: u32) -> u32 {
         let set = self.sets.set(line);
         let prediction = match self.insertion(set) {
             Insertion::Bimodal => {
@@ -180,7 +196,13 @@ impl Cache for Rrip {
             Insertion::Static | Insertion::Dueling => LONG,
         };
         let place = self.sets.victim(set);
+        let evicted = self.sets.line(place);
         self.sets.insert(place, line, prediction);
+        evicted
+    }
+
+    fn remove(&mut self, line: u32) -> bool {
+        self.sets.remove(line)
     }
 
     /// The duel begins anew as well: other work between two frames trains the counter for itself.

@@ -228,6 +228,16 @@ impl DelayedFill for SetOrder {
         self.mshrs.enter(line, now, arrival);
     }
 
+    fn remove(&mut self, line: u32, now: u64) -> bool {
+        let (set, _) = self.settled(line, now);
+        let Some(way) = set.tags.iter().position(|&tag| tag == line) else {
+            return false;
+        };
+        set.tags[way..].rotate_left(1);
+        set.tags[3] = EMPTY;
+        true
+    }
+
     fn clear(&mut self) {
         self.sets.fill(EMPTY_SET);
         self.later.iter_mut().for_each(Later::clear);
@@ -279,6 +289,9 @@ mod tests {
                         general.enter(line, now, now + latency);
                     }
                     prop_assert_eq!(sets.arrival(line, now), general.arrival(line, now));
+                }
+                if step % 5 == 0 {
+                    prop_assert_eq!(sets.remove(lines[0], now), general.remove(lines[0], now));
                 }
             }
         }

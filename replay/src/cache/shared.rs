@@ -2,16 +2,25 @@
 
 use super::below::{Below, BelowResult};
 use super::delayed::{DelayedFill, NOT_IN_FLIGHT};
+use super::inclusion::Evictions;
+use super::limited_mshrs::LimitedMshrs;
 use super::prefetch::{Demand, Prefetcher};
 use super::{Cache, EMPTY};
 use crate::config::{ConfigError, PrefetchConfig, RunConfig};
-use crate::result::{PrefetchResult, Timeline};
+use crate::result::{MshrResult, PrefetchResult, Timeline};
+use std::cell::RefCell;
 use std::collections::HashSet;
 
 /// What a configuration has beside and below the L2.
 pub struct MissPath {
     below: Option<Below>,
     prefetch: Option<Prefetch>,
+    /// Where their number is limited.
+    mshrs: Option<LimitedMshrs>,
+    /// Where levels depend on what others evict.
+    evictions: Option<Evictions>,
+    /// True with a prefetcher or with evictions to follow: what comes after the answer to a request.
+    has_consequences: bool,
     memory_cycles: u64,
     /// Fetches by interval of time, where they are recorded.
     fetched_lines: Option<Vec<u32>>,
@@ -24,6 +33,10 @@ pub struct MissPathResult {
     pub below: BelowResult,
     /// The prefetcher, where the configuration has one.
     pub prefetch: Option<PrefetchResult>,
+    /// The MSHRs of the L2, where their number is limited.
+    pub mshrs: Option<MshrResult>,
+    /// Lines invalidated by inclusive levels, where levels depend on what others evict.
+    pub invalidated_lines: Option<u64>,
 }
 
 impl MissPath {
@@ -32,17 +45,51 @@ impl MissPath {
     /// # Errors
     /// A geometry that cannot be built.
     pub fn build(config: &RunConfig) -> Result<Self, ConfigError> {
+        let mshrs = config.tmu.l2_mshrs;
         Ok(Self {
             below: Below::build(config)?,
             prefetch: config.prefetch.as_ref().map(Prefetch::new),
+            mshrs: (mshrs > 0).then(|| LimitedMshrs::new(mshrs)),
+            evictions: Evictions::build(config),
+            has_consequences: config.prefetch.is_some() || config.levels_depend_on_evictions(),
             memory_cycles: config.tmu.l2_penalty_cycles.into(),
             fetched_lines: config.timeline.then(Vec::new),
         })
     }
 
+    /// True where lines leave L1 caches because other levels evict them.
+    #[must_use]
+    pub fn invalidates(&self) -> bool {
+        self.evictions.is_some()
+    }
+
     /// When a line that the L2 requests `now` is there.
     #[inline(always)]
     fn fetch(&mut self, line: u32, now: u64) -> u64 {
+        if self.mshrs.is_some() {
+            return self.fetch_by_mshr(line, now);
+        }
+        self.read(line, now)
+    }
+
+    #[inline(never)]
+    fn fetch_by_mshr(&mut self, line: u32, now: u64) -> u64 {
+        let start = self.mshrs.as_mut().map_or(now, |mshrs| mshrs.start(now));
+        let arrival = self.read(line, start);
+        if let Some(mshrs) = &mut self.mshrs {
+            mshrs.enter(arrival);
+        }
+        arrival
+    }
+
+    /// True if a fetch would wait for an MSHR.
+    fn is_busy(&mut self, now: u64) -> bool {
+        (self.mshrs.as_mut()).is_some_and(|mshrs| mshrs.are_in_use(now))
+    }
+
+    /// When a line is there that the path reads `now`.
+    #[inline(always)]
+    fn read(&mut self, line: u32, now: u64) -> u64 {
         if let Some(fetched_lines) = &mut self.fetched_lines {
             let interval = (now / Timeline::INTERVAL_CYCLES) as usize;
             if fetched_lines.len() <= interval {
@@ -129,6 +176,9 @@ impl<C> SharedLevel<C> {
         MissPathResult {
             below: (self.path.below.as_ref()).map_or_else(BelowResult::default, Below::result),
             prefetch: self.path.prefetch.as_ref().map(|prefetch| prefetch.counts),
+            mshrs: self.path.mshrs.as_ref().map(|mshrs| mshrs.counts),
+            invalidated_lines: (self.path.evictions.as_ref())
+                .map(|evictions| evictions.invalidated_lines),
         }
     }
 
@@ -138,8 +188,20 @@ impl<C> SharedLevel<C> {
         self.path.fetched_lines.as_deref().unwrap_or_default()
     }
 
+    /// Takes lines that inclusive levels have evicted out of the L1 caches: `remove` takes one out of all of them and returns
+    /// how many held it.
+    #[inline(always)]
+    pub fn invalidate_l1(&mut self, remove: impl FnMut(u32) -> u64) {
+        if let Some(evictions) = &mut self.path.evictions
+            && evictions.are_pending()
+        {
+            evictions.invalidate_l1(remove);
+        }
+    }
+
     fn clear_path(&mut self) {
         self.path.below.iter_mut().for_each(Below::clear);
+        self.path.mshrs.iter_mut().for_each(LimitedMshrs::clear);
         if let Some(prefetch) = &mut self.path.prefetch {
             prefetch.unused.clear();
         }
@@ -160,10 +222,23 @@ impl<D: DelayedFill> SharedLevel<D> {
             }
             arrival => Answer::InFlight(arrival),
         };
-        if self.path.prefetch.is_some() {
+        if self.path.has_consequences {
             self.prefetch(line, now, answer);
+            self.follow_evictions(now);
         }
         answer
+    }
+
+    #[inline(never)]
+    fn follow_evictions(&mut self, now: u64) {
+        if let Some(evictions) = &mut self.path.evictions {
+            let cache = RefCell::new(&mut self.cache);
+            evictions.follow(
+                self.path.below.as_mut(),
+                |lines| cache.borrow_mut().take_evicted(lines),
+                |line| cache.borrow_mut().remove(line, now),
+            );
+        }
     }
 
     #[inline(never)]
@@ -175,6 +250,10 @@ impl<D: DelayedFill> SharedLevel<D> {
         for index in 0..prefetch.wanted.len() {
             let line = prefetch.wanted[index];
             if line != EMPTY && !self.cache.holds(line, now) {
+                if self.path.is_busy(now) {
+                    prefetch.counts.dropped_lines += 1;
+                    continue;
+                }
                 let arrival = self.path.fetch(line, now);
                 self.cache.enter(line, now, arrival);
                 prefetch.fetched(line);
@@ -199,10 +278,23 @@ impl<C: Cache> SharedLevel<C> {
         if !hit && let Some(below) = &mut self.path.below {
             below.read(line);
         }
-        if self.path.prefetch.is_some() {
+        if self.path.has_consequences {
             self.prefetch_at_once(line, hit);
+            self.follow_evictions_at_once();
         }
         hit
+    }
+
+    #[inline(never)]
+    fn follow_evictions_at_once(&mut self) {
+        if let Some(evictions) = &mut self.path.evictions {
+            let cache = RefCell::new(&mut self.cache);
+            evictions.follow(
+                self.path.below.as_mut(),
+                |lines| cache.borrow_mut().take_evicted(lines),
+                |line| cache.borrow_mut().remove(line),
+            );
+        }
     }
 
     #[inline(never)]

@@ -56,7 +56,7 @@ impl Cache for Ship {
         self.sets.contains(line)
     }
 
-    fn fill(&mut self, line: u32) {
+    fn fill(&mut self, line: u32) -> u32 {
         let place = self.sets.victim(self.sets.set(line));
         let victim = self.sets.line(place);
         if victim != EMPTY && !self.is_reused[place] {
@@ -69,6 +69,11 @@ impl Cache for Ship {
             _ => LONG,
         };
         self.sets.insert(place, line, prediction);
+        victim
+    }
+
+    fn remove(&mut self, line: u32) -> bool {
+        self.sets.remove(line)
     }
 
     fn clear(&mut self) {

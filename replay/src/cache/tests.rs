@@ -1,4 +1,5 @@
 use super::*;
+use crate::config::{Inclusion, LevelConfig, LowerLevels, RunConfig};
 use proptest::prelude::*;
 use std::collections::HashSet;
 
@@ -41,9 +42,9 @@ impl Twin {
 
 fn config(lines: u64, ways: u32, replacement: Replacement) -> CacheConfig {
     CacheConfig {
-        size_bytes: lines * 16,
         ways,
         replacement,
+        ..CacheConfig::lru(lines * 16)
     }
 }
 
@@ -54,6 +55,32 @@ fn cache(lines: u64, ways: u32, replacement: Replacement) -> Box<dyn Cache> {
 fn seeded(seed: u64, lines: u64, ways: u32, replacement: Replacement) -> Box<dyn Cache> {
     let built = AnyCache::build(&config(lines, ways, replacement), "L1", 16, seed);
     built.unwrap().into_box()
+}
+
+fn built(config: &CacheConfig) -> Box<dyn Cache> {
+    let built = AnyCache::build(config, "L1", 16, 5);
+    built.unwrap().into_box()
+}
+
+/// Caches of every policy, alone, with sectors, with a victim cache and with both.
+fn kinds(lines: u64, ways: u32) -> Vec<CacheConfig> {
+    let mut all = Vec::new();
+    for replacement in Replacement::all() {
+        for (sectors, victim_lines) in [(1, 0), (4, 0), (1, 3), (2, 2)] {
+            all.push(CacheConfig {
+                sectors,
+                victim_lines,
+                ..config(lines * u64::from(sectors), ways, replacement)
+            });
+        }
+    }
+    all
+}
+
+/// Misses of a fully associative LRU cache, by brute force.
+fn stack_misses(trace: &[u32], lines: usize) -> usize {
+    let mut twin = Twin::new(1, lines, true);
+    trace.iter().filter(|&&line| !twin.access(line)).count()
 }
 
 fn misses(cache: &mut dyn Cache, trace: &[u32]) -> usize {
@@ -138,8 +165,8 @@ proptest! {
 
     #[test]
     fn of_several_look_ups_of_a_line_only_the_last_matters(trace in trace(), wanted in prop::collection::vec(0_u32..40, 1..20)) {
-        for policy in Replacement::all() {
-            let (mut all, mut last) = (cache(32, 4, policy), cache(32, 4, policy));
+        for kind in kinds(32, 4) {
+            let (mut all, mut last) = (built(&kind), built(&kind));
             for &line in &trace {
                 prop_assert_eq!(all.access(line), last.access(line));
             }
@@ -158,6 +185,115 @@ proptest! {
             }
             for &line in trace.iter().rev() {
                 prop_assert_eq!(all.access(line), last.access(line));
+            }
+        }
+    }
+
+    /// What `fill` returns is what leaves, and what `remove` takes out is out; the next fill of that set evicts nothing.
+    #[test]
+    fn a_cache_holds_what_was_filled_less_what_was_evicted_and_removed(
+        trace in trace(),
+        removed in prop::collection::vec(0_u32..40, 1..20),
+    ) {
+        for kind in kinds(32, 4).into_iter().filter(|kind| kind.sectors == 1) {
+            let mut cache = built(&kind);
+            let mut held: HashSet<u32> = HashSet::new();
+            for (step, &line) in trace.iter().enumerate() {
+                prop_assert_eq!(cache.lookup(line), held.contains(&line));
+                if held.insert(line) {
+                    let evicted = cache.fill(line);
+                    prop_assert_eq!(evicted != EMPTY, held.remove(&evicted));
+                }
+                if step % 7 == 0 {
+                    let line = removed[step % removed.len()];
+                    prop_assert_eq!(cache.remove(line), held.remove(&line));
+                    prop_assert!(!cache.contains(line));
+                    if kind.victim_lines == 0 && !held.contains(&line) {
+                        let before = held.iter().filter(|&&other| other % 8 == line % 8).count();
+                        let evicted = cache.fill(line);
+                        prop_assert_eq!(evicted == EMPTY, before < 4);
+                        held.remove(&evicted);
+                        held.insert(line);
+                    }
+                }
+                for &line in &held {
+                    prop_assert!(cache.contains(line));
+                }
+            }
+        }
+    }
+
+    /// Sets as lists of groups, each with the sectors that are there.
+    #[test]
+    fn a_sectored_cache_equals_lists_of_groups(trace in trace()) {
+        for sectors in [2_u32, 4, 16] {
+            let mut cache = built(&CacheConfig {
+                sectors,
+                ..config(u64::from(4 * 2 * sectors), 2, Replacement::LRU)
+            });
+            let mut sets: Vec<Vec<(u32, HashSet<u32>)>> = vec![Vec::new(); 4];
+            for &line in &trace {
+                let group = line / sectors;
+                let set = &mut sets[group as usize % 4];
+                let at = set.iter().position(|other| other.0 == group);
+                let hit = at.is_some_and(|at| set[at].1.contains(&line));
+                let mut entry = at.map_or_else(|| (group, HashSet::new()), |at| set.remove(at));
+                entry.1.insert(line);
+                set.push(entry);
+                if set.len() > 2 {
+                    set.remove(0);
+                }
+                prop_assert_eq!(cache.access(line), hit);
+            }
+        }
+    }
+
+    /// An exclusive level of a fully associative L2 adds its lines; an inclusive one never holds less than the L2.
+    #[test]
+    fn inclusion_holds_after_every_request(trace in trace(), l2_inclusive in any::<bool>()) {
+        for inclusion in [Inclusion::Inclusive, Inclusion::Exclusive] {
+            let level = LevelConfig { ways: 16, inclusion, ..LevelConfig::lru(16 * 16) };
+            let of_l2 = if l2_inclusive { Inclusion::Inclusive } else { Inclusion::None };
+            let config = RunConfig {
+                l1: config(8, 4, Replacement::LRU),
+                l2: CacheConfig { inclusion: of_l2, ..config(8, 8, Replacement::LRU) },
+                level: LowerLevels::of(&[level]).unwrap(),
+                ..RunConfig::default()
+            };
+            config.validate().unwrap();
+            let Err(mut levels) = Levels::build(&config).unwrap().all_four_way() else {
+                panic!("the L2's evictions are followed");
+            };
+            let mut l2 = SharedLevel::new(levels.l2, MissPath::build(&config).unwrap());
+            let mut missed = Vec::new();
+            for (step, &line) in trace.iter().enumerate() {
+                if levels.l1[step % 2].access(line) {
+                    continue;
+                }
+                missed.push(line);
+                l2.access(line);
+                l2.invalidate_l1(|line| levels.l1.iter_mut().map(|l1| u64::from(l1.remove(line))).sum());
+                if inclusion == Inclusion::Exclusive && !l2_inclusive {
+                    continue;
+                }
+                for line in 0..400 {
+                    let in_l1 = levels.l1.iter().any(|l1| l1.contains(line));
+                    prop_assert!(!in_l1 || !l2_inclusive || l2.cache.contains(line));
+                }
+            }
+            let result = l2.result();
+            let l3 = &result.below.levels[0];
+            if inclusion == Inclusion::Exclusive {
+                prop_assert_eq!(l3.line_misses as usize, stack_misses(&missed, 8 + 16));
+            } else {
+                // Whatever the L2 holds, the L3 answers without a miss.
+                let below = l3.line_misses;
+                let held: Vec<u32> = (0..400).filter(|&line| l2.cache.contains(line)).collect();
+                for line in held {
+                    l2.cache.remove(line);
+                    l2.access(line);
+                }
+                prop_assert_eq!(l2.result().below.levels[0].line_misses, below);
             }
         }
     }
@@ -237,8 +373,8 @@ proptest! {
 
     #[test]
     fn repeating_a_safe_sequence_changes_nothing(trace in trace(), first in 0_u32..40) {
-        for policy in Replacement::all() {
-            let (mut once, mut twice) = (cache(16, 4, policy), cache(16, 4, policy));
+        for kind in kinds(16, 4) {
+            let (mut once, mut twice) = (built(&kind), built(&kind));
             for &line in &trace {
                 let safe: Vec<u32> =
                     (0..once.repeat_safe_lines()).map(|i| line + i * (first % 5)).collect();
@@ -248,6 +384,27 @@ proptest! {
                 prop_assert!(safe.iter().all(|&l| twice.access(l)));
             }
         }
+    }
+}
+
+/// Lines that all map to one set, in turn: a victim cache that holds those for which the set has no way avoids all misses but
+/// the first ones, and one that is a line smaller, like none at all, avoids none.
+#[test]
+fn a_victim_cache_holds_the_conflicts_of_a_set() {
+    for (ways, victim_lines) in [(1, 1), (4, 3), (8, 16)] {
+        let trace: Vec<u32> = (0..10)
+            .flat_map(|_| (0..ways + victim_lines).map(|line| 64 * line))
+            .collect();
+        let of = |victim_lines| {
+            let kind = CacheConfig {
+                victim_lines,
+                ..config(u64::from(16 * ways), ways, Replacement::LRU)
+            };
+            misses(&mut *built(&kind), &trace)
+        };
+        assert_eq!(of(victim_lines), (ways + victim_lines) as usize);
+        assert_eq!(of(victim_lines - 1), trace.len());
+        assert_eq!(of(0), trace.len());
     }
 }
 

@@ -63,7 +63,7 @@ impl Cache for TreePlru {
         self.tags[first..first + self.ways].contains(&line)
     }
 
-    fn fill(&mut self, line: u32) {
+    fn fill(&mut self, line: u32) -> u32 {
         let set = (line & self.set_mask) as usize;
         let first = set * self.ways;
         let empty = self.tags[first..first + self.ways]
@@ -76,8 +76,19 @@ impl Cache for TreePlru {
             }
             node - self.ways
         });
-        self.tags[first + way] = line;
+        let evicted = std::mem::replace(&mut self.tags[first + way], line);
         self.touch(set, way);
+        evicted
+    }
+
+    fn remove(&mut self, line: u32) -> bool {
+        let first = (line & self.set_mask) as usize * self.ways;
+        let tags = &mut self.tags[first..first + self.ways];
+        let way = tags.iter().position(|&tag| tag == line);
+        if let Some(way) = way {
+            tags[way] = EMPTY;
+        }
+        way.is_some()
     }
 
     fn clear(&mut self) {

@@ -1,6 +1,7 @@
 //! `replay accuracy`: run time against error, measured.
 
 use super::ConfigArgs;
+use super::addresses::two_levels_only;
 use super::subjects::Traces;
 use crate::accuracy::{Inputs, Rays, Replays, STUDIES, TraversalRow};
 use crate::config::{Mode, RunConfig};
@@ -76,6 +77,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         config.mode == Mode::Timed && config.order == RunConfig::default().order,
         "--mode and --order are varied here"
     );
+    two_levels_only(&config, "accuracy")?;
     std::fs::create_dir_all(&args.output).with_context(|| args.output.display().to_string())?;
     let paths: Vec<PathBuf> = FILES.iter().map(|file| args.output.join(file)).collect();
     let outputs: Vec<Output> = paths

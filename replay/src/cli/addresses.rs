@@ -120,11 +120,15 @@ fn only_with_addresses(flags: &[(&str, bool)]) -> Result<()> {
 /// Refuses a configuration with more than an L1 and an L2, which `place` cannot simulate.
 ///
 /// # Errors
-/// The configuration has `[prefetch]`, `[[level]]`, `[dram]` or `[frame]`.
+/// The configuration has `[prefetch]`, `[[level]]`, `[dram]`, `[frame]`, sectors, a victim cache or an inclusion.
 pub fn two_levels_only(config: &RunConfig, place: &str) -> Result<()> {
     ensure!(
         !config.follows_l2_misses() && config.frame.is_none(),
-        "{place}: expected an L1 and an L2 only, found [prefetch], [[level]], [dram] or [frame]"
+        "{place}: expected an L1 and an L2 only, found [prefetch], [[level]], [dram], [frame] or l2.inclusion"
+    );
+    ensure!(
+        [config.l1, config.l2].map(|cache| (cache.sectors, cache.victim_lines)) == [(1, 0); 2],
+        "{place}: expected caches of whole lines without victim caches, found sectors or victim_lines"
     );
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Cache levels below the L2: the `[[level]]` tables of a configuration.
 
-use super::{CacheConfig, ConfigError};
+use super::{CacheConfig, ConfigError, Inclusion, is_one, is_zero, one};
 use crate::cache::Replacement;
 use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -18,6 +18,15 @@ pub struct LevelConfig {
     /// Replacement policy.
     #[serde(default)]
     pub replacement: Replacement,
+    /// Lines that share a tag (a sectored cache); a miss fetches one of them.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub sectors: u32,
+    /// Lines of a fully associative victim cache beside it.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub victim_lines: u32,
+    /// Whether it holds what the level above holds.
+    #[serde(default, skip_serializing_if = "Inclusion::is_none")]
+    pub inclusion: Inclusion,
     /// Line size in bytes; none: that of the level above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub line_bytes: Option<u32>,
@@ -42,6 +51,9 @@ impl LevelConfig {
             size_bytes,
             ways: Self::default_ways(),
             replacement: Replacement::LRU,
+            sectors: 1,
+            victim_lines: 0,
+            inclusion: Inclusion::None,
             line_bytes: None,
             hit_cycles: Self::default_hit_cycles(),
         }
@@ -54,6 +66,9 @@ impl LevelConfig {
             size_bytes: self.size_bytes,
             ways: self.ways,
             replacement: self.replacement,
+            sectors: self.sectors,
+            victim_lines: self.victim_lines,
+            inclusion: self.inclusion,
         }
     }
 }
@@ -114,8 +129,9 @@ impl LowerLevels {
     ///
     /// # Errors
     /// The first one out of range.
-    pub fn check(&self, l2_line_bytes: u32) -> Result<(), ConfigError> {
+    pub fn check(&self, l2_line_bytes: u32, l2: &CacheConfig) -> Result<(), ConfigError> {
         let mut above = l2_line_bytes;
+        let mut above_sectors = l2.sectors;
         for (name, level, line_bytes) in self.named(l2_line_bytes) {
             let range = |ok: bool, key, expected, found: u32| match ok {
                 true => Ok(()),
@@ -138,7 +154,15 @@ impl LowerLevels {
                 level.hit_cycles,
             )?;
             level.cache().sets(name, line_bytes)?;
-            above = line_bytes;
+            if level.inclusion == Inclusion::Exclusive && (line_bytes != above || above_sectors > 1)
+            {
+                return Err(ConfigError::Range {
+                    key: "level.inclusion",
+                    expected: "none or inclusive, unless the level above has lines of the same size and one per tag",
+                    found: format!("exclusive ({name})"),
+                });
+            }
+            (above, above_sectors) = (line_bytes, level.sectors);
         }
         Ok(())
     }
@@ -147,13 +171,25 @@ impl LowerLevels {
     #[must_use]
     pub fn text(&self, l2_line_bytes: u32) -> Option<String> {
         let level = |(_, level, line_bytes): (_, &LevelConfig, u32)| {
-            format!(
+            let mut text = format!(
                 "{}, {} ways, {}, {line_bytes}-byte lines, {} cycles",
                 format_bytes(level.size_bytes),
                 level.ways,
                 level.replacement.name(),
                 level.hit_cycles
-            )
+            );
+            if level.sectors > 1 {
+                text += &format!(", {} sectors", level.sectors);
+            }
+            if level.victim_lines > 0 {
+                text += &format!(", {} victim lines", level.victim_lines);
+            }
+            match level.inclusion {
+                Inclusion::None => {}
+                Inclusion::Inclusive => text += ", inclusive",
+                Inclusion::Exclusive => text += ", exclusive",
+            }
+            text
         };
         let all: Vec<String> = self.named(l2_line_bytes).map(level).collect();
         (!all.is_empty()).then(|| all.join("; "))

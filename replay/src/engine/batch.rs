@@ -340,8 +340,11 @@ impl Pass<'_> {
     }
 
     /// The fewest sets of an L1, if all are LRU caches in which a footprint's lines cannot crowd each other
-    /// out: its repeats find all of them then.
+    /// out, and in which no other level invalidates them: its repeats find all of them then.
     pub(super) fn least_sets(&self) -> Option<u32> {
+        if self.config().levels_depend_on_evictions() {
+            return None;
+        }
         let l1 = self.geometries()?.into_iter().map(|(l1, _)| l1);
         let sets = l1.map(|(sets, ways)| (ways >= 4).then_some(sets));
         sets.min().flatten()
@@ -385,7 +388,7 @@ impl Pass<'_> {
 }
 
 /// A shared pass does not see the misses of one L2 in their order.
-const fn shares_passes(config: &RunConfig) -> bool {
+fn shares_passes(config: &RunConfig) -> bool {
     matches!(config.mode, Mode::Functional) && !config.follows_l2_misses()
 }
 

@@ -12,6 +12,8 @@ use crate::stream::{Consumer, Cores, QuadLines, StreamError, interleave};
 pub struct Functional<C> {
     l1: Vec<C>,
     l2: SharedLevel<C>,
+    /// A footprint of more lines may evict some of its own, so that its repeats are simulated.
+    most_safe_lines: u32,
     /// What missed.
     pub counts: CacheCounts,
 }
@@ -19,7 +21,13 @@ pub struct Functional<C> {
 impl<C: Cache> Functional<C> {
     /// Empty caches.
     pub fn new(levels: Levels<C>, counts: CacheCounts, path: MissPath) -> Self {
+        let own = levels.l1.iter().map(Cache::repeat_safe_lines).min();
+        let most_safe_lines = match path.invalidates() {
+            true => 1,
+            false => own.unwrap_or(1),
+        };
         Self {
+            most_safe_lines,
             l1: levels.l1,
             l2: SharedLevel::new(levels.l2, path),
             counts,
@@ -36,13 +44,15 @@ impl<C: Cache> Functional<C> {
         for &line in lines {
             misses.l2_lines += u32::from(!self.l2.access(line));
         }
+        let l1 = &mut self.l1;
+        (self.l2).invalidate_l1(|line| l1.iter_mut().map(|l1| u64::from(l1.remove(line))).sum());
         self.counts.footprint(cell, tile, &misses);
     }
 }
 
 impl<C: Cache> Consumer for Functional<C> {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
-        let safe_lines = self.l1[core].repeat_safe_lines() as usize;
+        let safe_lines = self.most_safe_lines as usize;
         for footprint in quad.footprints() {
             // Repeats that would find everything there need no simulation.
             let repeats_are_idle = footprint.lines.len() <= safe_lines;

@@ -58,6 +58,8 @@ pub fn summary(
         cycles: None,
         first_lookups: None,
         prefetch: None,
+        l2_mshrs: None,
+        invalidated_lines: None,
         timeline: None,
         lower_levels: Vec::new(),
         dram: None,

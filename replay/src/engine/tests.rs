@@ -373,6 +373,7 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     RunResult {
         tmu,
         cycles,
+        l2_mshrs: outcome.path.mshrs,
         ..summary(
             &trace.tables,
             expander.bins(),

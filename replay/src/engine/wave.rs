@@ -109,12 +109,19 @@ impl Wave<'_> {
             let config = &self.job.configs[index];
             let outcome = machine.outcome(config);
             let (tmu, cycles) = (outcome.tmu, outcome.cycles);
-            let MissPathResult { below, prefetch } = outcome.path;
+            let MissPathResult {
+                below,
+                prefetch,
+                mshrs,
+                invalidated_lines,
+            } = outcome.path;
             let mut result = RunResult {
                 tmu,
                 cycles,
                 dram: below.dram,
                 prefetch,
+                l2_mshrs: mshrs,
+                invalidated_lines,
                 timeline: outcome.timeline,
                 lower_levels: below.levels,
                 first_lookups: machine.first_lookups(),

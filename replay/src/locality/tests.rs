@@ -63,13 +63,13 @@ fn geometries() -> impl Strategy<Value = CacheConfig> {
     let policy = proptest::sample::select(Replacement::all().collect::<Vec<_>>());
     (0..5_u32, ways, policy)
         .prop_map(|(sets, ways, replacement)| CacheConfig {
-            size_bytes: (u64::from(ways) << sets) * 16,
             ways: if replacement == Replacement::TREE_PLRU && ways == 3 {
                 1
             } else {
                 ways
             },
             replacement,
+            ..CacheConfig::lru((u64::from(ways) << sets) * 16)
         })
         .prop_filter("sets are powers of two", |cache| {
             cache.sets("L1", 16).is_ok()
@@ -191,9 +191,9 @@ fn misses_are_those_of_a_replay() {
     ];
     for (cores, replacement, ways, assign) in machines {
         let cache = |size_bytes| CacheConfig {
-            size_bytes,
             ways,
             replacement,
+            ..CacheConfig::lru(size_bytes)
         };
         let config = RunConfig {
             mode: crate::config::Mode::Functional,

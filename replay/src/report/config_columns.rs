@@ -48,13 +48,16 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
     ) -> Figure<'a> {
         Figure::text(key, key, move |r: &ResultRow| value(&r.point.config))
     }
-    fn cache<'a>(keys: [&'static str; 3], level: fn(&RunConfig) -> &CacheConfig) -> [Figure<'a>; 3] {
-        let [size_bytes, ways, replacement] = keys;
+    fn cache<'a>(keys: [&'static str; 6], level: fn(&RunConfig) -> &CacheConfig) -> [Figure<'a>; 6] {
+        let [size_bytes, ways, replacement, sectors, victim_lines, inclusion] = keys;
         let of = move |r: &ResultRow| *level(&r.point.config);
         [
             Figure::text(size_bytes, size_bytes, move |r: &ResultRow| of(r).size_bytes),
             Figure::text(ways, ways, move |r: &ResultRow| u64::from(of(r).ways)),
             Figure::text(replacement, replacement, move |r: &ResultRow| of(r).replacement.name()),
+            Figure::text(sectors, sectors, move |r: &ResultRow| u64::from(of(r).sectors)),
+            Figure::text(victim_lines, victim_lines, move |r: &ResultRow| u64::from(of(r).victim_lines)),
+            Figure::text(inclusion, inclusion, move |r: &ResultRow| name(&of(r).inclusion)),
         ]
     }
     let mut columns = vec![
@@ -68,8 +71,8 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("assign", |c| name(&c.assign)),
         key("line_bytes", |c| u64::from(c.line_bytes)),
     ];
-    columns.extend(cache(["l1.size_bytes", "l1.ways", "l1.replacement"], |c| &c.l1));
-    columns.extend(cache(["l2.size_bytes", "l2.ways", "l2.replacement"], |c| &c.l2));
+    columns.extend(cache(["l1.size_bytes", "l1.ways", "l1.replacement", "l1.sectors", "l1.victim_lines", "l1.inclusion"], |c| &c.l1));
+    columns.extend(cache(["l2.size_bytes", "l2.ways", "l2.replacement", "l2.sectors", "l2.victim_lines", "l2.inclusion"], |c| &c.l2));
     columns.extend([
         key("sampling.filter", |c| name(&c.sampling.filter)),
         key("sampling.lod_bias", |c| f64::from(c.sampling.lod_bias)),
@@ -89,6 +92,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("tmu.retry_footprints", |c| u64::from(c.tmu.retry_footprints)),
         key("tmu.fetches_per_trip", |c| u64::from(c.tmu.fetches_per_trip)),
         key("tmu.allocation", |c| name(&c.tmu.allocation)),
+        key("tmu.l2_mshrs", |c| u64::from(c.tmu.l2_mshrs)),
         key("tile_maps", |c| c.tile_maps),
         key("hsr", |c| name(&c.hsr)),
         key("between_frames", |c| name(&c.between_frames)),

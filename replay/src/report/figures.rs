@@ -61,6 +61,14 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("prefetched lines that were requested while they were there or in flight"),
         Figure::real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.misses)?) })
             .about("useful prefetches over these and the line misses of the L2"),
+        Figure::real("l2_mshrs_peak", "MSHRs", "", 0, |r| Some(r.result.l2_mshrs?.peak))
+            .about("MSHRs of the L2 in use at most, where their number is limited"),
+        Figure::real("l2_stalled_misses_pct", "stalled", "% of L2 misses", 2, |r| { let stalled = r.result.l2_mshrs?.stalled_misses; Some(100.0 * over(stalled, r.result.l2.misses)?) })
+            .about("misses of the L2 that found all MSHRs in use"),
+        Figure::real("l2_stall_cycles", "stalls", "cycles", 0, |r| Some(r.result.l2_mshrs?.stall_cycles))
+            .about("cycles that misses of the L2 waited for an MSHR, together"),
+        Figure::real("invalidated_lines", "invalidated", "lines", 0, |r| r.result.invalidated_lines)
+            .about("lines that inclusive levels invalidated in L1 caches and in the L2"),
         Figure::real("last_level_miss_pct", "last level", "%", 2, |r| Some(100.0 * r.result.lower_levels.last()?.miss_rate))
             .about("line look-ups of the last level below the L2 that miss"),
         Figure::real("dram_row_hit_pct", "row hits", "%", 2, |r| Some(100.0 * r.result.dram.as_ref()?.row_hit_rate))

@@ -94,6 +94,15 @@ pub fn text(row: &ResultRow) -> String {
             prefetch.lines, prefetch.useful_lines, prefetch.late_lines, prefetch.evicted_lines
         );
     }
+    if let Some(mshrs) = &result.l2_mshrs {
+        text += &format!(
+            "MSHRs of the L2: {} in use at most, {} misses waited {} cycles together\n",
+            mshrs.peak, mshrs.stalled_misses, mshrs.stall_cycles
+        );
+    }
+    if let Some(lines) = result.invalidated_lines {
+        text += &format!("invalidated by inclusive levels: {lines} lines\n");
+    }
     for level in &result.lower_levels {
         text += &format!(
             "{}, {}-byte lines: {} look-ups, {} misses ({:.2} %), {} merged\n",

@@ -229,6 +229,7 @@ mod tests {
         retry_footprints: 4,
         fetches_per_trip: 2,
         allocation: Allocation::OnFill,
+        l2_mshrs: 0,
     };
 
     /// Runs threads of (hits, latencies of the misses) one after another.

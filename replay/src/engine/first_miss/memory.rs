@@ -145,6 +145,13 @@ impl<D: DelayedFill> Memory<D> {
             self.l1[core].enter(line, now, arrival);
             latest = latest.max(arrival);
         }
+        let caches = &mut self.l1;
+        (self.l2).invalidate_l1(|line| {
+            caches
+                .iter_mut()
+                .map(|l1| u64::from(l1.remove(line, now)))
+                .sum()
+        });
         l1.lines += u64::from(fetched);
         l2.lines += u64::from(from_memory);
         // A footprint counts once, however often it asks.

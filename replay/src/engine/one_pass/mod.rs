@@ -16,7 +16,7 @@ use super::Machine;
 use super::batch::Outcome;
 use super::counts::{CacheCounts, CellMisses, TileMisses};
 use crate::cache::Forest;
-use crate::config::{Assign, CacheConfig, Replacement, RunConfig};
+use crate::config::{Assign, CacheConfig, RunConfig};
 use crate::order::Phase;
 use crate::stream::{Bins, Consumer, Cores, QuadLines, StreamError, interleave};
 
@@ -26,10 +26,10 @@ pub type Geometry = (u32, u32);
 /// Both levels of a configuration.
 pub type LevelGeometry = (Geometry, Geometry);
 
-/// The geometry of a configuration, if all its caches are LRU.
+/// The geometry of a configuration, if all its caches are plain LRU.
 pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
     let of = |cache: &CacheConfig, level| {
-        let lru = cache.replacement == Replacement::LRU;
+        let lru = cache.is_plain_lru();
         let sets = cache.sets(level, config.line_bytes).ok()?;
         lru.then_some((sets, cache.ways))
     };

@@ -1,7 +1,7 @@
 //! Levels below the L2, through the engine.
 
 use super::*;
-use crate::config::{LevelConfig, LowerLevels, PrefetchConfig, Prefetching};
+use crate::config::{Inclusion, LevelConfig, LowerLevels, PrefetchConfig, Prefetching};
 use crate::memory::dram::DramConfig;
 use crate::result::RunResult;
 
@@ -131,5 +131,131 @@ fn a_batch_gives_what_each_replay_gives_alone() {
         let line_bytes = found.lower_levels.last().map_or(16, |last| last.line_bytes);
         let requested = dram.requests * u64::from(line_bytes);
         assert_eq!(requested, found.external_bytes, "{config:?}");
+    }
+}
+
+#[test]
+fn inclusion_matters_where_a_level_evicts_what_others_hold() {
+    let trace = small();
+    for mode in MODES {
+        let of = |size_bytes, inclusion| {
+            let level = LevelConfig {
+                inclusion,
+                ..LevelConfig::lru(size_bytes)
+            };
+            let config = RunConfig {
+                l2: CacheConfig::lru(4 << 10),
+                ..with(&[level], mode)
+            };
+            replay(&trace, &config).unwrap()
+        };
+        // Nothing is evicted from a large level.
+        let [independent, mut inclusive] =
+            [Inclusion::None, Inclusion::Inclusive].map(|inclusion| of(4 << 20, inclusion));
+        assert_eq!(inclusive.invalidated_lines.take(), Some(0), "{mode:?}");
+        assert_eq!(inclusive, independent, "{mode:?}");
+        // A level as large as the L2 takes lines from it; an exclusive one adds its own size.
+        let [independent, inclusive, exclusive] =
+            [Inclusion::None, Inclusion::Inclusive, Inclusion::Exclusive]
+                .map(|inclusion| of(4 << 10, inclusion));
+        assert!(inclusive.invalidated_lines > Some(0), "{mode:?}");
+        assert!(
+            exclusive.external_bytes < independent.external_bytes,
+            "{mode:?}"
+        );
+        assert_eq!(exclusive.access_hash, inclusive.access_hash);
+    }
+}
+
+#[test]
+fn more_mshrs_than_are_used_change_nothing_and_few_of_them_cost_cycles() {
+    let trace = small();
+    for mode in [Mode::Timed, Mode::FirstMiss] {
+        let of = |l2_mshrs| {
+            let mut config = with(&[], mode);
+            config.tmu.l2_mshrs = l2_mshrs;
+            replay(&trace, &config).unwrap()
+        };
+        let unlimited = of(0);
+        let mut many = of(65_536);
+        let counted = many.l2_mshrs.take().unwrap();
+        assert!(counted.peak > 4 && counted.stalled_misses == 0, "{mode:?}");
+        assert_eq!(many, unlimited, "{mode:?}");
+        let few = of(2);
+        let counted = few.l2_mshrs.unwrap();
+        assert_eq!(counted.peak, 2);
+        assert!(
+            counted.stall_cycles > 0 && few.cycles > unlimited.cycles,
+            "{mode:?}"
+        );
+        // Just enough of them.
+        let mut enough = of(many_enough(&of(65_536)));
+        assert_eq!(enough.l2_mshrs.take().unwrap().stalled_misses, 0);
+        assert_eq!(enough, unlimited, "{mode:?}");
+    }
+}
+
+fn many_enough(result: &RunResult) -> u32 {
+    result.l2_mshrs.unwrap().peak as u32
+}
+
+#[test]
+fn sectors_and_victim_caches_are_replayed_in_every_mode() {
+    let trace = small();
+    for mode in MODES {
+        let of = |sectors, victim_lines| {
+            let plain = with(&[], mode);
+            let cache = |cache: CacheConfig| CacheConfig {
+                sectors,
+                victim_lines,
+                ..cache
+            };
+            let config = RunConfig {
+                l1: cache(plain.l1),
+                l2: cache(CacheConfig::lru(4 << 10)),
+                ..plain
+            };
+            replay(&trace, &config).unwrap()
+        };
+        let plain = of(1, 0);
+        let (sectored, victims) = (of(4, 0), of(1, 16));
+        for other in [&sectored, &victims] {
+            assert_eq!(other.access_hash, plain.access_hash, "{mode:?}");
+            assert_eq!(other.unique_lines, plain.unique_lines, "{mode:?}");
+        }
+        assert!(victims.l1.misses < plain.l1.misses, "{mode:?}");
+        assert_ne!(sectored.l2.misses, plain.l2.misses, "{mode:?}");
+    }
+}
+
+/// Repeats that find their lines in the L1 are left out of a stream only where no other level can invalidate them: one
+/// configuration at a time gives what a machine gives that sees every access.
+#[test]
+fn back_invalidation_is_exact_in_functional_mode() {
+    let trace = small();
+    for (l2_inclusion, l3_inclusion) in [
+        (Inclusion::Inclusive, Inclusion::None),
+        (Inclusion::None, Inclusion::Inclusive),
+        (Inclusion::Inclusive, Inclusion::Exclusive),
+    ] {
+        let level = LevelConfig {
+            inclusion: l3_inclusion,
+            ..LevelConfig::lru(2 << 10)
+        };
+        let config = RunConfig {
+            l1: CacheConfig::lru(1 << 10),
+            l2: CacheConfig {
+                inclusion: l2_inclusion,
+                ..CacheConfig::lru(2 << 10)
+            },
+            ..with(&[level], Mode::Functional)
+        };
+        let result = replay(&trace, &config).unwrap();
+        let mut plain = single(&trace, &config);
+        assert!(result.invalidated_lines > Some(0));
+        plain.external_bytes = result.external_bytes;
+        plain.invalidated_lines = result.invalidated_lines;
+        plain.lower_levels.clone_from(&result.lower_levels);
+        assert_eq!(result, plain);
     }
 }

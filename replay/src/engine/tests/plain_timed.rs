@@ -3,11 +3,11 @@
 //! cycle by cycle.
 
 use super::*;
-use crate::cache::Cache;
+use crate::cache::{Cache, MissPathResult};
 use crate::config::{Allocation, Replacement, TmuConfig};
 use crate::engine::counts::FootprintMisses;
 use crate::engine::timed::Timed;
-use crate::result::TmuResult;
+use crate::result::{MshrResult, TmuResult};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
@@ -111,6 +111,9 @@ struct PlainTimed {
     counts: CacheCounts,
     units: Vec<PlainUnit>,
     cycles: u64,
+    /// When each MSHR of the L2 is free.
+    mshrs: Vec<u64>,
+    mshr_counts: MshrResult,
 }
 
 impl PlainTimed {
@@ -126,6 +129,8 @@ impl PlainTimed {
             counts: CacheCounts::new(bins, config.tile_maps),
             units: (0..config.cores).map(|_| PlainUnit::default()).collect(),
             cycles: 0,
+            mshrs: vec![0; config.tmu.l2_mshrs as usize],
+            mshr_counts: MshrResult::default(),
         }
     }
 
@@ -186,7 +191,21 @@ impl PlainTimed {
             arrival
         } else {
             misses.l2_lines += 1;
-            let arrival = now + u64::from(tmu.l2_penalty_cycles);
+            let mut start = now;
+            if let Some(first) = (0..self.mshrs.len()).min_by_key(|&slot| self.mshrs[slot]) {
+                start = now.max(self.mshrs[first]);
+                self.mshr_counts.stalled_misses += u64::from(start > now);
+                self.mshr_counts.stall_cycles += start - now;
+                self.mshrs[first] = start + u64::from(tmu.l2_penalty_cycles);
+                let in_use = self.mshrs.iter().filter(|&&free| free > start).count();
+                // A miss that takes no time uses one as well; one that waited takes the place of another.
+                let in_use = match start > now {
+                    true => self.mshrs.len(),
+                    false => in_use + usize::from(tmu.l2_penalty_cycles == 0),
+                };
+                self.mshr_counts.peak = self.mshr_counts.peak.max(in_use as u64);
+            }
+            let arrival = start + u64::from(tmu.l2_penalty_cycles);
             self.l2.enter(line, now, arrival);
             arrival
         };
@@ -267,6 +286,7 @@ impl Machine for PlainTimed {
     }
 
     fn flush(&mut self) {
+        self.mshrs.fill(0);
         for level in self.l1.iter_mut().chain([&mut self.l2]) {
             level.cache.clear();
             level.in_flight = PlainInFlight::default();
@@ -290,7 +310,10 @@ impl Machine for PlainTimed {
                 loops: sum(|unit| unit.loops),
             }),
             cycles: Some(self.cycles),
-            path: crate::cache::MissPathResult::default(),
+            path: MissPathResult {
+                mshrs: (self.tmu.l2_mshrs > 0).then_some(self.mshr_counts),
+                ..MissPathResult::default()
+            },
             timeline: None,
         }
     }
@@ -322,6 +345,11 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
             l1.replacement = random.of(&policies);
             l2.replacement = random.of(&policies);
         }
+        for cache in [&mut l1, &mut l2] {
+            cache.victim_lines = random.of(&[0, 0, 0, 2]);
+            cache.sectors = random.of(&[1, 1, 1, 4]);
+            cache.size_bytes *= u64::from(cache.sectors);
+        }
         let config = RunConfig {
             mode: Mode::Timed,
             order: random.of(&orders),
@@ -341,6 +369,7 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
                     Allocation::OnFill,
                     Allocation::OnMiss,
                 ]),
+                l2_mshrs: random.of(&[0, 0, 1, 3, 16]),
             },
             tile_maps: true,
             ..RunConfig::default()

@@ -181,6 +181,11 @@ impl<D: DelayedFill> Memory<D> {
             }
             first.waiting.sort_by_segment();
         }
-        &mut first.waiting
+        let caches = &mut self.l1;
+        self.l2.invalidate_l1(|line| {
+            let removed = caches.iter_mut().map(|first| first.cache.remove(line, now));
+            removed.map(u64::from).sum()
+        });
+        &mut self.l1[core].waiting
     }
 }

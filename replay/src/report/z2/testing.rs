@@ -117,6 +117,8 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
         }),
         cycles: Some(30_000_000),
         prefetch: None,
+        l2_mshrs: None,
+        invalidated_lines: None,
         timeline: None,
         lower_levels: Vec::new(),
         dram: None,
