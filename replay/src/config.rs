@@ -17,6 +17,7 @@ pub use formats::footprint::{
     AnisotropyModel, FilterOverride, LodFormula, SamplingOptions as SamplingConfig,
 };
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
+use formats::view::TILE_SIZE_PX;
 pub use inclusion::Inclusion;
 pub use lower_levels::{LevelConfig, LowerLevels};
 pub use prefetch::{PrefetchConfig, Prefetching};
@@ -113,6 +114,10 @@ pub struct CacheConfig {
     /// Whether it holds what the caches above hold (L2 only).
     #[serde(default, skip_serializing_if = "Inclusion::is_none")]
     pub inclusion: Inclusion,
+}
+
+fn is_recorded_tile(tile_px: &u32) -> bool {
+    *tile_px == TILE_SIZE_PX
 }
 
 const fn one() -> u32 {
@@ -297,6 +302,9 @@ pub struct RunConfig {
     pub layout: LayoutConfig,
     /// Texture unit.
     pub tmu: TmuConfig,
+    /// Width and height of a tile in pixels; other tiles than the recorded ones of 16 pixels are regrouped.
+    #[serde(skip_serializing_if = "is_recorded_tile")]
+    pub tile_px: u32,
     /// Also count by tile.
     pub tile_maps: bool,
     /// Also record which core works on which tiles when (timed mode, `--timeline`); no key of a file.
@@ -336,6 +344,7 @@ impl Default for RunConfig {
             sampling: SamplingConfig::default(),
             layout: LayoutConfig::default(),
             tmu: TmuConfig::default(),
+            tile_px: TILE_SIZE_PX,
             tile_maps: false,
             timeline: false,
             hsr: Hsr::EarlyZ,
@@ -442,6 +451,18 @@ impl RunConfig {
             "cores",
             "1 to 64",
             self.cores.to_string(),
+        )?;
+        range(
+            matches!(self.tile_px, 8 | 16 | 32 | 64),
+            "tile_px",
+            "8, 16, 32 or 64",
+            self.tile_px.to_string(),
+        )?;
+        range(
+            self.frame.is_none() || self.tile_px == TILE_SIZE_PX,
+            "tile_px",
+            "16 with [frame], whose primitive lists are recorded by tile",
+            self.tile_px.to_string(),
         )?;
         range(
             self.layout.base_align_bytes.is_power_of_two()

@@ -6,7 +6,7 @@ use crate::config::{BetweenFrames, ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::order::{self, Phase};
 use crate::stream::{
-    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, shaded,
+    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, rendered,
 };
 
 /// What is replayed.
@@ -80,8 +80,8 @@ pub fn counts(
     part: &Part<'_>,
 ) -> Result<Counts, ReplayError> {
     config.validate()?;
-    let shaded = shaded(trace, config.hsr)?;
-    let expander = Expander::new(&shaded, config)?;
+    let rendered = rendered(trace, config)?;
+    let expander = Expander::new(&rendered, config)?;
     let mut accesses = TraceCounts::new(expander.bins());
     let clusters = cluster_count(config)?;
     let Levels { l1, l2 } = Levels::build(config)?;
@@ -96,7 +96,7 @@ pub fn counts(
             by_frame: Vec::new(),
         },
     };
-    let passes = &trace.tables().passes;
+    let passes = &rendered.tables().passes;
     let order = order.build(config.seed);
     let mut index = 0;
     for &number in part.frames {

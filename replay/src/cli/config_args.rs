@@ -70,6 +70,9 @@ pub struct ConfigArgs {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
+    /// Width and height of a tile: 8, 16 (as recorded), 32 or 64
+    #[arg(long, value_name = "PIXELS")]
+    tile_px: Option<u32>,
     /// Hidden-surface removal
     #[arg(long)]
     hsr: Option<Hsr>,
@@ -213,6 +216,7 @@ impl ConfigArgs {
             ("--cores", self.cores.is_some()),
             ("--assign", self.assign.is_some()),
             ("--between-frames", self.between_frames.is_some()),
+            ("--tile-px", self.tile_px.is_some()),
             ("--hsr", self.hsr.is_some()),
             ("--l3", self.l3.is_some()),
             ("--prefetch", self.prefetch.is_some()),
@@ -268,6 +272,7 @@ impl ConfigArgs {
         set(&mut config.cores, self.cores);
         set(&mut config.assign, self.assign);
         set(&mut config.seed, self.seed);
+        set(&mut config.tile_px, self.tile_px);
         set(&mut config.hsr, self.hsr);
         set(&mut config.between_frames, self.between_frames);
         if let Some(size_bytes) = self.l3 {

@@ -4,7 +4,7 @@ use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
 use crate::order;
-use crate::stream::{for_quads, shaded};
+use crate::stream::{for_quads, rendered};
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
@@ -285,7 +285,7 @@ fn accesses(
         },
         line_bytes: config.line_bytes,
     };
-    let source = shaded(trace, config.hsr)?;
+    let source = rendered(trace, config)?;
     let order = config.order.build(config.seed);
     for item in order::plan(&*order, &tables.passes).iter().flatten() {
         for_quads(&source, item, |quad| -> Result<()> {

@@ -5,7 +5,6 @@ use crate::config::RunConfig;
 use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap};
 use crate::stream::{Bins, Cell, CellAccesses, TraceCounts};
 use formats::textrace::{Pass, Tables};
-use formats::view::TILE_SIZE_PX;
 
 /// Sums everything up; the configuration says what a line is and whether tiles are wanted. Texture
 /// unit and cycles are left out.
@@ -72,7 +71,7 @@ pub fn summary(
         ),
         by_level: sums(level_names.collect(), |c| c.level),
         tile_maps: if config.tile_maps {
-            tile_maps(tables, bins, trace, caches)
+            tile_maps(tables, bins, trace, caches, config.tile_px)
         } else {
             Vec::new()
         },
@@ -108,6 +107,7 @@ fn tile_maps(
     bins: &Bins,
     trace: &TraceCounts,
     caches: &CacheCounts,
+    tile_px: u32,
 ) -> Vec<TileMap> {
     let passes = tables.passes.iter().zip(bins.first_tiles()).enumerate();
     passes
@@ -119,7 +119,7 @@ fn tile_maps(
                 tiles: pass.tiles,
                 overdraw: (0..)
                     .zip(accesses)
-                    .map(|(tile, t)| t.lanes as f32 / pixels(pass, tile) as f32)
+                    .map(|(tile, t)| t.lanes as f32 / pixels(pass, tile, tile_px) as f32)
                     .collect(),
                 footprints: accesses.iter().map(|t| t.footprints).collect(),
                 l1_misses: misses.iter().map(|t| t.l1_footprints).collect(),
@@ -130,12 +130,12 @@ fn tile_maps(
 }
 
 /// Pixels of a tile inside the image, which cuts the last ones.
-fn pixels(pass: &Pass, tile: u32) -> u32 {
+fn pixels(pass: &Pass, tile: u32, tile_px: u32) -> u32 {
     let at = [tile % pass.tiles[0], tile / pass.tiles[0]];
     let side = |axis: usize| {
         pass.size_px[axis]
-            .saturating_sub(at[axis] * TILE_SIZE_PX)
-            .min(TILE_SIZE_PX)
+            .saturating_sub(at[axis] * tile_px)
+            .min(tile_px)
     };
     (side(0) * side(1)).max(1)
 }

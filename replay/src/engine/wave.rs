@@ -8,7 +8,7 @@ use crate::cache::MissPathResult;
 use crate::config::{BetweenFrames, Mode, Order, RunConfig};
 use crate::order::{self, Phase};
 use crate::result::RunResult;
-use crate::stream::{Cores, Expander, Frame, LineMemory, TraceCounts, shaded};
+use crate::stream::{Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, rendered};
 use crate::whole_frame::traffic;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -26,9 +26,9 @@ impl Wave<'_> {
     /// Runs the passes, of which there is one at least. While a frame is replayed, the next one is expanded, if
     /// there is memory for it.
     pub(super) fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
-        let trace_passes = &self.job.trace.tables().passes;
-        let shaded = shaded(self.job.trace, passes[0].config().hsr)?;
-        let expander = expander_for(Expander::new(&shaded, passes[0].config())?, &passes);
+        let rendered = rendered(self.job.trace, passes[0].config())?;
+        let trace_passes = &rendered.tables().passes;
+        let expander = expander_for(Expander::new(&rendered, passes[0].config())?, &passes);
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
         frames.sort_unstable();
@@ -73,7 +73,7 @@ impl Wave<'_> {
                 return all.try_for_each(|(pass, frame)| {
                     let machine = replay(pass, &frame)?;
                     drop(frame);
-                    self.finish(pass, &*machine, &expander, &counts)
+                    self.finish(pass, &*machine, &rendered, &expander, &counts)
                 });
             };
             let keep = || {
@@ -92,7 +92,13 @@ impl Wave<'_> {
         }
         // No frames at all.
         for pass in &passes {
-            self.finish(pass, &*pass.build(&expander)?, &expander, &counts)?;
+            self.finish(
+                pass,
+                &*pass.build(&expander)?,
+                &rendered,
+                &expander,
+                &counts,
+            )?;
         }
         Ok(())
     }
@@ -101,10 +107,11 @@ impl Wave<'_> {
         &self,
         pass: &Pass<'_>,
         machine: &dyn Machine,
+        rendered: &dyn TileSource,
         expander: &Expander<'_>,
         counts: &TraceCounts,
     ) -> Result<(), ReplayError> {
-        let tables = self.job.trace.tables();
+        let tables = rendered.tables();
         for &index in &pass.points {
             let config = &self.job.configs[index];
             let outcome = machine.outcome(config);

@@ -8,7 +8,7 @@ use crate::engine::ReplayError;
 use crate::order::{self, Phase};
 use crate::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, TraceCounts,
-    interleave, shaded,
+    interleave, rendered,
 };
 use formats::textrace::Pass;
 use formats::view::Eye;
@@ -110,10 +110,11 @@ pub fn analyse(
         _ => rayon::current_num_threads(),
     };
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-    let shaded = shaded(trace, config.hsr)?;
+    let rendered = rendered(trace, config)?;
+    let passes = &rendered.tables().passes;
     let mut figures = Vec::new();
     for orders in orders.chunks(together.max(1)) {
-        let expander = Expander::new(&shaded, config)?;
+        let expander = Expander::new(&rendered, config)?;
         let tiles = expander.bins().tiles();
         if tiles > Place::MOST_TILES as usize {
             return Err(StreamError::Tables(format!(

@@ -88,7 +88,7 @@ pub(super) fn lanes(records: &[QuadRecord]) -> u32 {
 }
 
 /// Refuses runs that a damaged or hand-made trace might hold.
-fn check(tile: &Tile, at: TileRef, draws: usize) -> Result<(), StreamError> {
+pub(super) fn check(tile: &Tile, at: TileRef, draws: usize) -> Result<(), StreamError> {
     let records = tile.records.len() as u64;
     let bad = tile.runs.iter().find(|run| {
         u64::from(run.first) + u64::from(run.count) > records || run.draw as usize >= draws

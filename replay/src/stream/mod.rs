@@ -18,6 +18,7 @@ mod interleave;
 mod last_used;
 mod line_set;
 mod lines;
+mod regroup;
 mod source;
 pub mod synthetic;
 #[cfg(test)]
@@ -33,4 +34,5 @@ pub use hsr::{Shaded, shaded};
 pub use interleave::{Consumer, furthest_behind, interleave};
 pub use line_set::LineSet;
 pub use lines::{Footprint, QuadLines, Tag, TileLines, interleaved};
+pub use regroup::{Rendered, rendered};
 pub use source::{MemoryTrace, TileSource};
