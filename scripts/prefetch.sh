@@ -7,6 +7,7 @@ capture_dk2
 for name in crytek-sponza atrium jungle; do
     for order in morton z2-sta; do
         "$bin/replay" run "$name.textrace" --order $order --json 2>/dev/null >"$name,$order,none,0.json"
+        "$bin/replay" run "$name.textrace" --order $order --prefetch tile-ahead --json 2>/dev/null >"$name,$order,tile-ahead,4096.json"
         for prefetcher in next-line aligned-block; do
             for lines in 1 2 4 8; do
                 # A block of one line prefetches nothing.
@@ -20,7 +21,7 @@ done
 python3 - "$results" <<'PYTHON'
 import csv, json, sys
 
-KINDS = [("none", 0), *(("next-line", lines) for lines in (1, 2, 4, 8)), *(("aligned-block", lines) for lines in (2, 4, 8))]
+KINDS = [("none", 0), *(("next-line", lines) for lines in (1, 2, 4, 8)), *(("aligned-block", lines) for lines in (2, 4, 8)), ("tile-ahead", 4096)]
 rows = []
 for scene in ("crytek-sponza", "atrium", "jungle"):
     for kind, lines in KINDS:

@@ -532,7 +532,8 @@ impl RunConfig {
         self.l2.sets("L2", self.line_bytes)?;
         self.l1.check_lines("L1", self.line_bytes, self.cores)?;
         self.level.check(self.line_bytes, &self.l2)?;
-        self.prefetch.as_ref().map_or(Ok(()), PrefetchConfig::check)
+        let prefetch = self.prefetch.as_ref();
+        prefetch.map_or(Ok(()), |prefetch| prefetch.check(self.mode))
     }
 
     /// True where the order of the L2's misses matters: they go to further levels or to DRAM, or prefetch others.

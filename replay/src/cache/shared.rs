@@ -188,6 +188,13 @@ impl<C> SharedLevel<C> {
         self.path.fetched_lines.as_deref().unwrap_or_default()
     }
 
+    /// Lines of the next work item that are prefetched when an item starts, at most.
+    #[must_use]
+    pub fn lines_of_next_item(&self) -> usize {
+        let prefetch = self.path.prefetch.as_ref();
+        prefetch.map_or(0, |prefetch| prefetch.prefetcher.lines_of_next_item())
+    }
+
     /// Takes lines that inclusive levels have evicted out of the L1 caches: `remove` takes one out of all of them and returns
     /// how many held it.
     #[inline(always)]
@@ -247,6 +254,22 @@ impl<D: DelayedFill> SharedLevel<D> {
             return;
         };
         prefetch.observe(line, answer);
+        self.fetch_wanted(&mut prefetch, now);
+        self.path.prefetch = Some(prefetch);
+    }
+
+    /// Fetches lines of the work item that comes next, as an item starts.
+    pub fn prefetch_item(&mut self, lines: &[u32], now: u64) {
+        if let Some(mut prefetch) = self.path.prefetch.take() {
+            prefetch.wanted.clear();
+            prefetch.wanted.extend_from_slice(lines);
+            self.fetch_wanted(&mut prefetch, now);
+            self.path.prefetch = Some(prefetch);
+            self.follow_evictions(now);
+        }
+    }
+
+    fn fetch_wanted(&mut self, prefetch: &mut Prefetch, now: u64) {
         for index in 0..prefetch.wanted.len() {
             let line = prefetch.wanted[index];
             if line != EMPTY && !self.cache.holds(line, now) {
@@ -259,7 +282,6 @@ impl<D: DelayedFill> SharedLevel<D> {
                 prefetch.fetched(line);
             }
         }
-        self.path.prefetch = Some(prefetch);
     }
 
     /// Empties the levels and drops the lines in flight.

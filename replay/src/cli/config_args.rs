@@ -80,7 +80,7 @@ pub struct ConfigArgs {
     #[arg(long)]
     between_frames: Option<BetweenFrames>,
 
-    /// Prefetcher of the L2, of 4 lines unless `[prefetch]` of --config says otherwise
+    /// Prefetcher of the L2, of its usual number of lines unless `[prefetch]` of --config says otherwise
     #[arg(long, value_name = "PREFETCHER")]
     prefetch: Option<Prefetching>,
     /// DRAM below the caches, with two channels unless `[dram]` of --config says otherwise: lpddr4, lpddr5, ddr4, gddr6

@@ -1,7 +1,9 @@
 //! Who takes the next work item, where the cores come for it one by one.
 
+use crate::cache::{DelayedFill, SharedLevel};
 use crate::config::Assign;
 use crate::order::WorkItem;
+use crate::stream::{Cores, StreamError};
 
 /// The items of a phase that are left.
 pub(super) struct Items<'a> {
@@ -26,6 +28,15 @@ impl<'a> Items<'a> {
         }
     }
 
+    /// The item that comes next, for whichever core takes it (first idle) or for this one (static).
+    pub(super) fn upcoming(&self, core: usize) -> Option<&'a WorkItem> {
+        let next = match self.assign {
+            Assign::FirstIdle => self.next[0],
+            Assign::Static => self.next[core],
+        };
+        self.items.get(next)
+    }
+
     /// The core's next item.
     pub(super) fn next(&mut self, core: usize) -> Option<&'a WorkItem> {
         let (next, step) = match self.assign {
@@ -36,4 +47,22 @@ impl<'a> Items<'a> {
         *next += step;
         item
     }
+}
+
+/// As a core starts an item `now`: prefetches lines of the one that comes next, if the L2's prefetcher wants them.
+#[inline(always)]
+pub(super) fn prefetch_upcoming<D: DelayedFill>(
+    l2: &mut SharedLevel<D>,
+    work: &mut Cores<'_>,
+    items: &Items<'_>,
+    core: usize,
+    now: u64,
+) -> Result<(), StreamError> {
+    let most = l2.lines_of_next_item();
+    if most > 0
+        && let Some(item) = items.upcoming(core)
+    {
+        l2.prefetch_item(&work.lines_of(item, most)?, now);
+    }
+    Ok(())
 }

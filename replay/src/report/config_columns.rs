@@ -98,7 +98,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("hsr", |c| name(&c.hsr)),
         key("between_frames", |c| name(&c.between_frames)),
         key("prefetch.prefetcher", |c| c.prefetch.map(|p| p.prefetcher.name())),
-        key("prefetch.lines", |c| c.prefetch.map(|p| u64::from(p.lines))),
+        key("prefetch.lines", |c| c.prefetch.map(|p| u64::from(p.lines()))),
         key("level", |c| c.level.text(c.line_bytes)),
         key("dram.preset", |c| c.dram.map(|dram| name(&dram.preset))),
         key("dram.channels", |c| c.dram.map(|dram| u64::from(dram.channels))),

@@ -4,12 +4,15 @@ use super::expand::Work;
 use super::lines::interleaved;
 use super::{Frame, QuadLines, StreamError, TileLines};
 use crate::order::{TileRef, WorkItem};
+use std::collections::HashSet;
 use std::ops::Range;
 
 /// The cores' work items and their positions in them.
 pub struct Cores<'f> {
     frame: &'f Frame<'f>,
     cores: Vec<Core<'f>>,
+    /// Tiles of an item that no core has yet.
+    upcoming: [Slot<'f>; 2],
 }
 
 /// A core's item. Runs are left to do in order: which tile, which run.
@@ -52,6 +55,7 @@ impl<'f> Cores<'f> {
         Self {
             frame,
             cores: (0..cores).map(|_| Core::default()).collect(),
+            upcoming: Default::default(),
         }
     }
 
@@ -87,6 +91,26 @@ impl<'f> Cores<'f> {
             (_, left, _) => core.quads = 0..left.map_or(0, TileLines::quad_count),
         }
         Ok(())
+    }
+
+    /// The distinct lines of an item, up to so many, in the order of their first use.
+    ///
+    /// # Errors
+    /// A tile that cannot be read.
+    pub fn lines_of(&mut self, item: &WorkItem, most: usize) -> Result<Vec<u32>, StreamError> {
+        let (mut lines, mut known) = (Vec::new(), HashSet::new());
+        for (slot, at) in self.upcoming.iter_mut().zip(item.tiles()) {
+            fill(slot, self.frame, at)?;
+            let Some(tile) = slot.lines() else { continue };
+            // Where only distinct lines are listed, quad by quad.
+            let all = match tile.lines.is_empty() {
+                true => &tile.distinct,
+                false => &tile.lines,
+            };
+            lines.extend(all.iter().copied().filter(|&line| known.insert(line)));
+        }
+        lines.truncate(most);
+        Ok(lines)
     }
 
     /// The quad that [`Self::next_quad`] gave last; none after [`Self::load`].

@@ -218,7 +218,7 @@ mod tests {
                     before = Some(run.primitive);
                     next += run.count;
                     let records = &tile.records[run.first as usize..][..run.count as usize];
-                    let codes: Vec<u64> = records.iter().map(|r| code(r)).collect();
+                    let codes: Vec<u64> = records.iter().map(code).collect();
                     assert!(codes.is_sorted(), "the Morton curve");
                     for record in records {
                         assert!(u32::from(record.x.max(record.y)) < tile_px / 2);

@@ -39,7 +39,10 @@ fn timed(config: &RunConfig) -> [Request; 2] {
 }
 
 fn prefetch(prefetcher: Prefetching, lines: u32) -> Option<PrefetchConfig> {
-    Some(PrefetchConfig { prefetcher, lines })
+    Some(PrefetchConfig {
+        prefetcher,
+        lines: Some(lines),
+    })
 }
 
 /// Sets as lists, most recent last; lists of what was prefetched and not used since.
@@ -74,7 +77,7 @@ impl Twin {
             self.misses += 1;
             self.fill(line);
         }
-        let n = config.lines;
+        let n = config.lines();
         let wanted: Vec<u32> = match config.prefetcher.name() {
             "next-line" if !hit || first => (line + 1..=line + n).collect(),
             "aligned-block" if !hit => (0..n).map(|i| line / n * n + ((line % n) ^ i)).collect(),

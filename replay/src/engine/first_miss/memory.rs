@@ -73,6 +73,11 @@ impl<D: DelayedFill> Memory<D> {
         .over(footprints)
     }
 
+    /// The L2 and what lies beside and below it.
+    pub fn l2(&mut self) -> &mut SharedLevel<D> {
+        &mut self.l2
+    }
+
     /// Empties all caches and drops the lines in flight.
     pub fn flush(&mut self) {
         self.l1.iter_mut().for_each(D::clear);

@@ -12,7 +12,7 @@ mod thread;
 use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
-use super::items::Items;
+use super::items::{Items, prefetch_upcoming};
 use crate::cache::{Delay, DelayedFill, Levels, MissPath};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
@@ -141,6 +141,8 @@ impl<D: DelayedFill> FirstMiss<D> {
                         return Ok(unit.clock);
                     } else if let Some(item) = items.next(core) {
                         work.load(core, item)?;
+                        let now = unit.clock;
+                        prefetch_upcoming(self.memory.l2(), work, items, core, now)?;
                     } else {
                         unit.drained = true;
                     }

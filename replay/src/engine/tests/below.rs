@@ -51,7 +51,7 @@ fn a_prefetcher_that_fetches_nothing_changes_nothing() {
         let without = replay(&trace, &with(&[], mode)).unwrap();
         let prefetch = Some(PrefetchConfig {
             prefetcher: Prefetching::ALIGNED_BLOCK,
-            lines: 1,
+            lines: Some(1),
         });
         let config = with(&[], mode);
         let mut idle = replay(&trace, &RunConfig { prefetch, ..config }).unwrap();
@@ -258,4 +258,55 @@ fn back_invalidation_is_exact_in_functional_mode() {
         plain.lower_levels.clone_from(&result.lower_levels);
         assert_eq!(result, plain);
     }
+}
+
+/// With an L2 that holds everything, each line is prefetched or missed once; nearly all are prefetched but the first item's, and the
+/// cycles of their misses are saved.
+#[test]
+fn the_next_items_lines_are_fetched_while_an_item_is_shaded() {
+    let trace = small();
+    for (mode, cores) in [(Mode::Timed, 1), (Mode::Timed, 3), (Mode::FirstMiss, 2)] {
+        let plain = RunConfig {
+            l2: CacheConfig::lru(4 << 20),
+            cores,
+            ..with(&[], mode)
+        };
+        let prefetch = Some(PrefetchConfig {
+            prefetcher: Prefetching::TILE_AHEAD,
+            lines: None,
+        });
+        let without = replay(&trace, &plain).unwrap();
+        let ahead = replay(&trace, &RunConfig { prefetch, ..plain }).unwrap();
+        let counted = ahead.prefetch.unwrap();
+        assert_eq!(
+            ahead.l2.misses + counted.lines,
+            ahead.unique_lines,
+            "{mode:?}"
+        );
+        assert_eq!(counted.useful_lines, counted.lines, "{mode:?}");
+        assert_eq!(ahead.external_bytes, without.external_bytes, "{mode:?}");
+        assert!(
+            2 * ahead.l2.misses < without.l2.misses,
+            "{mode:?}: {} {}",
+            ahead.l2.misses,
+            without.l2.misses
+        );
+        // Threads that stop at their first miss wait for whole loops, so that fewer misses need not shorten a small frame.
+        assert!(
+            mode == Mode::FirstMiss || ahead.cycles < without.cycles,
+            "{mode:?}"
+        );
+    }
+    let functional = RunConfig {
+        prefetch: Some(PrefetchConfig {
+            prefetcher: Prefetching::TILE_AHEAD,
+            lines: None,
+        }),
+        ..with(&[], Mode::Functional)
+    };
+    let error = functional.validate().unwrap_err().to_string();
+    assert!(
+        error.starts_with("prefetch.prefetcher: expected one that goes by requests"),
+        "{error}"
+    );
 }

@@ -8,7 +8,7 @@ mod timeline;
 use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
-use super::items::Items;
+use super::items::{Items, prefetch_upcoming};
 use crate::cache::{Delay, DelayedFill, Levels, MissPath};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
@@ -102,6 +102,7 @@ impl<D: DelayedFill> Timed<D> {
                                 recorder.start(core, now, unit.stats(), item);
                             }
                             work.load(core, item)?;
+                            prefetch_upcoming(self.memory.l2(), work, &items, core, now)?;
                         } else {
                             unit.drain();
                         }
