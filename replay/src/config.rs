@@ -92,6 +92,25 @@ impl BetweenFrames {
     }
 }
 
+/// What a replay breaks its counts down by, beside views and tiles.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum CountBy {
+    /// Textures and mip levels.
+    #[default]
+    Texture,
+    /// Draws.
+    Draw,
+}
+
+impl CountBy {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// Geometry of one cache level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -307,6 +326,9 @@ pub struct RunConfig {
     pub tile_px: u32,
     /// Also count by tile.
     pub tile_maps: bool,
+    /// What counts are broken down by.
+    #[serde(skip_serializing_if = "CountBy::is_default")]
+    pub count_by: CountBy,
     /// Also record which core works on which tiles when (timed mode, `--timeline`); no key of a file.
     #[serde(skip)]
     pub timeline: bool,
@@ -346,6 +368,7 @@ impl Default for RunConfig {
             tmu: TmuConfig::default(),
             tile_px: TILE_SIZE_PX,
             tile_maps: false,
+            count_by: CountBy::Texture,
             timeline: false,
             hsr: Hsr::EarlyZ,
             between_frames: BetweenFrames::Keep,

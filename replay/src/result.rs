@@ -266,6 +266,9 @@ pub struct RunResult {
     pub by_texture: Vec<Part>,
     /// By mip level.
     pub by_level: Vec<Part>,
+    /// By draw, in table order, in place of textures and levels; only when asked for (`--count-by draw`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub by_draw: Vec<Part>,
     /// Per-tile maps, only when asked for (`--tiles`; the report asks).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tile_maps: Vec<TileMap>,

@@ -1,7 +1,7 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
 use crate::config::{
-    Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, FilterOverride, Hsr,
+    Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, CountBy, FilterOverride, Hsr,
     LodFormula, Mode, Order, Prefetching, Replacement, RunConfig, TextureOrder,
 };
 use crate::memory::clients::FrameMachine;
@@ -70,6 +70,9 @@ pub struct ConfigArgs {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
+    /// What misses are broken down by in --json; with draw, tables list the busiest draws
+    #[arg(long, value_name = "PARTS")]
+    count_by: Option<CountBy>,
     /// Width and height of a tile: 8, 16 (as recorded), 32 or 64
     #[arg(long, value_name = "PIXELS")]
     tile_px: Option<u32>,
@@ -216,6 +219,7 @@ impl ConfigArgs {
             ("--cores", self.cores.is_some()),
             ("--assign", self.assign.is_some()),
             ("--between-frames", self.between_frames.is_some()),
+            ("--count-by", self.count_by.is_some()),
             ("--tile-px", self.tile_px.is_some()),
             ("--hsr", self.hsr.is_some()),
             ("--l3", self.l3.is_some()),
@@ -273,6 +277,7 @@ impl ConfigArgs {
         set(&mut config.assign, self.assign);
         set(&mut config.seed, self.seed);
         set(&mut config.tile_px, self.tile_px);
+        set(&mut config.count_by, self.count_by);
         set(&mut config.hsr, self.hsr);
         set(&mut config.between_frames, self.between_frames);
         if let Some(size_bytes) = self.l3 {

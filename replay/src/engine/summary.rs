@@ -1,7 +1,7 @@
 //! A replay's result: counts of the trace and counts of the caches summed up.
 
 use super::counts::{CacheCounts, CellMisses, Misses};
-use crate::config::RunConfig;
+use crate::config::{CountBy, RunConfig};
 use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap};
 use crate::stream::{Bins, Cell, CellAccesses, TraceCounts};
 use formats::textrace::{Pass, Tables};
@@ -65,17 +65,35 @@ pub fn summary(
         clients: Vec::new(),
         geometry: None,
         by_view,
-        by_texture: sums(
-            tables.textures.iter().map(|t| t.name.clone()).collect(),
-            |c| c.texture,
-        ),
-        by_level: sums(level_names.collect(), |c| c.level),
+        by_texture: match config.count_by {
+            CountBy::Texture => sums(
+                tables.textures.iter().map(|t| t.name.clone()).collect(),
+                |c| c.part,
+            ),
+            CountBy::Draw => Vec::new(),
+        },
+        by_level: match config.count_by {
+            CountBy::Texture => sums(level_names.collect(), |c| c.level),
+            CountBy::Draw => Vec::new(),
+        },
+        by_draw: match config.count_by {
+            CountBy::Texture => Vec::new(),
+            CountBy::Draw => sums(draw_names(tables), |c| c.part),
+        },
         tile_maps: if config.tile_maps {
             tile_maps(tables, bins, trace, caches, config.tile_px)
         } else {
             Vec::new()
         },
     }
+}
+
+/// The number of each draw and the name of its material.
+fn draw_names(tables: &Tables) -> Vec<String> {
+    let draws = tables.draws.iter().enumerate();
+    draws
+        .map(|(index, draw)| format!("draw {index}: {}", draw.material))
+        .collect()
 }
 
 /// A cell's counters of both levels: what misses the L1 is what comes to the L2.

@@ -3,7 +3,7 @@ use super::functional::Functional;
 use super::summary::summary;
 use super::*;
 use crate::cache::{AnyCache, Levels, MissPath};
-use crate::config::{BetweenFrames, CacheConfig, Mode, Order, Replacement};
+use crate::config::{BetweenFrames, CacheConfig, CountBy, Mode, Order, Replacement};
 use crate::order::{self, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
@@ -391,7 +391,7 @@ fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
         l1: l1.into_iter().map(AnyCache::into_box).collect(),
         l2: l2.into_box(),
     };
-    let bins = Bins::new(&trace.tables).unwrap();
+    let bins = Bins::new(&trace.tables, CountBy::Texture).unwrap();
     let counts = CacheCounts::new(&bins, config.tile_maps);
     alone(
         trace,
@@ -522,7 +522,7 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
 #[test]
 fn caches_take_lines_that_no_trace_sent() {
     let config = functional(Order::MORTON);
-    let bins = Bins::new(&testing::tables(&[[64, 64]])).unwrap();
+    let bins = Bins::new(&testing::tables(&[[64, 64]]), CountBy::Texture).unwrap();
     let levels = Levels::build(&config).unwrap().all_four_way().ok().unwrap();
     let path = MissPath::build(&config).unwrap();
     let mut caches = Functional::new(levels, CacheCounts::new(&bins, false), path);
@@ -598,6 +598,55 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
                 );
                 assert_eq!(flushed.cycles, single.cycles.map(|cycles| 3 * cycles));
             }
+        }
+    }
+}
+
+/// Counts by draw add up to those by texture: each material of the trace has textures of its own.
+#[test]
+fn counts_by_draw_are_those_of_its_textures() {
+    let trace = small();
+    for mode in [Mode::Functional, Mode::Timed, Mode::FirstMiss] {
+        let config = RunConfig {
+            mode,
+            ..functional(Order::Z2_STA)
+        };
+        let by_texture = replay(&trace, &config).unwrap();
+        let by_draw = RunConfig {
+            count_by: CountBy::Draw,
+            ..config
+        };
+        let mut by_draw = replay(&trace, &by_draw).unwrap();
+        let parts = std::mem::take(&mut by_draw.by_draw);
+        assert_eq!(parts.len(), trace.tables.draws.len());
+        assert!(by_draw.by_texture.is_empty() && by_draw.by_level.is_empty());
+        by_draw.by_texture.clone_from(&by_texture.by_texture);
+        by_draw.by_level.clone_from(&by_texture.by_level);
+        assert_eq!(by_draw, by_texture, "{mode:?}");
+        let textures_of = |draw: &formats::textrace::Draw| {
+            let samples = draw.groups.iter().flat_map(|group| &group.samples);
+            samples
+                .map(|sample| sample.texture)
+                .collect::<HashSet<u32>>()
+        };
+        let mut by_textures: HashMap<Vec<u32>, [LevelCounters; 2]> = HashMap::new();
+        for (draw, part) in trace.tables.draws.iter().zip(&parts) {
+            let mut textures: Vec<u32> = textures_of(draw).into_iter().collect();
+            textures.sort_unstable();
+            let [l1, l2] = by_textures.entry(textures).or_default();
+            l1.add(&part.l1);
+            l2.add(&part.l2);
+        }
+        assert!(by_textures.len() > 1);
+        for (textures, levels) in by_textures {
+            let mut expected = [LevelCounters::default(); 2];
+            for texture in textures {
+                let part = &by_texture.by_texture[texture as usize];
+                expected[0].add(&part.l1);
+                expected[1].add(&part.l2);
+            }
+            // A footprint counts once, and so does a look-up of a line that several of its textures have.
+            assert_eq!(levels, expected, "{mode:?}");
         }
     }
 }

@@ -95,6 +95,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("tmu.l2_mshrs", |c| u64::from(c.tmu.l2_mshrs)),
         key("tile_px", |c| u64::from(c.tile_px)),
         key("tile_maps", |c| c.tile_maps),
+        key("count_by", |c| name(&c.count_by)),
         key("hsr", |c| name(&c.hsr)),
         key("between_frames", |c| name(&c.between_frames)),
         key("prefetch.prefetcher", |c| c.prefetch.map(|p| p.prefetcher.name())),

@@ -88,6 +88,9 @@ pub fn text(row: &ResultRow) -> String {
         "quads {}, covered pixels {}, access hash {}\n",
         result.quads, result.lanes, result.access_hash,
     );
+    if !result.by_draw.is_empty() {
+        text += &busiest_draws(&result.by_draw);
+    }
     if let Some(prefetch) = &result.prefetch {
         text += &format!(
             "prefetched {} lines: {} useful ({} of them late), {} evicted before their use\n",
@@ -263,4 +266,20 @@ pub fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
         }),
     ];
     Table::new(&columns, &MEASURES).text()
+}
+
+/// Draws in the table of the busiest ones.
+const BUSIEST_DRAWS: usize = 10;
+
+/// The draws with the most line misses of the L2.
+fn busiest_draws(draws: &[Part]) -> String {
+    let mut busiest: Vec<&Part> = draws.iter().collect();
+    busiest.sort_by_key(|draw| std::cmp::Reverse((draw.l2.line_misses, draw.l1.footprints)));
+    busiest.truncate(BUSIEST_DRAWS);
+    let rows: Vec<Part> = busiest.into_iter().cloned().collect();
+    let more = match draws.len() - rows.len() {
+        0 => String::new(),
+        more => format!("and {more} more draws (--json has all)\n"),
+    };
+    format!("\n{}{more}", Table::new(&Part::columns(), &rows).text())
 }

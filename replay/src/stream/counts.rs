@@ -1,6 +1,7 @@
 //! Counts of what a trace accesses: the same for every order and every cache.
 
 use super::{StreamError, Tag};
+use crate::config::CountBy;
 use crate::order::TileRef;
 use formats::textrace::Tables;
 use formats::view::Eye;
@@ -8,11 +9,12 @@ use formats::view::Eye;
 /// Left, right, and passes that belong to no eye.
 const VIEWS: [&str; 3] = ["left", "right", "shared"];
 
-/// Where things count: a number for each (view, texture, mip level), called a cell, and for each
+/// Where things count: a number for each (view, texture, mip level) or each (view, draw), called a cell, and for each
 /// tile. All counters of a replay are lists by these numbers.
 #[derive(Debug)]
 pub struct Bins {
-    /// First cell of each texture within a view, and the number of a view's cells.
+    by: CountBy,
+    /// First cell of each texture or draw within a view, and the number of a view's cells.
     first_levels: Vec<usize>,
     /// View by pass.
     views: Vec<usize>,
@@ -33,9 +35,9 @@ pub struct Place {
 pub struct Cell {
     /// Index into [`Bins::view_names`].
     pub view: usize,
-    /// Index into the texture table.
-    pub texture: usize,
-    /// Mip level.
+    /// Index into the texture table, or into that of the draws.
+    pub part: usize,
+    /// Mip level; 0 where draws are counted.
     pub level: usize,
 }
 
@@ -44,16 +46,24 @@ impl Bins {
     ///
     /// # Errors
     /// More mip levels than a [`Tag`] can name, or more than 2^32 tiles.
-    pub fn new(tables: &Tables) -> Result<Self, StreamError> {
+    pub fn new(tables: &Tables, by: CountBy) -> Result<Self, StreamError> {
         let mut first_levels = vec![0];
         let mut levels = 0;
-        for texture in &tables.textures {
-            levels += texture.levels as usize;
+        let textures = tables
+            .textures
+            .iter()
+            .map(|texture| texture.levels as usize);
+        let of_each: Vec<usize> = match by {
+            CountBy::Texture => textures.collect(),
+            CountBy::Draw => vec![1; tables.draws.len()],
+        };
+        for cells in of_each {
+            levels += cells;
             first_levels.push(levels);
         }
         if levels > Tag::CELLS {
             return Err(StreamError::Tables(format!(
-                "textures have {levels} levels: expected at most {}",
+                "textures have {levels} levels or draws: expected at most {}",
                 Tag::CELLS
             )));
         }
@@ -74,6 +84,7 @@ impl Bins {
             None => 2,
         };
         Ok(Self {
+            by,
             first_levels,
             views: tables.passes.iter().map(|pass| view(pass.eye)).collect(),
             first_tiles,
@@ -121,11 +132,11 @@ impl Bins {
     pub fn meaning(&self, cell: usize) -> Cell {
         let (view, within) = (cell / self.view_cells(), cell % self.view_cells());
         // Textures without levels share their first cell with the one that has it.
-        let texture = self.first_levels.partition_point(|&first| first <= within) - 1;
+        let part = self.first_levels.partition_point(|&first| first <= within) - 1;
         Cell {
             view,
-            texture,
-            level: within - self.first_levels[texture],
+            part,
+            level: within - self.first_levels[part],
         }
     }
 
@@ -148,8 +159,11 @@ impl Bins {
 
     /// Cell within a view.
     #[inline(always)]
-    pub(super) fn cell(&self, texture: u32, level: u8) -> u32 {
-        (self.first_levels[texture as usize] + usize::from(level)) as u32
+    pub(super) fn cell(&self, draw: u32, texture: u32, level: u8) -> u32 {
+        match self.by {
+            CountBy::Texture => (self.first_levels[texture as usize] + usize::from(level)) as u32,
+            CountBy::Draw => draw,
+        }
     }
 }
 

@@ -100,7 +100,7 @@ impl<'a> Expander<'a> {
         Ok(Self {
             touched: LineSet::new(footprints.lines()),
             footprints,
-            bins: Bins::new(tables)?,
+            bins: Bins::new(tables, config.count_by)?,
             source,
             distinct: false,
             all: true,
@@ -242,7 +242,7 @@ impl<'a> Expander<'a> {
                 }
                 self.footprints
                     .for_quad(run.draw, records, scratch, |sample, bundle| {
-                        let cell = self.bins.cell(sample.texture, bundle.level);
+                        let cell = self.bins.cell(run.draw, sample.texture, bundle.level);
                         if let Some(distinct) = distinct {
                             let (found, uses) = (&mut lines.distinct, &mut lines.uses);
                             distinct.add(cell, sample.base_line, bundle, found, uses);

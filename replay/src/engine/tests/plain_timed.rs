@@ -374,7 +374,7 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
             tile_maps: true,
             ..RunConfig::default()
         };
-        let bins = Bins::new(&trace.tables).unwrap();
+        let bins = Bins::new(&trace.tables, CountBy::Texture).unwrap();
         let plain = alone(trace, &config, &mut PlainTimed::new(&config, &bins));
         assert_eq!(replay(trace, &config).unwrap(), plain, "{step}: {config:?}");
         loops += plain.tmu.unwrap().loops;
@@ -394,7 +394,7 @@ fn compiled_and_general_caches_agree() {
         l1: l1.into_iter().map(AnyCache::into_box).collect(),
         l2: l2.into_box(),
     };
-    let counts = CacheCounts::new(&Bins::new(&trace.tables).unwrap(), false);
+    let counts = CacheCounts::new(&Bins::new(&trace.tables, CountBy::Texture).unwrap(), false);
     let mut general = Timed::new(
         pointers,
         config.tmu,

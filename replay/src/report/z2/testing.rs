@@ -130,6 +130,7 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
             ..FirstLookups::default()
         }),
         by_view: parts(&["left", "right"]),
+        by_draw: Vec::new(),
         by_texture: parts(&textures),
         by_level: parts(&["level 0", "level 1", "level 2", "level 3", "level 4"]),
         tile_maps: if maps {
