@@ -1,6 +1,6 @@
 #!/bin/sh
-# What sectors, victim caches, inclusion and MSHRs change: `scripts/organisations.sh SCENES` writes results/organisations.csv and results/tiles.csv
-# (tiles of 8 to 64 pixels), Crytek Sponza, atrium and jungle as the DK2 shows them.
+# What sectors, victim caches, inclusion and MSHRs change: `scripts/organisations.sh SCENES` writes results/organisations.csv, results/tiles.csv
+# (tiles of 8 to 64 pixels) and results/fifo.csv (texture units with a prefetching FIFO), Crytek Sponza, atrium and jungle as the DK2 shows them.
 set -eu
 . "$(dirname "$0")/captures.sh"
 capture_dk2
@@ -22,6 +22,9 @@ for name in crytek-sponza atrium jungle; do
         done
         for mshrs in 32 16 8 4; do
             run mshrs-$mshrs "tmu.l2_mshrs = $mshrs"
+        done
+        for footprints in 16 64 256 1024; do
+            run fifo-$footprints 'mode = "prefetch-fifo"' "tmu.fifo_footprints = $footprints"
         done
         for px in 8 16 32 64; do
             run tile-$px "tile_px = $px"
@@ -72,4 +75,14 @@ rows = [[scene, text, *figures(scene, machine)] for scene in SCENES for machine,
 write("organisations", ["scene", "caches", *header], rows)
 rows = [[scene, f"{px}x{px}", 4 * px * px, *figures(scene, f"tile-{px}")] for scene in SCENES for px in (8, 16, 32, 64)]
 write("tiles", ["scene", "tile, px", "bytes of a tile's colours", *header], rows)
+UNITS = {"plain": "looping (timed)", **{f"fifo-{n}": f"FIFO of {n} footprints" for n in (16, 64, 256, 1024)}}
+rows = []
+for scene in SCENES:
+    for machine, text in UNITS.items():
+        morton, sta = (result(scene, order, machine) for order in ("morton", "z2-sta"))
+        use = [f"{100 * one['tmu']['utilization']:.2f}" for one in (morton, sta)]
+        cells = [cell for one, share in zip((morton, sta), use) for cell in (f"{one['external_bytes'] / 1e6:.3f}", f"{one['cycles'] / 1e6:.2f}", share)]
+        rows.append([scene, text, *cells, f"{100 * (1 - sta['cycles'] / morton['cycles']):.1f}".replace("-0.0", "0.0")])
+columns = ("MB per frame", "million cycles", "utilisation %")
+write("fifo", ["scene", "texture unit", *(f"{order}: {column}" for order in ("Morton", "Z2 STA") for column in columns), "cycles saved %"], rows)
 PYTHON

@@ -34,8 +34,23 @@ pub enum Mode {
     /// The machine of the Z2 paper as its table suggests it: a thread stops at its first miss, and
     /// rates count first look-ups beside primary misses.
     FirstMiss,
+    /// Tags are checked in order, and footprints wait in a FIFO until their lines have arrived (Igehy et al., 1998).
+    PrefetchFifo,
     /// Without latencies: a footprint is a unit of time, and a miss fills at once.
     Functional,
+}
+
+impl Mode {
+    /// Its name in configuration files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Timed => "timed",
+            Self::FirstMiss => "first-miss",
+            Self::PrefetchFifo => "prefetch-fifo",
+            Self::Functional => "functional",
+        }
+    }
 }
 
 /// How work items are given to cores.
@@ -270,6 +285,16 @@ pub struct TmuConfig {
     /// Misses of the L2 in flight at most (MSHRs), further ones wait; 0: any number. Without effect in functional mode.
     #[serde(skip_serializing_if = "is_zero")]
     pub l2_mshrs: u32,
+    /// Footprints that the FIFO of prefetch-fifo mode holds.
+    #[serde(skip_serializing_if = "is_usual_fifo")]
+    pub fifo_footprints: u32,
+}
+
+/// Footprints of the FIFO unless a configuration says otherwise.
+const USUAL_FIFO: u32 = 64;
+
+fn is_usual_fifo(footprints: &u32) -> bool {
+    *footprints == USUAL_FIFO
 }
 
 impl TmuConfig {
@@ -291,6 +316,7 @@ impl Default for TmuConfig {
             fetches_per_trip: 2,
             allocation: Allocation::OnFill,
             l2_mshrs: 0,
+            fifo_footprints: USUAL_FIFO,
         }
     }
 }
@@ -539,6 +565,12 @@ impl RunConfig {
                 count.to_string(),
             )?;
         }
+        range(
+            (1..=65_536).contains(&tmu.fifo_footprints),
+            "tmu.fifo_footprints",
+            "1 to 65536",
+            tmu.fifo_footprints.to_string(),
+        )?;
         range(
             tmu.l2_mshrs <= 65_536,
             "tmu.l2_mshrs",

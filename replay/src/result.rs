@@ -274,6 +274,17 @@ pub struct RunResult {
     pub tile_maps: Vec<TileMap>,
 }
 
+impl RunResult {
+    /// What the counts are broken down by, a texture or a draw, and the parts.
+    #[must_use]
+    pub fn parts(&self) -> (&'static str, &[Part]) {
+        match self.by_draw.is_empty() {
+            true => ("texture", &self.by_texture),
+            false => ("draw", &self.by_draw),
+        }
+    }
+}
+
 /// Which trace a result belongs to.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TraceId {

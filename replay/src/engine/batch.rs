@@ -8,6 +8,7 @@ use super::counts::CacheCounts;
 use super::first_miss::FirstMiss;
 use super::functional::Functional;
 use super::one_pass::{LevelGeometry, OnePass, geometry};
+use super::prefetch_fifo::PrefetchFifo;
 use super::scheduler::{Stage, run_within_memory};
 use super::timed::Timed;
 use super::wave::Wave;
@@ -372,7 +373,7 @@ impl Pass<'_> {
                 Err(levels) => Box::new(Functional::new(levels, counts(), path)),
             });
         }
-        if config.tmu.allocation == Allocation::OnMiss {
+        if config.tmu.allocation == Allocation::OnMiss || config.mode == Mode::PrefetchFifo {
             return Ok(with_latencies(
                 config,
                 levels.allocate_on_miss(),
@@ -404,6 +405,7 @@ where
 {
     match config.mode {
         Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts, path)),
+        Mode::PrefetchFifo => Box::new(PrefetchFifo::new(levels, config.tmu, counts, path)),
         _ => Box::new(Timed::new(levels, config.tmu, counts, path).with_timeline(config.timeline)),
     }
 }

@@ -6,6 +6,7 @@ mod first_miss;
 mod functional;
 mod items;
 mod one_pass;
+mod prefetch_fifo;
 mod scheduler;
 mod summary;
 #[cfg(test)]

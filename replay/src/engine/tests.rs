@@ -546,6 +546,7 @@ mod below;
 mod one_pass;
 mod plain_first_miss;
 mod plain_timed;
+mod prefetch_fifo;
 mod timeline;
 
 /// The same frame several times over.

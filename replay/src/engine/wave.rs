@@ -157,7 +157,7 @@ fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a>
             Some(Some(sets)) => expander.without_idle_accesses(sets),
             _ => expander,
         },
-        Mode::FirstMiss => expander,
+        Mode::FirstMiss | Mode::PrefetchFifo => expander,
         // Where a miss changes a cache at once, the timed machine looks footprints up one by one.
         Mode::Timed if passes.iter().any(at_once) => expander.with_distinct_lines(true),
         Mode::Timed => expander.only_distinct_lines(),

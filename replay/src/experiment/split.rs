@@ -151,7 +151,7 @@ impl Split {
 fn pass_cost(config: &RunConfig, configs: u64) -> u64 {
     let (part, of) = cost::FUNCTIONAL_PART;
     match config.mode {
-        Mode::Timed => cost::TIMED,
+        Mode::Timed | Mode::PrefetchFifo => cost::TIMED,
         Mode::FirstMiss => cost::FIRST_MISS,
         Mode::Functional => cost::FUNCTIONAL + cost::FUNCTIONAL * (configs - 1) * part / of,
     }

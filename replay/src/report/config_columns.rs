@@ -93,6 +93,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("tmu.fetches_per_trip", |c| u64::from(c.tmu.fetches_per_trip)),
         key("tmu.allocation", |c| name(&c.tmu.allocation)),
         key("tmu.l2_mshrs", |c| u64::from(c.tmu.l2_mshrs)),
+        key("tmu.fifo_footprints", |c| u64::from(c.tmu.fifo_footprints)),
         key("tile_px", |c| u64::from(c.tile_px)),
         key("tile_maps", |c| c.tile_maps),
         key("count_by", |c| name(&c.count_by)),

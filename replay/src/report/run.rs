@@ -4,7 +4,7 @@ use super::columns::{Column, Row, Show, Value};
 use super::errors::{self, KnownError, Of};
 use super::figures::figures;
 use super::table::Table;
-use crate::config::{Mode, RunConfig};
+use crate::config::RunConfig;
 use crate::experiment::ResultRow;
 use crate::memory::clients::ClientTraffic;
 use crate::model_version::MODEL_VERSION;
@@ -68,11 +68,7 @@ pub fn text(row: &ResultRow) -> String {
     ];
     let levels = Table::new(&level, &[("L1", &result.l1), ("L2", &result.l2)]);
     let views = Table::new(&Part::columns(), &result.by_view);
-    let mode = match config.mode {
-        Mode::Timed => "timed",
-        Mode::FirstMiss => "first-miss",
-        Mode::Functional => "functional",
-    };
+    let mode = config.mode.name();
     let mut text = format!(
         "{} ({}), {}, {mode}, L1 {}, L2 {}\n\n{}\n{}\n{}\n",
         row.subject.id.scene,

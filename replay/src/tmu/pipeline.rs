@@ -230,6 +230,7 @@ mod tests {
         fetches_per_trip: 2,
         allocation: Allocation::OnFill,
         l2_mshrs: 0,
+        fifo_footprints: 64,
     };
 
     /// Runs threads of (hits, latencies of the misses) one after another.

@@ -21,7 +21,7 @@ use crate::stream::{Cores, StreamError, furthest_behind};
 use crate::tmu::PipelineStats;
 use memory::{Memory, Seen};
 use std::collections::VecDeque;
-use thread::Thread;
+pub(super) use thread::Thread;
 
 /// Cores whose threads stop at their first miss, over caches with delayed fill.
 pub struct FirstMiss<D> {

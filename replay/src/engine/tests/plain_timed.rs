@@ -370,6 +370,7 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
                     Allocation::OnMiss,
                 ]),
                 l2_mshrs: random.of(&[0, 0, 1, 3, 16]),
+                ..TmuConfig::default()
             },
             tile_maps: true,
             ..RunConfig::default()

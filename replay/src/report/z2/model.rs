@@ -302,6 +302,8 @@ struct Detail<'a> {
     by_view: &'a [Part],
     by_texture: &'a [Part],
     by_level: &'a [Part],
+    #[serde(skip_serializing_if = "<[Part]>::is_empty")]
+    by_draw: &'a [Part],
     #[serde(skip_serializing_if = "<[TileMap]>::is_empty")]
     tile_maps: &'a [TileMap],
 }
@@ -317,6 +319,7 @@ impl<'a> Detail<'a> {
             by_view: &row.result.by_view,
             by_texture: &row.result.by_texture,
             by_level: &row.result.by_level,
+            by_draw: &row.result.by_draw,
             tile_maps: &row.result.tile_maps,
         }
     }

@@ -3,7 +3,7 @@
 use super::model::{PaperReport, TraceInfo};
 use super::plots::{self, TileMeasure};
 use super::{tables, whole_frame};
-use crate::config::{Mode, Order};
+use crate::config::{CountBy, Order};
 use crate::report::errors::{self, Of};
 use crate::report::html::{self, Section, figures, folded};
 use crate::report::picture::EmbeddedPicture;
@@ -12,8 +12,8 @@ use crate::report::table::Table;
 use crate::result::TOOL;
 use maud::{Markup, html};
 
-/// Textures in the charts and tables by texture.
-const BUSIEST_TEXTURES: usize = 20;
+/// Textures or draws in the charts and tables by them.
+const BUSIEST_PARTS: usize = 20;
 /// Grid of the example paths, as in the paper's Fig. 3 (32 tiles).
 const EXAMPLE_TILES: [u32; 2] = [8, 4];
 
@@ -60,8 +60,14 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
     sections.push(Section::new("Bounds and checks", bounds(report)));
     sections.push(Section::new("Tile orders", orders(report)?));
     sections.push(Section::new("Heat maps by tile", heat_maps(report)?));
-    sections.push(Section::new("By mip level", levels(report)?));
-    sections.push(Section::new("By texture", textures(report)?));
+    if report.config.count_by == CountBy::Texture {
+        sections.push(Section::new("By mip level", levels(report)?));
+    }
+    let by_part = match report.config.count_by {
+        CountBy::Texture => "By texture",
+        CountBy::Draw => "By draw",
+    };
+    sections.push(Section::new(by_part, parts(report)?));
     sections.extend(errors::section(Of::Textures));
     sections.push(Section::new("Configuration", configuration(report)));
     let lead = html! {
@@ -300,24 +306,22 @@ fn levels(report: &PaperReport) -> Result<Markup, PlotError> {
     Ok(html! { @for scene in body { (scene) } })
 }
 
-fn textures(report: &PaperReport) -> Result<Markup, PlotError> {
+fn parts(report: &PaperReport) -> Result<Markup, PlotError> {
     let mut body = Vec::new();
     for info in &report.traces {
         let details = report.details(&info.label);
-        let charts = plots::by_texture(&details, BUSIEST_TEXTURES)
+        let (what, all) = (details.first()).map_or(("texture", 0), |d| {
+            let (what, parts) = d.result.parts();
+            (what, parts.len())
+        });
+        let charts = plots::by_part(&details, BUSIEST_PARTS)
             .iter()
             .map(|c| Ok((c.svg()?, String::new())))
             .collect::<Result<Vec<_>, PlotError>>()?;
-        let table = tables::parts(
-            &details,
-            "texture",
-            |d| &d.result.by_texture,
-            BUSIEST_TEXTURES,
-        );
-        let all = details.first().map_or(0, |d| d.result.by_texture.len());
+        let table = tables::parts(&details, what, |d| d.result.parts().1, BUSIEST_PARTS);
         body.push(html! {
             h3 { (info.label) }
-            @if all > BUSIEST_TEXTURES { p.note { "The " (BUSIEST_TEXTURES) " of " (all) " textures with the most external traffic; all are in the JSON." } }
+            @if all > BUSIEST_PARTS { p.note { "The " (BUSIEST_PARTS) " of " (all) " " (what) "s with the most external traffic; all are in the JSON." } }
             (figures(&charts)) details { summary { "table" } (table.markup()) }
         });
     }
@@ -328,11 +332,7 @@ fn configuration(report: &PaperReport) -> Markup {
     let text = toml::to_string(&report.config).unwrap_or_default();
     let orders: Vec<&str> = report.orders().into_iter().map(Order::title).collect();
     let caches = report.caches();
-    let mode = match report.config.mode {
-        Mode::Timed => "timed",
-        Mode::FirstMiss => "first-miss",
-        Mode::Functional => "functional",
-    };
+    let mode = report.config.mode.name();
     html! {
         p {
             "Mode " (mode) "; varied: orders " (orders.join(", ")) "; L1/L2 " (caches.join(", ")) " KiB. "

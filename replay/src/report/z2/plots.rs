@@ -245,29 +245,26 @@ pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
     columns.zip(titles).map(chart).collect()
 }
 
-/// The textures with the most external traffic.
+/// The textures or draws with the most external traffic.
 #[must_use]
-pub fn by_texture(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
+pub fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
     let Some(first) = details.first() else {
         return Vec::new();
     };
-    let textures = &first.result.by_texture;
+    let (what, parts) = first.result.parts();
     let chart = |(column, title): (Column<Part>, &str)| HBarChart {
         decimals: None,
-        title: format!("{}: {title} by texture", first.subject.label),
+        title: format!("{}: {title} by {what}", first.subject.label),
         value_label: column.heading.axis_label(),
         series: details
             .iter()
             .map(|d| style(d.point.config.order))
             .collect(),
-        rows: busiest(textures, most)
+        rows: busiest(parts, most)
             .into_iter()
             .map(|i| {
-                let value = |d: &&ResultRow| column.value(d.result.by_texture.get(i)?).number();
-                (
-                    textures[i].name.clone(),
-                    details.iter().map(value).collect(),
-                )
+                let value = |d: &&ResultRow| column.value(d.result.parts().1.get(i)?).number();
+                (parts[i].name.clone(), details.iter().map(value).collect())
             })
             .collect(),
     };

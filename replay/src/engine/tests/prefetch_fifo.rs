@@ -1,0 +1,71 @@
+//! The texture unit with a prefetching FIFO.
+
+use super::*;
+use crate::config::TmuConfig;
+
+fn config(fifo_footprints: u32, cores: u32) -> RunConfig {
+    RunConfig {
+        mode: Mode::PrefetchFifo,
+        cores,
+        tmu: TmuConfig {
+            fifo_footprints,
+            ..TmuConfig::default()
+        },
+        ..functional(Order::Z2_STA)
+    }
+}
+
+/// With room for one footprint nothing is in flight at the next one, so one core misses exactly what it misses without latencies. In a
+/// longer FIFO, a line that is evicted in flight is not requested again.
+#[test]
+fn one_core_misses_what_functional_mode_misses() {
+    let trace = small();
+    let without_latencies = RunConfig {
+        mode: Mode::Functional,
+        ..config(1, 1)
+    };
+    let expected = replay(&trace, &without_latencies).unwrap();
+    let mut result = replay(&trace, &config(1, 1)).unwrap();
+    let (tmu, cycles) = (result.tmu.take().unwrap(), result.cycles.take().unwrap());
+    assert!((tmu.utilization - result.footprints as f64 / cycles as f64).abs() < 1e-12);
+    assert_eq!(result, expected);
+    for fifo in [7, 64, 4096] {
+        let result = replay(&trace, &config(fifo, 1)).unwrap();
+        assert_eq!(result.access_hash, expected.access_hash);
+        let ratio = result.l1.misses as f64 / expected.l1.misses as f64;
+        assert!((0.9..=1.0).contains(&ratio), "{fifo}: {ratio}");
+    }
+}
+
+/// With room for one footprint, each waits for the slowest of its lines.
+#[test]
+fn a_fifo_of_one_footprint_hides_nothing() {
+    let trace = small();
+    let mut one = config(1, 1);
+    one.tmu.l2_penalty_cycles = 0;
+    let result = replay(&trace, &one).unwrap();
+    // A miss takes 20 cycles, a hit one; none is in flight when the next footprint is looked up.
+    let expected = result.footprints + 19 * result.l1.counters.footprint_misses;
+    assert_eq!(result.cycles, Some(expected));
+    assert_eq!(result.l1.counters.secondary_misses, 0);
+}
+
+/// A FIFO longer than the latency of a miss hides it: cycles are those of the footprints, and those of the last miss at most.
+#[test]
+fn a_long_fifo_hides_every_latency() {
+    let trace = small();
+    for cores in [1, 3] {
+        let mut before = u64::MAX;
+        for fifo in [1, 8, 64, 512, 4096] {
+            let result = replay(&trace, &config(fifo, cores)).unwrap();
+            let cycles = result.cycles.unwrap();
+            assert!(cycles <= before || cores > 1, "{fifo}");
+            before = cycles;
+        }
+        let result = replay(&trace, &config(4096, cores)).unwrap();
+        assert!(result.tmu.unwrap().utilization > 0.98, "{:?}", result.tmu);
+        if cores == 1 {
+            assert!(before <= result.footprints + 2 * 220, "{before}");
+        }
+    }
+}
