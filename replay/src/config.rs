@@ -1,26 +1,27 @@
 //! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
 
-mod inclusion;
+mod caches;
 mod lower_levels;
 mod prefetch;
+mod tmu;
 
 use crate::memory::clients::FrameConfig;
 use crate::memory::dram::DramConfig;
-use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use crate::cache::Replacement;
 pub use crate::order::Order;
+pub use caches::{CacheConfig, Inclusion};
 use formats::footprint::MOST_ANISOTROPY;
 pub use formats::footprint::{
     AnisotropyModel, FilterOverride, LodFormula, SamplingOptions as SamplingConfig,
 };
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
 use formats::view::TILE_SIZE_PX;
-pub use inclusion::Inclusion;
 pub use lower_levels::{LevelConfig, LowerLevels};
 pub use prefetch::{PrefetchConfig, Prefetching};
+pub use tmu::{Allocation, TmuConfig};
 
 /// How time passes in a replay.
 #[derive(
@@ -126,199 +127,12 @@ impl CountBy {
     }
 }
 
-/// Geometry of one cache level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CacheConfig {
-    /// Capacity in bytes.
-    #[serde(with = "serde_bytes")]
-    pub size_bytes: u64,
-    /// Associativity.
-    #[serde(default = "CacheConfig::default_ways")]
-    pub ways: u32,
-    /// Replacement policy.
-    #[serde(default)]
-    pub replacement: Replacement,
-    /// Lines that share a tag (a sectored cache); a miss fetches one of them.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
-    pub sectors: u32,
-    /// Lines of a fully associative victim cache beside it.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub victim_lines: u32,
-    /// Whether it holds what the caches above hold (L2 only).
-    #[serde(default, skip_serializing_if = "Inclusion::is_none")]
-    pub inclusion: Inclusion,
-}
-
-fn is_recorded_tile(tile_px: &u32) -> bool {
-    *tile_px == TILE_SIZE_PX
-}
-
-const fn one() -> u32 {
-    1
-}
-
-fn is_one(value: &u32) -> bool {
-    *value == 1
-}
-
 fn is_zero(value: &u32) -> bool {
     *value == 0
 }
 
-impl CacheConfig {
-    const fn default_ways() -> u32 {
-        4
-    }
-
-    /// True for LRU and one line per tag, alone: what stack distances describe.
-    #[must_use]
-    pub fn is_plain_lru(&self) -> bool {
-        *self
-            == Self {
-                ways: self.ways,
-                ..Self::lru(self.size_bytes)
-            }
-    }
-
-    /// A four-way LRU cache of this size.
-    #[must_use]
-    pub const fn lru(size_bytes: u64) -> Self {
-        Self {
-            size_bytes,
-            ways: Self::default_ways(),
-            replacement: Replacement::LRU,
-            sectors: 1,
-            victim_lines: 0,
-            inclusion: Inclusion::None,
-        }
-    }
-
-    /// Number of sets for this line size.
-    ///
-    /// # Errors
-    /// The sets must be a power of two, the ways such as the policy can have.
-    pub fn sets(&self, level: &'static str, line_bytes: u32) -> Result<u32, ConfigError> {
-        let (expected, accepts) = self.replacement.ways_rule();
-        if !accepts(self.ways) {
-            return Err(ConfigError::Ways {
-                level,
-                policy: self.replacement.name(),
-                expected,
-                found: self.ways,
-            });
-        }
-        self.check_parts(level)?;
-        let bytes_per_set = u64::from(self.ways) * u64::from(line_bytes) * u64::from(self.sectors);
-        let sets = self.size_bytes / bytes_per_set;
-        let is_whole = self.size_bytes.is_multiple_of(bytes_per_set);
-        if !is_whole || !sets.is_power_of_two() || sets > MOST_SETS {
-            return Err(ConfigError::Sets {
-                level,
-                size: format_bytes(self.size_bytes),
-                ways: self.ways,
-                line_bytes,
-                found: if is_whole {
-                    sets.to_string()
-                } else {
-                    (self.size_bytes as f64 / bytes_per_set as f64).to_string()
-                },
-            });
-        }
-        self.check_lines(level, line_bytes, 1)?;
-        Ok(sets as u32)
-    }
-
-    /// Checks that `caches` such caches have lines that this machine's memory can stand for.
-    fn check_lines(
-        &self,
-        level: &'static str,
-        line_bytes: u32,
-        caches: u32,
-    ) -> Result<(), ConfigError> {
-        let lines = self.size_bytes / u64::from(line_bytes);
-        if lines.saturating_mul(caches.into()) > MOST_LINES {
-            return Err(ConfigError::Lines {
-                level,
-                size: format_bytes(self.size_bytes),
-                line_bytes,
-                caches,
-                found: lines,
-            });
-        }
-        Ok(())
-    }
-}
-
-/// When a line that misses gets its way in the cache, and its victim is lost.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Allocation {
-    /// When it arrives, as in the Z2 paper: lines in flight take no way.
-    #[default]
-    OnFill,
-    /// When it is asked for: lines in flight take a way.
-    OnMiss,
-}
-
-/// The texture unit's pipeline ("looping for the next chance"); see `docs/tmu-model.md`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TmuConfig {
-    /// Cycles from an L1 miss that hits the L2 until the line is in the L1.
-    pub l1_penalty_cycles: u32,
-    /// Cycles that an L2 miss takes, in addition.
-    pub l2_penalty_cycles: u32,
-    /// Pipeline length: a thread that missed is back at the first stage after this many cycles.
-    pub loop_cycles: u32,
-    /// Threads (quads) that a core holds at once.
-    pub threads: u32,
-    /// Footprints that one issue slot tries when their lines are not there: tags are checked a
-    /// quad at a time, while filtering takes one footprint a cycle.
-    pub retry_footprints: u32,
-    /// Lines that a thread asks the L2 for in one trip; further ones wait for the next trip.
-    pub fetches_per_trip: u32,
-    /// When a line that misses gets its way in a cache; without effect where time does not pass (functional mode).
-    pub allocation: Allocation,
-    /// Misses of the L2 in flight at most (MSHRs), further ones wait; 0: any number. Without effect in functional mode.
-    #[serde(skip_serializing_if = "is_zero")]
-    pub l2_mshrs: u32,
-    /// Footprints that the FIFO of prefetch-fifo mode holds.
-    #[serde(skip_serializing_if = "is_usual_fifo")]
-    pub fifo_footprints: u32,
-}
-
-/// Footprints of the FIFO unless a configuration says otherwise.
-const USUAL_FIFO: u32 = 64;
-
-fn is_usual_fifo(footprints: &u32) -> bool {
-    *footprints == USUAL_FIFO
-}
-
-impl TmuConfig {
-    /// True where a miss changes a cache at once, so that a thread's later look-ups see it.
-    #[must_use]
-    pub fn misses_change_caches_at_once(&self) -> bool {
-        self.l1_penalty_cycles == 0 || self.allocation == Allocation::OnMiss
-    }
-}
-
-impl Default for TmuConfig {
-    fn default() -> Self {
-        Self {
-            l1_penalty_cycles: 20,
-            l2_penalty_cycles: 200,
-            loop_cycles: 64,
-            threads: 64,
-            retry_footprints: 4,
-            fetches_per_trip: 2,
-            allocation: Allocation::OnFill,
-            l2_mshrs: 0,
-            fifo_footprints: USUAL_FIFO,
-        }
-    }
+fn is_recorded_tile(tile_px: &u32) -> bool {
+    *tile_px == TILE_SIZE_PX
 }
 
 /// Everything that decides the result of a replay of a given trace.
@@ -541,48 +355,7 @@ impl RunConfig {
                 expected,
                 found: found.to_string(),
             })?;
-        let tmu = &self.tmu;
-        range(
-            (1..=4096).contains(&tmu.threads),
-            "tmu.threads",
-            "1 to 4096",
-            tmu.threads.to_string(),
-        )?;
-        range(
-            (1..=100_000).contains(&tmu.loop_cycles),
-            "tmu.loop_cycles",
-            "1 to 100000",
-            tmu.loop_cycles.to_string(),
-        )?;
-        for (key, count) in [
-            ("tmu.retry_footprints", tmu.retry_footprints),
-            ("tmu.fetches_per_trip", tmu.fetches_per_trip),
-        ] {
-            range(
-                (1..=4096).contains(&count),
-                key,
-                "1 to 4096",
-                count.to_string(),
-            )?;
-        }
-        range(
-            (1..=65_536).contains(&tmu.fifo_footprints),
-            "tmu.fifo_footprints",
-            "1 to 65536",
-            tmu.fifo_footprints.to_string(),
-        )?;
-        range(
-            tmu.l2_mshrs <= 65_536,
-            "tmu.l2_mshrs",
-            "0 to 65536",
-            tmu.l2_mshrs.to_string(),
-        )?;
-        for (key, cycles) in [
-            ("tmu.l1_penalty_cycles", tmu.l1_penalty_cycles),
-            ("tmu.l2_penalty_cycles", tmu.l2_penalty_cycles),
-        ] {
-            range(cycles <= 100_000, key, "0 to 100000", cycles.to_string())?;
-        }
+        self.tmu.check()?;
         self.l1.sets("L1", self.line_bytes)?;
         self.l2.sets("L2", self.line_bytes)?;
         self.l1.check_lines("L1", self.line_bytes, self.cores)?;

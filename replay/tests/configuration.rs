@@ -250,9 +250,10 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
 fn page() -> String {
     let sources: String = [
         "replay/src/config.rs",
-        "replay/src/config/inclusion.rs",
+        "replay/src/config/caches.rs",
         "replay/src/config/lower_levels.rs",
         "replay/src/config/prefetch.rs",
+        "replay/src/config/tmu.rs",
         "replay/src/memory/clients.rs",
         "replay/src/memory/dram/mod.rs",
         "replay/src/memory/dram/mapping.rs",

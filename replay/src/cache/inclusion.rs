@@ -7,7 +7,8 @@ use crate::config::{Inclusion, RunConfig};
 /// Evictions that other levels have to follow.
 pub struct Evictions {
     is_l2_inclusive: bool,
-    evicted: Vec<u32>,
+    /// Lines that the L2 has evicted since the last call of [`Self::follow`].
+    pub evicted: Vec<u32>,
     /// Lines that the L1 caches must give up.
     invalidated: Vec<u32>,
     /// Lines that were invalidated in L1 caches and in the L2.
@@ -25,15 +26,8 @@ impl Evictions {
         })
     }
 
-    /// Follows the evictions of the L2 and of the levels below since the last call: `take_evicted` appends those of the L2,
-    /// `remove` takes a line out of it.
-    pub fn follow(
-        &mut self,
-        below: Option<&mut Below>,
-        take_evicted: impl FnOnce(&mut Vec<u32>),
-        mut remove: impl FnMut(u32) -> bool,
-    ) {
-        take_evicted(&mut self.evicted);
+    /// Follows the evictions of the L2 and of the levels below since the last call. `remove` takes a line out of the L2.
+    pub fn follow(&mut self, below: Option<&mut Below>, mut remove: impl FnMut(u32) -> bool) {
         if self.is_l2_inclusive {
             self.invalidated.extend_from_slice(&self.evicted);
         }

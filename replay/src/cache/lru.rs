@@ -3,7 +3,7 @@
 //! Moving a hit to the front of four packed tags beat time stamps by four times and SIMD compares
 //! by two; the repeats that dominate texture traffic end at the first compare.
 
-use super::{AnyCache, Cache, EMPTY, boxed};
+use super::{AnyCache, Cache, EMPTY, boxed, empty_way};
 
 /// Associativity, fixed at compile time where speed matters.
 pub trait Ways: Copy + Send {
@@ -168,6 +168,15 @@ pub(super) fn look_up(set: &mut [u32], line: u32) -> bool {
     true
 }
 
+/// Takes a line out; the lines behind it move up. True if it was there.
+pub(super) fn take_out(set: &mut [u32], line: u32) -> bool {
+    let Some(way) = empty_way(set, line) else {
+        return false;
+    };
+    set[way..].rotate_left(1);
+    true
+}
+
 impl<W: Ways> Cache for Lru<W> {
     #[inline(always)]
     fn lookup(&mut self, line: u32) -> bool {
@@ -203,15 +212,7 @@ impl<W: Ways> Cache for Lru<W> {
     }
 
     fn remove(&mut self, line: u32) -> bool {
-        let set = self.set(line);
-        let Some(way) = set.iter().position(|&tag| tag == line) else {
-            return false;
-        };
-        set[way..].rotate_left(1);
-        if let Some(last) = set.last_mut() {
-            *last = EMPTY;
-        }
-        true
+        take_out(self.set(line), line)
     }
 
     fn clear(&mut self) {

@@ -114,6 +114,13 @@ struct Geometry {
 /// Tag of a way that holds nothing; no line has this number.
 const EMPTY: u32 = u32::MAX;
 
+/// Empties the way of a set that holds a line: its number.
+fn empty_way(tags: &mut [u32], line: u32) -> Option<usize> {
+    let way = tags.iter().position(|&tag| tag == line)?;
+    tags[way] = EMPTY;
+    Some(way)
+}
+
 /// A cache that holds whole lines. What look-ups leave behind depends only on the order of the last
 /// one of each line that is there: earlier ones need no simulation.
 pub trait Cache: Send {

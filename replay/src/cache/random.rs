@@ -1,6 +1,6 @@
 //! Random replacement, seeded.
 
-use super::{Cache, EMPTY};
+use super::{Cache, EMPTY, empty_way};
 
 /// A cache with random replacement; empty ways are used first.
 pub struct RandomReplacement {
@@ -49,12 +49,7 @@ impl Cache for RandomReplacement {
 
     fn remove(&mut self, line: u32) -> bool {
         let first = (line & self.set_mask) as usize * self.ways;
-        let tags = &mut self.tags[first..first + self.ways];
-        let way = tags.iter().position(|&tag| tag == line);
-        if let Some(way) = way {
-            tags[way] = EMPTY;
-        }
-        way.is_some()
+        empty_way(&mut self.tags[first..first + self.ways], line).is_some()
     }
 
     fn clear(&mut self) {

@@ -3,7 +3,7 @@
 //! A line is promoted by a hit once another line has been filled into its set. Accesses before that belong to the quads that
 //! fetched the line, and count as one: all policies here rely on it that repeats of an access change nothing.
 
-use super::{Cache, EMPTY};
+use super::{Cache, EMPTY, empty_way};
 
 /// A distant re-reference: the next victim.
 pub(super) const DISTANT: u8 = 3;
@@ -97,11 +97,9 @@ impl Sets {
     pub(super) fn remove(&mut self, line: u32) -> bool {
         let set = self.set(line);
         let first = set * self.ways;
-        let tags = &self.tags[first..first + self.ways];
-        let Some(way) = tags.iter().position(|&tag| tag == line) else {
+        let Some(way) = empty_way(&mut self.tags[first..first + self.ways], line) else {
             return false;
         };
-        self.tags[first + way] = EMPTY;
         self.predictions[first + way] = DISTANT;
         if usize::from(self.newest[set]) == way {
             self.newest[set] = u8::MAX;

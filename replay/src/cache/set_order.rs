@@ -5,7 +5,7 @@
 
 use super::EMPTY;
 use super::delayed::{DelayedFill, NOT_IN_FLIGHT};
-use super::lru::look_up;
+use super::lru::{look_up, take_out};
 use super::mshr::Mshrs;
 
 /// A line in flight.
@@ -230,12 +230,7 @@ impl DelayedFill for SetOrder {
 
     fn remove(&mut self, line: u32, now: u64) -> bool {
         let (set, _) = self.settled(line, now);
-        let Some(way) = set.tags.iter().position(|&tag| tag == line) else {
-            return false;
-        };
-        set.tags[way..].rotate_left(1);
-        set.tags[3] = EMPTY;
-        true
+        take_out(&mut set.tags, line)
     }
 
     fn clear(&mut self) {

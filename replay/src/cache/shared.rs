@@ -8,7 +8,6 @@ use super::prefetch::{Demand, Prefetcher};
 use super::{Cache, EMPTY};
 use crate::config::{ConfigError, PrefetchConfig, RunConfig};
 use crate::result::{MshrResult, PrefetchResult, Timeline};
-use std::cell::RefCell;
 use std::collections::HashSet;
 
 /// What a configuration has beside and below the L2.
@@ -239,12 +238,10 @@ impl<D: DelayedFill> SharedLevel<D> {
     #[inline(never)]
     fn follow_evictions(&mut self, now: u64) {
         if let Some(evictions) = &mut self.path.evictions {
-            let cache = RefCell::new(&mut self.cache);
-            evictions.follow(
-                self.path.below.as_mut(),
-                |lines| cache.borrow_mut().take_evicted(lines),
-                |line| cache.borrow_mut().remove(line, now),
-            );
+            self.cache.take_evicted(&mut evictions.evicted);
+            evictions.follow(self.path.below.as_mut(), |line| {
+                self.cache.remove(line, now)
+            });
         }
     }
 
@@ -310,12 +307,8 @@ impl<C: Cache> SharedLevel<C> {
     #[inline(never)]
     fn follow_evictions_at_once(&mut self) {
         if let Some(evictions) = &mut self.path.evictions {
-            let cache = RefCell::new(&mut self.cache);
-            evictions.follow(
-                self.path.below.as_mut(),
-                |lines| cache.borrow_mut().take_evicted(lines),
-                |line| cache.borrow_mut().remove(line),
-            );
+            self.cache.take_evicted(&mut evictions.evicted);
+            evictions.follow(self.path.below.as_mut(), |line| self.cache.remove(line));
         }
     }
 

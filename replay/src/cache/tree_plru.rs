@@ -1,7 +1,7 @@
 //! Tree pseudo-LRU: one bit a node of a binary tree over the ways points to the half that was not
 //! used last.
 
-use super::{Cache, EMPTY};
+use super::{Cache, EMPTY, empty_way};
 
 /// A tree-PLRU cache.
 pub struct TreePlru {
@@ -83,12 +83,7 @@ impl Cache for TreePlru {
 
     fn remove(&mut self, line: u32) -> bool {
         let first = (line & self.set_mask) as usize * self.ways;
-        let tags = &mut self.tags[first..first + self.ways];
-        let way = tags.iter().position(|&tag| tag == line);
-        if let Some(way) = way {
-            tags[way] = EMPTY;
-        }
-        way.is_some()
+        empty_way(&mut self.tags[first..first + self.ways], line).is_some()
     }
 
     fn clear(&mut self) {

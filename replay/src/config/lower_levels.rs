@@ -1,6 +1,7 @@
 //! Cache levels below the L2: the `[[level]]` tables of a configuration.
 
-use super::{CacheConfig, ConfigError, Inclusion, is_one, is_zero, one};
+use super::caches::{is_one, one};
+use super::{CacheConfig, ConfigError, Inclusion, is_zero};
 use crate::cache::Replacement;
 use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};

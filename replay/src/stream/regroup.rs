@@ -1,7 +1,7 @@
 //! Tiles of another size than the trace's: regrouped when they are read.
 //!
-//! Records keep their order: primitives in submission order and, within a primitive, quads on the Morton curve over the tile. So
-//! a regrouped tile is what a capture with tiles of that size would hold.
+//! Records keep the order that a trace has (`Tile`): primitives in submission order and, within a primitive, quads on the Morton
+//! curve over the tile.
 
 use super::feed::check;
 use super::hsr::{Shaded, shaded};
@@ -89,7 +89,9 @@ impl Rendered<'_> {
     /// The part of a recorded tile that lies in a smaller one.
     fn split(&self, pass: u32, at: [u32; 2], tile: &mut Tile) -> Result<(), StreamError> {
         let per_edge = TILE_SIZE_PX / self.tile_px;
-        self.recorded(pass, at.map(|place| place / per_edge), tile)?;
+        let from = at.map(|place| place / per_edge);
+        self.recorded(pass, from, tile)?;
+        self.check_inside(pass, from, tile)?;
         let edge_quads = (self.tile_px / 2) as u8;
         let part = at.map(|place| (place % per_edge) as u8);
         let (runs, records) = (std::mem::take(&mut tile.runs), &mut tile.records);
@@ -118,6 +120,28 @@ impl Rendered<'_> {
         }
         records.truncate(kept);
         Ok(())
+    }
+
+    /// Smaller tiles end with the picture, so a quad of a recorded tile that lies outside would be lost.
+    fn check_inside(&self, pass: u32, at: [u32; 2], tile: &Tile) -> Result<(), StreamError> {
+        let of_pass = &self.shaded.tables().passes[pass as usize];
+        let room = [0, 1].map(|axis| {
+            let left = of_pass.size_px[axis].saturating_sub(at[axis] * TILE_SIZE_PX);
+            left.div_ceil(2)
+        });
+        let outside =
+            |record: &&QuadRecord| u32::from(record.x) >= room[0] || u32::from(record.y) >= room[1];
+        match tile.records.iter().find(outside) {
+            None => Ok(()),
+            Some(record) => Err(StreamError::Tile {
+                pass,
+                tile: at[1] * of_pass.tiles[0] + at[0],
+                message: format!(
+                    "expected quads inside the picture, in columns below {} and rows below {}, found column {} and row {}",
+                    room[0], room[1], record.x, record.y
+                ),
+            }),
+        }
     }
 
     /// The recorded tiles that lie in a larger one, primitive by primitive.
@@ -258,6 +282,19 @@ mod tests {
             let rendered = rendered(&trace, &config(tile_px)).unwrap();
             assert_eq!(records(&rendered, tile_px), expected, "{tile_px}");
         }
+    }
+
+    #[test]
+    fn a_quad_outside_the_picture_is_refused_rather_than_lost() {
+        let mut trace = trace();
+        for pass in &mut trace.tables.passes {
+            pass.size_px = [156, 80];
+        }
+        let error = replay(&trace, &config(8)).unwrap_err().to_string();
+        assert!(
+            error.contains("expected quads inside the picture, in columns below 6"),
+            "{error}"
+        );
     }
 
     /// What is sampled does not depend on the tiles; how well it fits the caches does.
