@@ -18,13 +18,13 @@ for name in crytek-sponza atrium jungle; do
         run long-lines 'line_bytes = 64'
         run sectored-64 'line_bytes = 64' 'l2.size_bytes = "128KiB"' 'l2.sectors = 2'
         for inclusion in none inclusive exclusive; do
-            run l3-$inclusion '[[level]]' 'size_bytes = "256KiB"' "inclusion = \"$inclusion\""
+            run l3-$inclusion 'l3.size_bytes = "256KiB"' "l3.inclusion = \"$inclusion\""
         done
         for mshrs in 32 16 8 4; do
             run mshrs-$mshrs "tmu.l2_mshrs = $mshrs"
         done
         for footprints in 16 64 256 1024; do
-            run fifo-$footprints 'mode = "prefetch-fifo"' "tmu.fifo_footprints = $footprints"
+            run fifo-$footprints 'tmu.model = "prefetch-fifo"' "tmu.fifo_footprints = $footprints"
         done
         for px in 8 16 32 64; do
             run tile-$px "tile_px = $px"

@@ -1,9 +1,9 @@
 //! Trace to answer: replays texture traces through caches and a texture unit in any tile order,
 //! and ray traces through a model of a mobile ray-tracing GPU.
 
+pub mod access;
 pub mod accuracy;
 pub mod addresses;
-pub mod cache;
 pub mod cli;
 pub mod compare;
 pub mod config;

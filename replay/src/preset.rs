@@ -1,6 +1,6 @@
 //! Machines by name: what a configuration starts from in place of the defaults.
 
-use crate::config::{BlockOrder, Mode, RunConfig};
+use crate::config::{BlockOrder, Mode, RunConfig, TmuModel};
 use crate::registry::{Named, registry};
 
 registry! { PresetRow:
@@ -38,7 +38,8 @@ impl Preset {
 /// was calibrated on, and why textures begin at multiples of 64 KiB. The paper's shadow rows save nothing or lose: of
 /// the layouts of a shadow map that were tried, a linear one comes nearest to that.
 fn z2_paper(mut config: RunConfig) -> RunConfig {
-    config.mode = Mode::FirstMiss;
+    config.mode = Mode::Timed;
+    config.tmu.model = TmuModel::FirstMiss;
     config.tmu.loop_cycles = 24;
     config.tmu.threads = 64;
     config.layout.base_align_bytes = 64 << 10;

@@ -1,9 +1,10 @@
 //! What a replay yields: plain data that the models fill and the printers read.
 
-use crate::memory::clients::{ClientTraffic, GeometryCounts};
+use crate::access::{ClientTraffic, GeometryCounts};
 use crate::memory::dram::DramResult;
 use formats::textrace::TraceMeta;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::path::Path;
 
 /// Program and version, recorded with every result.
@@ -61,6 +62,18 @@ pub struct MshrResult {
     pub stall_cycles: u64,
 }
 
+impl MshrResult {
+    /// Two caches together: of the peaks the higher one.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            peak: self.peak.max(other.peak),
+            stalled_misses: self.stalled_misses + other.stalled_misses,
+            stall_cycles: self.stall_cycles + other.stall_cycles,
+        }
+    }
+}
+
 fn is_zero(value: &u64) -> bool {
     *value == 0
 }
@@ -81,6 +94,20 @@ pub struct PrefetchResult {
     pub evicted_lines: u64,
 }
 
+impl PrefetchResult {
+    /// The sums of two prefetchers.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            lines: self.lines + other.lines,
+            useful_lines: self.useful_lines + other.useful_lines,
+            dropped_lines: self.dropped_lines + other.dropped_lines,
+            late_lines: self.late_lines + other.late_lines,
+            evicted_lines: self.evicted_lines + other.evicted_lines,
+        }
+    }
+}
+
 /// A level below the L2.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LowerLevelResult {
@@ -96,6 +123,74 @@ pub struct LowerLevelResult {
     pub line_misses: u64,
     /// Look-ups of a line whose fetch was in flight (timed and first-miss mode only).
     pub secondary_misses: u64,
+}
+
+/// What is counted beside and below the L2: nothing unless a configuration has more than two caches and memory.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MemoryResult {
+    /// The prefetcher of the L2, where the configuration has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prefetch: Option<PrefetchResult>,
+    /// The MSHRs of the L2, where their number is limited.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub l2_mshrs: Option<MshrResult>,
+    /// Lines that inclusive levels invalidated in L1 caches and in the L2, where levels depend on what others evict.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub invalidated_lines: Option<u64>,
+    /// The levels below the L2, where the configuration has any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lower_levels: Vec<LowerLevelResult>,
+    /// The DRAM below the caches, where the configuration has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dram: Option<DramResult>,
+}
+
+impl MemoryResult {
+    /// Bytes that are read from memory, where so many lines of the L2 missed.
+    #[must_use]
+    pub fn external_bytes(&self, l2_line_misses: u64, l2_line_bytes: u32) -> u64 {
+        if let Some(last) = self.lower_levels.last() {
+            return last.line_misses * u64::from(last.line_bytes);
+        }
+        let prefetched = self.prefetch.map_or(0, |prefetch| prefetch.lines);
+        (l2_line_misses + prefetched) * u64::from(l2_line_bytes)
+    }
+}
+
+/// A line for each part of the memory system that has counts.
+impl fmt::Display for MemoryResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(prefetch) = &self.prefetch {
+            writeln!(
+                f,
+                "prefetched {} lines: {} useful ({} of them late), {} evicted before their use",
+                prefetch.lines, prefetch.useful_lines, prefetch.late_lines, prefetch.evicted_lines
+            )?;
+        }
+        if let Some(mshrs) = &self.l2_mshrs {
+            writeln!(
+                f,
+                "MSHRs of the L2: {} in use at most, {} misses waited {} cycles together",
+                mshrs.peak, mshrs.stalled_misses, mshrs.stall_cycles
+            )?;
+        }
+        if let Some(lines) = self.invalidated_lines {
+            writeln!(f, "invalidated by inclusive levels: {lines} lines")?;
+        }
+        for level in &self.lower_levels {
+            writeln!(
+                f,
+                "{}, {}-byte lines: {} look-ups, {} misses ({:.2} %), {} merged",
+                level.name,
+                level.line_bytes,
+                level.line_lookups,
+                level.line_misses,
+                100.0 * level.miss_rate,
+                level.secondary_misses
+            )?;
+        }
+        self.dram.iter().try_for_each(|dram| write!(f, "{dram}"))
+    }
 }
 
 /// A tile of a pass, by its numbers in the trace.
@@ -236,21 +331,9 @@ pub struct RunResult {
     /// Rates as the Z2 paper very probably counts them; only where threads stop at their first miss.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_lookups: Option<FirstLookups>,
-    /// The prefetcher of the L2, where the configuration has one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub prefetch: Option<PrefetchResult>,
-    /// The MSHRs of the L2, where their number is limited.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub l2_mshrs: Option<MshrResult>,
-    /// Lines that inclusive levels invalidated in L1 caches and in the L2, where levels depend on what others evict.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub invalidated_lines: Option<u64>,
-    /// The levels below the L2, where the configuration has any.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub lower_levels: Vec<LowerLevelResult>,
-    /// The DRAM below the caches, where the configuration has one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dram: Option<DramResult>,
+    /// What was counted beside and below the L2.
+    #[serde(flatten)]
+    pub memory: MemoryResult,
     /// Traffic of the whole frame by client, where the configuration has a `[frame]`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub clients: Vec<ClientTraffic>,

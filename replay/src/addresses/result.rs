@@ -2,6 +2,8 @@
 
 use super::Totals;
 use crate::config::RunConfig;
+use crate::engine::LineOutcome;
+use crate::result::MemoryResult;
 
 /// Counters of one level, by kind: reads, writes, fetches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,7 +38,7 @@ impl LevelCounts {
 }
 
 /// One configuration.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// Its caches and line size are what counts here.
     pub config: RunConfig,
@@ -44,14 +46,23 @@ pub struct Point {
     pub l1: LevelCounts,
     /// Second level: what misses the first comes here.
     pub l2: LevelCounts,
+    /// What was counted beside and below the L2.
+    pub memory: MemoryResult,
 }
 
 impl Point {
-    /// A point with the misses of both levels.
-    pub(super) fn new(config: &RunConfig, totals: &Totals, misses: [[u64; 3]; 2]) -> Self {
-        let [l1, l2] = misses;
+    /// A point with the misses of all levels.
+    pub(super) fn new(config: &RunConfig, totals: &Totals, outcome: LineOutcome) -> Self {
+        let [l1, l2] = [0, 1].map(|level: usize| {
+            let mut misses = [0; 3];
+            for (sum, cell) in misses.iter_mut().zip(&outcome.misses) {
+                *sum = cell[level].lines;
+            }
+            misses
+        });
         Self {
             config: *config,
+            memory: outcome.memory,
             l1: LevelCounts {
                 lookups: totals.lookups,
                 misses: l1,
@@ -66,12 +77,14 @@ impl Point {
     /// Bytes fetched from memory.
     #[must_use]
     pub fn external_bytes(&self) -> u64 {
-        self.l2.line_misses() * u64::from(self.config.line_bytes)
+        let l2_misses = self.l2.line_misses();
+        self.memory
+            .external_bytes(l2_misses, self.config.line_bytes)
     }
 }
 
 /// All configurations of one replay.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Outcome {
     /// What was accessed.
     pub totals: Totals,

@@ -3,7 +3,7 @@
 use super::ConfigArgs;
 use super::addresses::AddressArgs;
 use super::subjects::Traces;
-use crate::config::Mode;
+use crate::config::{Mode, TmuModel};
 use crate::experiment::{self, Plan};
 use crate::files;
 use crate::report::run as report;
@@ -74,15 +74,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     config.tile_maps |= args.tiles;
     config.timeline = args.timeline.is_some();
     ensure!(
-        !config.timeline || config.mode == Mode::Timed,
-        "--timeline: expected --mode timed: only there time passes as on the texture units"
+        !config.timeline || config.is_looping(),
+        "--timeline: expected --mode timed --tmu looping: only there time passes as on the texture units"
     );
     let Some(path) = args.trace.clone().filter(|_| !args.print_config) else {
         super::print(&toml::to_string(&config)?)?;
         return Ok(ExitCode::SUCCESS);
     };
     if args.compare_modes {
-        config.mode = Mode::Timed;
+        (config.mode, config.tmu.model) = (Mode::Timed, TmuModel::Looping);
     }
     let inputs = std::iter::once(path.as_path()).chain(args.machine.file());
     let prints = files::check_outputs(&outputs(args), inputs)?;

@@ -5,22 +5,20 @@
 //! *pass* ([`OnePass`]); every other configuration (another policy, timed) is a pass of its own.
 
 use super::counts::CacheCounts;
-use super::first_miss::FirstMiss;
+use super::fast::one_pass::{LevelGeometry, OnePass, geometry};
 use super::functional::Functional;
-use super::one_pass::{LevelGeometry, OnePass, geometry};
-use super::prefetch_fifo::PrefetchFifo;
 use super::scheduler::{Stage, run_within_memory};
-use super::timed::Timed;
 use super::wave::Wave;
-use super::{Machine, ReplayError};
-use crate::cache::{Delay, Levels, MissPath, MissPathResult};
-use crate::config::{Allocation, CacheConfig, Mode, RunConfig, TmuConfig};
-use crate::result::{RunResult, Timeline, TmuResult};
-use crate::stream::{Expander, LineMemory, TileSource};
+use super::{AtOnce, Machine, ReplayError, threads};
+use crate::config::{ConfigError, Mode, RunConfig, TmuConfig};
+use crate::memory::{Caches, Hierarchy, MissPath};
+use crate::result::{FirstLookups, MemoryResult, RunResult, Timeline, TmuResult};
+use crate::stream::{Bins, Expander, LineMemory, TileSource};
 use crate::tmu::PipelineStats;
 use crate::whole_frame;
+use formats::layout::Layout;
 use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Passes whose machines are kept from frame to frame; beyond them a stream is expanded again.
 const WAVE: usize = 256;
@@ -74,8 +72,10 @@ pub struct Outcome {
     pub tmu: Option<TmuResult>,
     /// Cycles until the last core was done; none in functional mode.
     pub cycles: Option<u64>,
+    /// First look-ups, where threads stop at their first miss.
+    pub first_lookups: Option<FirstLookups>,
     /// What was counted beside and below the L2.
-    pub path: MissPathResult,
+    pub memory: MemoryResult,
     /// The replay over time, where it was recorded.
     pub timeline: Option<Timeline>,
 }
@@ -90,6 +90,7 @@ impl Outcome {
         let mut sum = PipelineStats::default();
         units.for_each(|unit| sum.add(&unit));
         Self {
+            first_lookups: None,
             counts,
             tmu: Some(TmuResult {
                 utilization: sum.utilization(),
@@ -98,7 +99,7 @@ impl Outcome {
                 loops: sum.loops,
             }),
             cycles: Some(cycles),
-            path: MissPathResult::default(),
+            memory: MemoryResult::default(),
             timeline: None,
         }
     }
@@ -107,10 +108,11 @@ impl Outcome {
 impl From<CacheCounts> for Outcome {
     fn from(counts: CacheCounts) -> Self {
         Self {
+            first_lookups: None,
             counts,
             tmu: None,
             cycles: None,
-            path: MissPathResult::default(),
+            memory: MemoryResult::default(),
             timeline: None,
         }
     }
@@ -273,6 +275,7 @@ fn grouped(
 /// The configuration without what the lines that are listed do not depend on.
 fn stream_key(config: &RunConfig) -> RunConfig {
     let usual = RunConfig::default();
+    let model = config.tmu_model().unwrap_or_default();
     RunConfig {
         order: usual.order,
         seed: usual.seed,
@@ -280,19 +283,19 @@ fn stream_key(config: &RunConfig) -> RunConfig {
         assign: usual.assign,
         between_frames: usual.between_frames,
         prefetch: None,
-        level: usual.level,
         dram: None,
+        tmu: TmuConfig { model, ..usual.tmu },
         ..pass_key(config)
     }
 }
 
 /// The configuration without what LRU caches that share a pass may differ in.
 fn pass_key(config: &RunConfig) -> RunConfig {
-    const ANY: CacheConfig = CacheConfig::lru(0);
+    let usual = RunConfig::default();
     RunConfig {
-        l1: ANY,
-        l2: ANY,
-        tmu: TmuConfig::default(),
+        level: usual.level,
+        memory_cycles: usual.memory_cycles,
+        tmu: usual.tmu,
         tile_maps: false,
         frame: None,
         ..*config
@@ -308,7 +311,7 @@ pub(super) struct Pass<'a> {
 }
 
 /// The passes of a stream's configurations.
-fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
+pub(super) fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
     let shared = |index: &usize| {
         let config = &configs[*index];
         shares_passes(config) && geometry(config).is_some()
@@ -343,7 +346,7 @@ impl Pass<'_> {
     /// The fewest sets of an L1, if all are LRU caches in which a footprint's lines cannot crowd each other
     /// out, and in which no other level invalidates them: its repeats find all of them then.
     pub(super) fn least_sets(&self) -> Option<u32> {
-        if self.config().levels_depend_on_evictions() {
+        if self.config().level.depend_on_evictions() {
             return None;
         }
         let l1 = self.geometries()?.into_iter().map(|(l1, _)| l1);
@@ -353,37 +356,44 @@ impl Pass<'_> {
 
     pub(super) fn build(&self, expander: &Expander<'_>) -> Result<Box<dyn Machine>, ReplayError> {
         let config = self.config();
-        let bins = expander.bins();
-        let counts = || CacheCounts::new(bins, config.tile_maps);
-        let geometries = self.geometries().filter(|_| shares_passes(config));
-        if let Some(geometries) = geometries {
+        let layout = config.prefetch.and_then(|_| expander.layout(config));
+        let layout = layout.as_ref();
+        if config.mode == Mode::Timed {
+            let counts = CacheCounts::new(expander.bins(), config.tile_maps);
+            return Ok(threads::machine(config, counts, layout)?);
+        }
+        Ok(self.build_at_once(expander.bins(), layout)?)
+    }
+
+    /// The machine of configurations whose caches fill at once.
+    pub(super) fn build_at_once(
+        &self,
+        bins: &Bins,
+        layout: Option<&Arc<Layout>>,
+    ) -> Result<Box<dyn AtOnce>, ConfigError> {
+        let config = self.config();
+        if shares_passes(config)
+            && let Some(geometries) = self.geometries()
+        {
             let maps = self.points.iter().any(|&p| self.configs[p].tile_maps);
-            return Ok(Box::new(OnePass::new(
-                bins,
-                config.cores,
-                maps,
-                &geometries,
-            )));
+            let one_pass = OnePass::new(bins, config.cores, maps, &geometries);
+            return Ok(Box::new(one_pass));
         }
-        let levels = Levels::build(config)?;
-        let path = MissPath::build(config)?;
-        if config.mode == Mode::Functional {
-            return Ok(match levels.all_four_way() {
-                Ok(levels) => Box::new(Functional::new(levels, counts(), path)),
-                Err(levels) => Box::new(Functional::new(levels, counts(), path)),
-            });
-        }
-        if config.tmu.allocation == Allocation::OnMiss || config.mode == Mode::PrefetchFifo {
-            return Ok(with_latencies(
-                config,
-                levels.allocate_on_miss(),
-                counts(),
-                path,
-            ));
-        }
-        Ok(match levels.all_four_way() {
-            Ok(levels) => with_latencies(config, levels, counts(), path),
-            Err(levels) => with_latencies(config, levels, counts(), path),
+        self.build_alone(bins, layout)
+    }
+
+    /// The plain machine of a configuration that shares no pass.
+    pub(super) fn build_alone(
+        &self,
+        bins: &Bins,
+        layout: Option<&Arc<Layout>>,
+    ) -> Result<Box<dyn AtOnce>, ConfigError> {
+        let config = self.config();
+        let counts = CacheCounts::new(bins, config.tile_maps);
+        let path = MissPath::build(config, layout)?;
+        Ok(match Caches::build(config)?.all_four_way() {
+            Ok(caches) => Box::new(Functional::new(Hierarchy::new(caches, path), counts)),
+            Err(caches) => Box::new(Functional::new(Hierarchy::new(caches, path), counts)),
         })
     }
 }
@@ -391,21 +401,4 @@ impl Pass<'_> {
 /// A shared pass does not see the misses of one L2 in their order.
 fn shares_passes(config: &RunConfig) -> bool {
     matches!(config.mode, Mode::Functional) && !config.follows_l2_misses()
-}
-
-/// The machine of a configuration where time passes.
-fn with_latencies<C: Delay>(
-    config: &RunConfig,
-    levels: Levels<C>,
-    counts: CacheCounts,
-    path: MissPath,
-) -> Box<dyn Machine>
-where
-    C::Delayed: 'static,
-{
-    match config.mode {
-        Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts, path)),
-        Mode::PrefetchFifo => Box::new(PrefetchFifo::new(levels, config.tmu, counts, path)),
-        _ => Box::new(Timed::new(levels, config.tmu, counts, path).with_timeline(config.timeline)),
-    }
 }

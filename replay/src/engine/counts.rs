@@ -1,5 +1,6 @@
 //! Counts of what a cache hierarchy makes of the accesses.
 
+use crate::memory::Answer;
 use crate::stream::Bins;
 
 /// Misses of one level.
@@ -42,6 +43,24 @@ pub struct FootprintMisses {
     pub l2_lines: u32,
     /// Lines in flight into the L2.
     pub l2_secondary: u32,
+}
+
+impl FootprintMisses {
+    /// Counts the answer of the L2 to a request `now`: when the line is there.
+    #[inline(always)]
+    pub fn ask_l2(&mut self, answer: Answer, now: u64) -> u64 {
+        match answer {
+            Answer::Hit => now,
+            Answer::Miss(arrival) => {
+                self.l2_lines += 1;
+                arrival
+            }
+            Answer::InFlight(arrival) => {
+                self.l2_secondary += 1;
+                arrival
+            }
+        }
+    }
 }
 
 /// All misses of a replay.

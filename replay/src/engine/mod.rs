@@ -2,24 +2,24 @@
 
 mod batch;
 mod counts;
-mod first_miss;
+mod fast;
 mod functional;
-mod items;
-mod one_pass;
-mod prefetch_fifo;
+mod lines;
 mod scheduler;
 mod summary;
 #[cfg(test)]
 mod tests;
-mod timed;
+mod threads;
 mod wave;
 
 pub use batch::{Job, Work, replay_all, replay_jobs, sharing};
+pub use counts::Misses;
+pub use lines::{LineOutcome, LineReplay};
 
 use crate::config::{Assign, ConfigError, RunConfig};
 use crate::order::Phase;
-use crate::result::{FirstLookups, RunResult};
-use crate::stream::{Cores, LineMemory, StreamError, TileSource};
+use crate::result::RunResult;
+use crate::stream::{Cores, LineMemory, StreamError, Tag, TileSource};
 use std::sync::Mutex;
 use thiserror::Error;
 
@@ -66,9 +66,13 @@ trait Machine: Send {
 
     /// What was counted for one of its configurations.
     fn outcome(&self, config: &RunConfig) -> batch::Outcome;
+}
 
-    /// What it counts besides where threads stop at their first miss.
-    fn first_lookups(&self) -> Option<FirstLookups> {
-        None
-    }
+/// A machine without clocks, which can be fed with lines from anywhere.
+trait AtOnce: Machine {
+    /// The first core accesses lines, each a footprint of its own. `missed` gets those that some L1 does not hold.
+    fn lines(&mut self, lines: &[u32], tags: &[Tag], missed: &mut Vec<u32>);
+
+    /// Counts what is still pending.
+    fn finish(&mut self) {}
 }

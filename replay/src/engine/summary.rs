@@ -2,7 +2,7 @@
 
 use super::counts::{CacheCounts, CellMisses, Misses};
 use crate::config::{CountBy, RunConfig};
-use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap};
+use crate::result::{LevelCounters, LevelResult, MemoryResult, Part, RunResult, TileMap};
 use crate::stream::{Bins, Cell, CellAccesses, TraceCounts};
 use formats::textrace::{Pass, Tables};
 
@@ -56,12 +56,8 @@ pub fn summary(
         tmu: None,
         cycles: None,
         first_lookups: None,
-        prefetch: None,
-        l2_mshrs: None,
-        invalidated_lines: None,
+        memory: MemoryResult::default(),
         timeline: None,
-        lower_levels: Vec::new(),
-        dram: None,
         clients: Vec::new(),
         geometry: None,
         by_view,

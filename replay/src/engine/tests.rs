@@ -2,8 +2,10 @@ use super::counts::CacheCounts;
 use super::functional::Functional;
 use super::summary::summary;
 use super::*;
-use crate::cache::{AnyCache, Levels, MissPath};
-use crate::config::{BetweenFrames, CacheConfig, CountBy, Mode, Order, Replacement};
+use crate::config::{
+    BetweenFrames, CountBy, LevelConfig, Levels, Mode, Order, Replacement, TmuModel,
+};
+use crate::memory::Hierarchy;
 use crate::order::{self, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
@@ -29,17 +31,28 @@ fn functional(order: Order) -> RunConfig {
     RunConfig {
         mode: Mode::Functional,
         order,
-        l1: CacheConfig::lru(1 << 10),
-        l2: CacheConfig::lru(8 << 10),
+        level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(8 << 10)),
         ..RunConfig::default()
     }
+}
+
+/// How time passes: the mode, and the model of the texture unit.
+type Time = (Mode, TmuModel);
+
+const AT_ONCE: Time = (Mode::Functional, TmuModel::Looping);
+const LOOPING: Time = (Mode::Timed, TmuModel::Looping);
+const FIRST_MISS: Time = (Mode::Timed, TmuModel::FirstMiss);
+
+fn in_time((mode, model): Time, mut config: RunConfig) -> RunConfig {
+    (config.mode, config.tmu.model) = (mode, model);
+    config
 }
 
 /// LRU sets as plain lists, most recent last.
 struct TwinCache(Vec<Vec<u64>>);
 
 impl TwinCache {
-    fn new(config: &CacheConfig) -> Self {
+    fn new(config: &LevelConfig) -> Self {
         Self(vec![Vec::new(); config.sets("", 16).unwrap() as usize])
     }
 
@@ -59,7 +72,10 @@ impl TwinCache {
 /// A straightforward single-core replay: no tables, no shortcuts.
 fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounters, usize) {
     let (mut c1, mut c2) = (LevelCounters::default(), LevelCounters::default());
-    let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
+    let (mut l1, mut l2) = (
+        TwinCache::new(&config.level.l1),
+        TwinCache::new(&config.level.l2),
+    );
     let mut seen = HashSet::new();
     let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
     let order = config.order.build(config.seed);
@@ -207,7 +223,7 @@ fn without_penalties_timed_equals_functional_on_one_core() {
             mode: Mode::Timed,
             ..functional
         };
-        (timed.tmu.l1_penalty_cycles, timed.tmu.l2_penalty_cycles) = (0, 0);
+        (timed.level.l2.hit_cycles, timed.memory_cycles) = (0, 0);
         let expected = replay(&trace, &functional).unwrap();
         let mut found = replay(&trace, &timed).unwrap();
         assert_eq!(found.tmu.take().unwrap().utilization, 1.0);
@@ -222,8 +238,7 @@ fn an_infinite_cache_misses_each_line_once() {
     for mode in [Mode::Functional, Mode::Timed] {
         let config = RunConfig {
             mode,
-            l1: CacheConfig::lru(1 << 10),
-            l2: CacheConfig::lru(64 << 20),
+            level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(64 << 20)),
             ..RunConfig::default()
         };
         let result = replay(&trace, &config).unwrap();
@@ -373,7 +388,7 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     RunResult {
         tmu,
         cycles,
-        l2_mshrs: outcome.path.mshrs,
+        memory: outcome.memory,
         ..summary(
             &trace.tables,
             expander.bins(),
@@ -386,18 +401,10 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
 
 /// One functional configuration in caches of its own, behind pointers as any policy's are.
 fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
-    let Levels { l1, l2 } = Levels::build(config).unwrap();
-    let levels = Levels {
-        l1: l1.into_iter().map(AnyCache::into_box).collect(),
-        l2: l2.into_box(),
-    };
     let bins = Bins::new(&trace.tables, CountBy::Texture).unwrap();
     let counts = CacheCounts::new(&bins, config.tile_maps);
-    alone(
-        trace,
-        config,
-        &mut Functional::new(levels, counts, MissPath::build(config).unwrap()),
-    )
+    let caches = Hierarchy::build(config).unwrap();
+    alone(trace, config, &mut Functional::new(caches, counts))
 }
 
 /// Random machines that a twin is held against: `MACHINES=1000` for many.
@@ -423,12 +430,12 @@ impl Random {
     }
 
     /// An LRU cache of up to `most_sets` sets and any small number of ways.
-    fn cache(&mut self, most_sets: u64) -> CacheConfig {
+    fn cache(&mut self, most_sets: u64) -> LevelConfig {
         let ways = self.of(&[1, 2, 3, 4, 4, 4, 5, 8, 12, 16]);
         let sets = 1 << self.below(u64::from(most_sets.ilog2()) + 1);
-        CacheConfig {
+        LevelConfig {
             ways,
-            ..CacheConfig::lru(sets * u64::from(ways) * 16)
+            ..LevelConfig::lru(sets * u64::from(ways) * 16)
         }
     }
 }
@@ -480,8 +487,8 @@ fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
                 ..functional(order)
             };
             let sent = sent(&trace, &config);
-            let mut l1: Vec<TwinCache> = (0..3).map(|_| TwinCache::new(&config.l1)).collect();
-            let mut l2 = TwinCache::new(&config.l2);
+            let mut l1: Vec<TwinCache> = (0..3).map(|_| TwinCache::new(&config.level.l1)).collect();
+            let mut l2 = TwinCache::new(&config.level.l2);
             let (mut l1_lines, mut l2_lines) = (0, 0);
             for (core, _, lines) in &sent {
                 for &line in lines {
@@ -510,7 +517,7 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
         for l1 in [64, 1 << 10, 1 << 20] {
             let config = RunConfig {
                 mode,
-                l1: CacheConfig::lru(l1),
+                level: Levels::two(LevelConfig::lru(l1), LevelConfig::lru(8 << 10)),
                 ..functional(Order::Z2_STA)
             };
             let result = replay(&trace, &config).unwrap();
@@ -523,10 +530,12 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
 fn caches_take_lines_that_no_trace_sent() {
     let config = functional(Order::MORTON);
     let bins = Bins::new(&testing::tables(&[[64, 64]]), CountBy::Texture).unwrap();
-    let levels = Levels::build(&config).unwrap().all_four_way().ok().unwrap();
-    let path = MissPath::build(&config).unwrap();
-    let mut caches = Functional::new(levels, CacheCounts::new(&bins, false), path);
-    let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
+    let hierarchy = Hierarchy::build(&config).unwrap();
+    let mut caches = Functional::new(hierarchy, CacheCounts::new(&bins, false));
+    let (mut l1, mut l2) = (
+        TwinCache::new(&config.level.l1),
+        TwinCache::new(&config.level.l2),
+    );
     let (mut l1_lines, mut l2_lines) = (0, 0);
     for step in 0..10_000_u64 {
         let line = step * step % 1009 + step % 7;
@@ -537,7 +546,7 @@ fn caches_take_lines_that_no_trace_sent() {
             l2_lines += u64::from(!l2.access(line));
         }
     }
-    let counted = &caches.counts.cells[0];
+    let counted = caches.outcome(&config).counts.cells[0];
     assert_eq!((counted.l1.lines, counted.l2.lines), (l1_lines, l2_lines));
     assert!(l1_lines > l2_lines && l2_lines > 1009);
 }
@@ -572,7 +581,7 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             };
             // A slot that is not full is carried over, a full one is not.
             config.tmu.retry_footprints = 1;
-            (config.l1.replacement, config.l2.replacement) = (policy, policy);
+            (config.level.l1.replacement, config.level.l2.replacement) = (policy, policy);
             let flush = RunConfig {
                 between_frames: BetweenFrames::Flush,
                 ..config
@@ -607,11 +616,8 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
 #[test]
 fn counts_by_draw_are_those_of_its_textures() {
     let trace = small();
-    for mode in [Mode::Functional, Mode::Timed, Mode::FirstMiss] {
-        let config = RunConfig {
-            mode,
-            ..functional(Order::Z2_STA)
-        };
+    for time in [AT_ONCE, LOOPING, FIRST_MISS] {
+        let config = in_time(time, functional(Order::Z2_STA));
         let by_texture = replay(&trace, &config).unwrap();
         let by_draw = RunConfig {
             count_by: CountBy::Draw,
@@ -623,7 +629,7 @@ fn counts_by_draw_are_those_of_its_textures() {
         assert!(by_draw.by_texture.is_empty() && by_draw.by_level.is_empty());
         by_draw.by_texture.clone_from(&by_texture.by_texture);
         by_draw.by_level.clone_from(&by_texture.by_level);
-        assert_eq!(by_draw, by_texture, "{mode:?}");
+        assert_eq!(by_draw, by_texture, "{time:?}");
         let textures_of = |draw: &formats::textrace::Draw| {
             let samples = draw.groups.iter().flat_map(|group| &group.samples);
             samples
@@ -647,7 +653,7 @@ fn counts_by_draw_are_those_of_its_textures() {
                 expected[1].add(&part.l2);
             }
             // A footprint counts once, and so does a look-up of a line that several of its textures have.
-            assert_eq!(levels, expected, "{mode:?}");
+            assert_eq!(levels, expected, "{time:?}");
         }
     }
 }

@@ -4,8 +4,7 @@ use super::batch::{Job, Pass};
 use super::scheduler::Stage;
 use super::summary::summary;
 use super::{Machine, ReplayError};
-use crate::cache::MissPathResult;
-use crate::config::{BetweenFrames, Mode, Order, RunConfig};
+use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
 use crate::order::{self, Phase};
 use crate::result::RunResult;
 use crate::stream::{Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, rendered};
@@ -116,29 +115,16 @@ impl Wave<'_> {
             let config = &self.job.configs[index];
             let outcome = machine.outcome(config);
             let (tmu, cycles) = (outcome.tmu, outcome.cycles);
-            let MissPathResult {
-                below,
-                prefetch,
-                mshrs,
-                invalidated_lines,
-            } = outcome.path;
             let mut result = RunResult {
                 tmu,
                 cycles,
-                dram: below.dram,
-                prefetch,
-                l2_mshrs: mshrs,
-                invalidated_lines,
                 timeline: outcome.timeline,
-                lower_levels: below.levels,
-                first_lookups: machine.first_lookups(),
+                first_lookups: outcome.first_lookups,
                 ..summary(tables, expander.bins(), counts, &outcome.counts, config)
             };
-            if let Some(last) = result.lower_levels.last() {
-                result.external_bytes = last.line_misses * u64::from(last.line_bytes);
-            } else if let Some(prefetch) = &result.prefetch {
-                result.external_bytes += prefetch.lines * u64::from(config.line_bytes);
-            }
+            let l2_misses = result.l2.misses;
+            result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
+            result.memory = outcome.memory;
             if let Some(machine) = &config.frame {
                 let whole = traffic(self.job.trace, config, machine, result.external_bytes)?;
                 (result.clients, result.geometry) = (whole.clients, Some(whole.geometry));
@@ -151,16 +137,16 @@ impl Wave<'_> {
 
 /// Lists what the passes read.
 fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a> {
-    let at_once = |pass: &Pass<'_>| pass.config().tmu.misses_change_caches_at_once();
-    match passes[0].config().mode {
-        Mode::Functional => match passes.iter().map(Pass::least_sets).min() {
+    let at_once = |pass: &Pass<'_>| pass.config().misses_change_caches_at_once();
+    match passes[0].config().tmu_model() {
+        None => match passes.iter().map(Pass::least_sets).min() {
             Some(Some(sets)) => expander.without_idle_accesses(sets),
             _ => expander,
         },
-        Mode::FirstMiss | Mode::PrefetchFifo => expander,
+        Some(TmuModel::FirstMiss | TmuModel::PrefetchFifo) => expander,
         // Where a miss changes a cache at once, the timed machine looks footprints up one by one.
-        Mode::Timed if passes.iter().any(at_once) => expander.with_distinct_lines(true),
-        Mode::Timed => expander.only_distinct_lines(),
+        Some(TmuModel::Looping) if passes.iter().any(at_once) => expander.with_distinct_lines(true),
+        Some(TmuModel::Looping) => expander.only_distinct_lines(),
     }
 }
 

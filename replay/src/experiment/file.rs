@@ -12,7 +12,7 @@
 //! ```
 
 use super::plan::{Axis, MOST_POINTS, Plan, PlanError};
-use crate::config::RunConfig;
+use crate::config::{Levels, RunConfig};
 use serde::Deserialize;
 use std::collections::HashSet;
 use toml::de::{DeTable, DeValue};
@@ -47,16 +47,7 @@ impl ExperimentFile {
     /// # Errors
     /// Syntax, an unknown key, a value that its key does not take; each with its line.
     pub fn parse(text: &str) -> Result<Self, PlanError> {
-        let line_at = |offset: usize| 1 + text.bytes().take(offset).filter(|b| *b == b'\n').count();
-        let document = DeTable::parse(text).map_err(|e| PlanError::Syntax {
-            line: line_at(e.span().map_or(0, |s| s.start)),
-            message: brief(e.message()),
-        })?;
-        Self::read(document.get_ref()).map_err(|fault| PlanError::Key {
-            line: line_at(fault.offset),
-            key: brief(&fault.key),
-            message: brief(&fault.message),
-        })
+        read(text, Self::read)
     }
 
     fn read(document: &DeTable) -> Result<Self, Fault> {
@@ -84,19 +75,7 @@ impl ExperimentFile {
                         file.traces.push(name.to_owned());
                     }
                 }
-                ("base", DeValue::Table(table)) => {
-                    for (key, offset, value) in leaves(table)? {
-                        let set = to_value(value).and_then(|value| {
-                            set(&mut base, &key, value);
-                            parsed(&base)
-                        });
-                        file.base = set.map_err(|message| Fault {
-                            offset,
-                            key,
-                            message,
-                        })?;
-                    }
-                }
+                ("base", DeValue::Table(table)) => file.base = with_keys(&mut base, table)?,
                 ("axes", DeValue::Table(table)) => file.axes = axes(table, &base)?,
                 ("one-at-a-time", DeValue::Table(table)) => {
                     file.one_at_a_time = axes(table, &base)?;
@@ -127,6 +106,47 @@ impl ExperimentFile {
     pub fn plan(&self) -> Result<Plan, PlanError> {
         Plan::cross(self.base, &self.axes, &self.one_at_a_time)
     }
+}
+
+/// Parses the file of a configuration: the keys that it gives, over the defaults.
+///
+/// # Errors
+/// As [`ExperimentFile::parse`].
+pub fn parse_config(text: &str) -> Result<RunConfig, PlanError> {
+    read(text, |document| {
+        with_keys(&mut to_table(&RunConfig::default()), document)
+    })
+}
+
+/// Reads a document; faults get their lines.
+fn read<T>(text: &str, content: impl Fn(&DeTable) -> Result<T, Fault>) -> Result<T, PlanError> {
+    let line_at = |offset: usize| 1 + text.bytes().take(offset).filter(|b| *b == b'\n').count();
+    let document = DeTable::parse(text).map_err(|e| PlanError::Syntax {
+        line: line_at(e.span().map_or(0, |s| s.start)),
+        message: brief(e.message()),
+    })?;
+    content(document.get_ref()).map_err(|fault| PlanError::Key {
+        line: line_at(fault.offset),
+        key: brief(&fault.key),
+        message: brief(&fault.message),
+    })
+}
+
+/// Sets the keys of a table in a configuration, one after another.
+fn with_keys(config: &mut Table, table: &DeTable) -> Result<RunConfig, Fault> {
+    let mut last = parsed(config).unwrap_or_default();
+    for (key, offset, value) in leaves(table)? {
+        let found = to_value(value).and_then(|value| {
+            set(config, &key, value);
+            parsed(config)
+        });
+        last = found.map_err(|message| Fault {
+            offset,
+            key,
+            message,
+        })?;
+    }
+    Ok(last)
 }
 
 /// The beginning of a text that may repeat a whole file.
@@ -180,7 +200,9 @@ fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Result<Vec<Leaf<'a, 'i>>, Fault> {
         for (key, value) in table.iter() {
             let path = format!("{prefix}{}", key.get_ref());
             match value.get_ref() {
-                DeValue::Table(inner) => walk(inner, &format!("{path}."), out),
+                DeValue::Table(inner) if !inner.is_empty() => {
+                    walk(inner, &format!("{path}."), out);
+                }
                 leaf => out.push((path, key.span().start, leaf)),
             }
         }
@@ -228,43 +250,35 @@ fn to_value(value: &DeValue) -> Result<Value, String> {
     }
 }
 
-/// Sets a dotted key, and makes the tables that it goes through. A number is an index into a list of tables, or that of
-/// a table after the last one: `level.0.size_bytes`.
+/// Sets a dotted key, and makes the tables that it goes through. The levels go by their names, `l1.size_bytes`; the one
+/// after the last level is added.
 pub(super) fn set(table: &mut Table, key: &str, value: Value) {
-    match key.split_once('.') {
-        None => {
-            table.insert(key.to_owned(), value);
+    let Some((first, rest)) = key.split_once('.') else {
+        table.insert(key.to_owned(), value);
+        return;
+    };
+    let is_level = |name: &&str| name.eq_ignore_ascii_case(first);
+    if let Some(index) = Levels::NAMES.iter().position(|name| is_level(&name))
+        && let Some(levels) = table.get_mut("level").and_then(Value::as_array_mut)
+        && index <= levels.len()
+    {
+        if index == levels.len() {
+            levels.push(Value::Table(Table::new()));
         }
-        Some((first, rest)) => {
-            let inner = table
-                .entry(first)
-                .or_insert_with(|| Value::Table(Table::new()));
-            if let Some((index, rest)) = rest.split_once('.')
-                && let Ok(index) = index.parse::<usize>()
-                && let Some(item) = item_of(inner, index)
-            {
-                return set(item, rest, value);
-            }
-            if !inner.is_table() {
-                *inner = Value::Table(Table::new());
-            }
-            if let Value::Table(inner) = inner {
-                set(inner, rest, value);
-            }
+        if let Some(level) = levels[index].as_table_mut() {
+            set(level, rest, value);
         }
+        return;
     }
-}
-
-/// A table of a list, which is made where there is none.
-fn item_of(list: &mut Value, index: usize) -> Option<&mut Table> {
-    if !list.is_array() {
-        *list = Value::Array(Vec::new());
+    let inner = table
+        .entry(first)
+        .or_insert_with(|| Value::Table(Table::new()));
+    if !inner.is_table() {
+        *inner = Value::Table(Table::new());
     }
-    let items = list.as_array_mut()?;
-    if items.len() == index {
-        items.push(Value::Table(Table::new()));
+    if let Value::Table(inner) = inner {
+        set(inner, rest, value);
     }
-    items.get_mut(index)?.as_table_mut()
 }
 
 fn to_table(config: &RunConfig) -> Table {

@@ -17,7 +17,7 @@ mod store;
 mod subject;
 
 pub use calibration::{Objective, SceneCaptures, SceneFit, Trial, is_of_the_table, trials};
-pub use file::ExperimentFile;
+pub use file::{ExperimentFile, parse_config};
 pub use outcome::{Outcome, ResultRow};
 pub use plan::{Axis, MOST_POINTS, Plan, PlanError, Point, Setting, plain};
 pub use runner::{AbsentPoint, Incomplete, RunError, merge, run, run_part};

@@ -132,7 +132,7 @@ impl<'a> Outcome<'a> {
 
 /// The paper's row for a trace's scene, if the caches are the paper's, too.
 fn published(subject: &Subject, point: &Point, order: Order) -> Option<&'static PublishedRow> {
-    let [l1, l2] = [&point.config.l1, &point.config.l2].map(|cache| cache.size_bytes);
+    let [l1, l2] = [&point.config.level.l1, &point.config.level.l2].map(|cache| cache.size_bytes);
     let exact = l1.is_multiple_of(1024) && l2.is_multiple_of(1024);
     let kib = |bytes: u64| u32::try_from(bytes / 1024).ok().filter(|_| exact);
     z2::row(subject.stand_in_for?, kib(l1)?, kib(l2)?, order)
@@ -144,7 +144,10 @@ impl ResultRow<'_> {
     pub fn caches_kib(&self) -> (f64, f64) {
         let config = &self.point.config;
         let kib = |bytes: u64| bytes as f64 / 1024.0;
-        (kib(config.l1.size_bytes), kib(config.l2.size_bytes))
+        (
+            kib(config.level.l1.size_bytes),
+            kib(config.level.l2.size_bytes),
+        )
     }
 
     /// Both sizes in KiB, as `8/128`.

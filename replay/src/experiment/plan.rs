@@ -196,8 +196,8 @@ impl Plan {
         for &(l1_bytes, l2_bytes) in caches_bytes {
             for &order in orders {
                 let mut config = RunConfig { order, ..base };
-                config.l1.size_bytes = l1_bytes;
-                config.l2.size_bytes = l2_bytes;
+                config.level.l1.size_bytes = l1_bytes;
+                config.level.l2.size_bytes = l2_bytes;
                 let setting = |key: &str, value: Value| (key.to_owned(), value);
                 points.push(Point {
                     settings: vec![
@@ -221,7 +221,7 @@ impl Plan {
     /// proposes.
     #[must_use]
     pub fn with_tile_maps(mut self) -> Self {
-        let caches = |point: &Point| [point.config.l1, point.config.l2];
+        let caches = |point: &Point| [point.config.level.l1, point.config.level.l2];
         let first = self.points.first().map(caches);
         for point in &mut self.points {
             let mapped = [Order::MORTON, Order::Z2_STA].contains(&point.config.order);
@@ -238,14 +238,14 @@ impl Plan {
     /// A configuration that no machine can have.
     pub fn beside(mut self, preset: Preset, machine: RunConfig) -> Result<Self, PlanError> {
         let timed = (self.points.iter())
-            .filter(|point| point.change.is_none() && point.config.mode == Mode::Timed);
+            .filter(|point| point.change.is_none() && point.config.is_looping());
         let others = timed.map(|point| {
             let mut config = RunConfig {
                 order: point.config.order,
                 ..machine
             };
-            config.l1.size_bytes = point.config.l1.size_bytes;
-            config.l2.size_bytes = point.config.l2.size_bytes;
+            config.level.l1.size_bytes = point.config.level.l1.size_bytes;
+            config.level.l2.size_bytes = point.config.level.l2.size_bytes;
             Point {
                 settings: point.settings.clone(),
                 change: Some(on_preset(preset)),
@@ -259,7 +259,7 @@ impl Plan {
 
     /// Adds every timed point in functional mode.
     fn add_functional(&mut self) {
-        let timed = self.points.iter().filter(|p| p.config.mode == Mode::Timed);
+        let timed = self.points.iter().filter(|p| p.config.is_looping());
         let functional: Vec<Point> = timed
             .map(|point| Point {
                 settings: point.settings.clone(),

@@ -5,7 +5,7 @@
 
 use super::Plan;
 use super::runner::groups;
-use crate::config::{Mode, RunConfig};
+use crate::config::{RunConfig, TmuModel};
 use crate::engine::sharing;
 use shell::{Piece, Shard, balanced};
 
@@ -150,10 +150,10 @@ impl Split {
 /// Cost a quad record of a pass over an order that answers so many configurations.
 fn pass_cost(config: &RunConfig, configs: u64) -> u64 {
     let (part, of) = cost::FUNCTIONAL_PART;
-    match config.mode {
-        Mode::Timed | Mode::PrefetchFifo => cost::TIMED,
-        Mode::FirstMiss => cost::FIRST_MISS,
-        Mode::Functional => cost::FUNCTIONAL + cost::FUNCTIONAL * (configs - 1) * part / of,
+    match config.tmu_model() {
+        Some(TmuModel::Looping | TmuModel::PrefetchFifo) => cost::TIMED,
+        Some(TmuModel::FirstMiss) => cost::FIRST_MISS,
+        None => cost::FUNCTIONAL + cost::FUNCTIONAL * (configs - 1) * part / of,
     }
 }
 

@@ -3,7 +3,7 @@
 use super::figures::Figures;
 use super::place::Place;
 use super::profile::{Profile, StreamCache, check_size};
-use crate::config::{BetweenFrames, CacheConfig, ConfigError, Order, RunConfig};
+use crate::config::{BetweenFrames, ConfigError, LevelConfig, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::order::{self, Phase};
 use crate::stream::{
@@ -264,7 +264,7 @@ impl Shared {
 impl Analysis {
     fn new(config: &RunConfig, merged: bool) -> Result<Self, ConfigError> {
         // Seeds as in a replay.
-        let profile = |level: &'static str, cache: &CacheConfig, number: u32| {
+        let profile = |level: &'static str, cache: &LevelConfig, number: u32| {
             Profile::new(StreamCache {
                 cache: *cache,
                 level,
@@ -277,16 +277,18 @@ impl Analysis {
             tile: None,
         };
         let core = |number| {
-            profile("L1", &config.l1, number).map(|profile| Core {
+            profile("L1", &config.level.l1, number).map(|profile| Core {
                 profile,
                 tile: None,
                 place: Place::default(),
             })
         };
-        let merged = merged.then(|| profile("L1", &config.l1, 1)).transpose()?;
+        let merged = merged
+            .then(|| profile("L1", &config.level.l1, 1))
+            .transpose()?;
         Ok(Self {
             l1: (1..=config.cores).map(core).collect::<Result<_, _>>()?,
-            l2: shared(profile("L2", &config.l2, 0)?),
+            l2: shared(profile("L2", &config.level.l2, 0)?),
             merged: merged.map(shared),
             places: None,
             flushed: Vec::new(),

@@ -4,7 +4,7 @@ use super::orders::{OrderFigures, Sequence, Stream};
 use super::place::Place;
 use super::profile::{Profile, StreamCache, check_size};
 use crate::addresses::{AddressError, KindSet, for_line_blocks};
-use crate::config::{CacheConfig, ConfigError, RunConfig};
+use crate::config::{ConfigError, LevelConfig, RunConfig};
 use formats::interop::plain::AddressFile;
 
 /// Look-ups of the first level that stand for a tile.
@@ -19,7 +19,7 @@ struct Level {
 impl Level {
     fn new(
         level: &'static str,
-        cache: &CacheConfig,
+        cache: &LevelConfig,
         config: &RunConfig,
         number: u64,
     ) -> Result<Self, ConfigError> {
@@ -55,7 +55,7 @@ impl Level {
 /// Sets that lines must be told apart by: those of the largest cache of the curves.
 fn most_sets(
     level: &'static str,
-    cache: &CacheConfig,
+    cache: &LevelConfig,
     line_bytes: u32,
 ) -> Result<u32, ConfigError> {
     /// What lines can be told apart by.
@@ -76,11 +76,11 @@ pub fn analyse_addresses(
     kinds: KindSet,
 ) -> Result<OrderFigures, AddressError> {
     check_size(config, 1)?;
-    let sets = [("L1", &config.l1), ("L2", &config.l2)]
+    let sets = [("L1", &config.level.l1), ("L2", &config.level.l2)]
         .map(|(level, cache)| most_sets(level, cache, config.line_bytes));
     let [l1_sets, l2_sets] = sets;
-    let mut l1 = Level::new("L1", &config.l1, config, 1)?;
-    let mut l2 = Level::new("L2", &config.l2, config, 0)?;
+    let mut l1 = Level::new("L1", &config.level.l1, config, 1)?;
+    let mut l2 = Level::new("L2", &config.level.l2, config, 0)?;
     let mut lookups = 0;
     let most_sets = l1_sets?.max(l2_sets?);
     for_line_blocks(file, config.line_bytes, most_sets, kinds, |block| {

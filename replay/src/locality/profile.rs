@@ -14,14 +14,14 @@ use super::place::{ByOrigin, Origin, Place, TileOfEye, add};
 use super::set_associative::{CacheHits, SetAssociative};
 use super::split::MissSplit;
 use super::working_set::WorkingSets;
-use crate::cache::{AnyCache, Cache};
-use crate::config::{CacheConfig, ConfigError, RunConfig};
+use crate::config::{ConfigError, LevelConfig, RunConfig, accept};
+use crate::memory::{AnyCache, Cache};
 
 /// The cache that a stream goes to.
 #[derive(Clone, Copy, Debug)]
 pub struct StreamCache {
     /// Size, ways and policy.
-    pub cache: CacheConfig,
+    pub cache: LevelConfig,
     /// `L1` or `L2`, for errors.
     pub level: &'static str,
     /// Bytes of a line.
@@ -45,17 +45,15 @@ const MOST_LINES: u64 = 1 << 21;
 /// # Errors
 /// Too many lines.
 pub(super) fn check_size(config: &RunConfig, first_levels: u32) -> Result<(), ConfigError> {
-    let lines = |cache: &CacheConfig| cache.size_bytes / u64::from(config.line_bytes);
-    let of_first = lines(&config.l1).saturating_mul(first_levels.into());
-    let found = of_first.saturating_add(lines(&config.l2));
-    if found <= MOST_LINES {
-        return Ok(());
-    }
-    Err(ConfigError::Range {
-        key: "lines of all L1 and L2 caches",
-        expected: "at most 2097152 for locality, whose curves go to sixteen times the size",
-        found: found.to_string(),
-    })
+    let lines = |cache: &LevelConfig| cache.size_bytes / u64::from(config.line_bytes);
+    let of_first = lines(&config.level.l1).saturating_mul(first_levels.into());
+    let found = of_first.saturating_add(lines(&config.level.l2));
+    accept(
+        found <= MOST_LINES,
+        "lines of all L1 and L2 caches",
+        "at most 2097152 for locality, whose curves go to sixteen times the size",
+        found,
+    )
 }
 
 /// Times of the first axis.

@@ -1,7 +1,7 @@
 //! Set-associative LRU caches of many sizes and ways, by the forest that sweeps use.
 
 use super::place::{ByOrigin, add};
-use crate::cache::Forest;
+use crate::memory::Forest;
 
 /// Hits of a cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

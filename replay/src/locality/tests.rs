@@ -3,7 +3,7 @@
 mod plain;
 
 use super::*;
-use crate::config::{BetweenFrames, CacheConfig, Mode, Order, Replacement, RunConfig};
+use crate::config::{BetweenFrames, LevelConfig, Levels, Mode, Order, Replacement, RunConfig};
 use crate::engine::replay;
 use crate::stream::MemoryTrace;
 use crate::stream::synthetic::Synthetic;
@@ -58,25 +58,25 @@ fn streams() -> impl Strategy<Value = Vec<Access>> {
     })
 }
 
-fn geometries() -> impl Strategy<Value = CacheConfig> {
+fn geometries() -> impl Strategy<Value = LevelConfig> {
     let ways = prop_oneof![Just(1_u32), Just(2), Just(3), Just(4), Just(8)];
     let policy = proptest::sample::select(Replacement::all().collect::<Vec<_>>());
     (0..5_u32, ways, policy)
-        .prop_map(|(sets, ways, replacement)| CacheConfig {
+        .prop_map(|(sets, ways, replacement)| LevelConfig {
             ways: if replacement == Replacement::TREE_PLRU && ways == 3 {
                 1
             } else {
                 ways
             },
             replacement,
-            ..CacheConfig::lru((u64::from(ways) << sets) * 16)
+            ..LevelConfig::lru((u64::from(ways) << sets) * 16)
         })
         .prop_filter("sets are powers of two", |cache| {
             cache.sets("L1", 16).is_ok()
         })
 }
 
-fn of(cache: &CacheConfig) -> StreamCache {
+fn of(cache: &LevelConfig) -> StreamCache {
     StreamCache {
         cache: *cache,
         level: "L1",
@@ -86,7 +86,7 @@ fn of(cache: &CacheConfig) -> StreamCache {
 }
 
 /// The analysis of a stream, on an axis so short that it is numbered anew all the time.
-fn analysed(stream: &[Access], cache: &CacheConfig) -> Figures {
+fn analysed(stream: &[Access], cache: &LevelConfig) -> Figures {
     let mut profile = Profile::with_axis(of(cache), 64).unwrap();
     let mut frame = None;
     for access in stream {
@@ -190,17 +190,16 @@ fn misses_are_those_of_a_replay() {
         (1, Replacement::RANDOM, 4, crate::config::Assign::FirstIdle),
     ];
     for (cores, replacement, ways, assign) in machines {
-        let cache = |size_bytes| CacheConfig {
+        let cache = |size_bytes| LevelConfig {
             ways,
             replacement,
-            ..CacheConfig::lru(size_bytes)
+            ..LevelConfig::lru(size_bytes)
         };
         let config = RunConfig {
             mode: crate::config::Mode::Functional,
             cores,
             assign,
-            l1: cache(2 << 10),
-            l2: cache(16 << 10),
+            level: Levels::two(cache(2 << 10), cache(16 << 10)),
             ..RunConfig::default()
         };
         let figures = analyse(&trace, &config, &orders, true, &|_| ()).unwrap();
@@ -253,15 +252,14 @@ fn caches_that_are_emptied_between_frames_find_in_each_frame_what_they_find_in_i
     let three = repeated(&one, 3);
     let orders = [Order::MORTON, Order::Z2_STA];
     for replacement in [Replacement::LRU, Replacement::RANDOM] {
-        let cache = |size_bytes| CacheConfig {
+        let cache = |size_bytes| LevelConfig {
             replacement,
-            ..CacheConfig::lru(size_bytes)
+            ..LevelConfig::lru(size_bytes)
         };
         let config = RunConfig {
             mode: Mode::Functional,
             between_frames: BetweenFrames::Flush,
-            l1: cache(2 << 10),
-            l2: cache(16 << 10),
+            level: Levels::two(cache(2 << 10), cache(16 << 10)),
             ..RunConfig::default()
         };
         let of = |trace: &MemoryTrace| analyse(trace, &config, &orders, true, &|_| ()).unwrap();

@@ -55,6 +55,14 @@ pub enum FrameError {
         /// Why.
         source: Box<dyn Error + Send + Sync>,
     },
+    /// Nodes and triangles lie in more lines than caches can tell apart.
+    #[error(
+        "hierarchy: expected fewer than 2^32 - 1 cache lines of nodes and triangles, found {lines}"
+    )]
+    Lines {
+        /// Lines of all nodes and triangles.
+        lines: u64,
+    },
     /// A tile has another number of pixel records than its size asks for.
     #[error("{eye} eye, tile {tile}: expected {expected} pixel records, found {found}")]
     Pixels {

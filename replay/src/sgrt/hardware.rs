@@ -4,7 +4,7 @@
 //! shade the one before and DMA moves the rows of the next, so a batch (a tile of one eye) takes
 //! the slowest of the three and a frame the sum over its batches.
 
-use super::cache::{self, Hierarchy, Misses};
+use super::cache::{self, DeviceCaches, Misses};
 use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::Decision;
@@ -17,7 +17,7 @@ use super::rows::RowNeeds;
 use super::srp::{self, SrpCycles};
 use super::tni::{self, TniCycles};
 use super::work::{BatchWork, RayClass};
-use formats::raytrace::RayTile;
+use formats::raytrace::{RayTile, Visit};
 use formats::view::Eye;
 use rayon::prelude::*;
 
@@ -196,7 +196,13 @@ pub fn misses_by_addresses(
     config: &SgrtConfig,
 ) -> Result<Vec<TileMisses>, FrameError> {
     let bvh = &frame.tables.bvh;
-    let [mut reference, mut reprojected] = [(); 2].map(|()| Hierarchy::new(config));
+    let last = bvh.triangles.checked_sub(1);
+    let end = last.map_or(0, |last| bvh.address(Visit::Triangle(last as u32)));
+    let lines = (end + u64::from(bvh.bytes_per_triangle)) / config.cache.line_bytes;
+    if lines >= DeviceCaches::MOST_LINES {
+        return Err(FrameError::Lines { lines });
+    }
+    let [mut reference, mut reprojected] = [(); 2].map(|()| DeviceCaches::new(config));
     let mut tile_data = RayTile::default();
     let mut out = vec![TileMisses::default(); work.len()];
     for ((tile, misses), work) in (0u32..).zip(&mut out).zip(work) {

@@ -92,6 +92,18 @@ impl Bins {
         })
     }
 
+    /// A cell for each kind of access, for lines that belong to no tile.
+    #[must_use]
+    pub fn of_kinds() -> Self {
+        Self {
+            by: CountBy::Texture,
+            first_levels: vec![0, 1],
+            views: Vec::new(),
+            first_tiles: Vec::new(),
+            tiles: 0,
+        }
+    }
+
     /// Cells of one view.
     fn view_cells(&self) -> usize {
         self.first_levels.last().copied().unwrap_or(0)

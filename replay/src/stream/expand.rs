@@ -13,10 +13,11 @@ use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, f
 use crate::config::RunConfig;
 use crate::order::TileRef;
 use crate::tmu::Pending;
+use formats::layout::Layout;
 use formats::textrace::Tile;
 use rayon::prelude::*;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Memory for the lines of all frames that are replayed at the same time.
 #[derive(Debug)]
@@ -138,6 +139,13 @@ impl<'a> Expander<'a> {
     #[must_use]
     pub fn bins(&self) -> &Bins {
         &self.bins
+    }
+
+    /// Where the textures lie under a configuration, for what needs it beside the lines.
+    #[must_use]
+    pub fn layout(&self, config: &RunConfig) -> Option<Arc<Layout>> {
+        let layout = Layout::new(&self.source.tables().textures, &config.layout);
+        layout.ok().map(Arc::new)
     }
 
     /// Lines of the whole address space.

@@ -26,6 +26,13 @@ impl Tag {
         ]
     }
 
+    /// The tag of a footprint of one line.
+    #[must_use]
+    pub fn of_line(cell: u32) -> Self {
+        let [first, _] = Self::of_footprint(cell, 0);
+        first
+    }
+
     /// True for a footprint's first line.
     #[inline(always)]
     #[must_use]
@@ -40,8 +47,10 @@ impl Tag {
         (self.0 & !Self::FIRST) >> Self::REPEATS_SHIFT
     }
 
+    /// Its cell within the view.
     #[inline(always)]
-    pub(super) fn cell(self) -> u32 {
+    #[must_use]
+    pub fn cell(self) -> u32 {
         self.0 & (Self::CELLS as u32 - 1)
     }
 }
@@ -204,6 +213,19 @@ pub struct QuadLines<'a> {
 }
 
 impl<'a> QuadLines<'a> {
+    /// Lines of no tile, each with its tag.
+    #[must_use]
+    pub fn of_lines(lines: &'a [u32], tags: &'a [Tag]) -> Self {
+        Self {
+            place: Place::default(),
+            footprints: lines.len() as u32,
+            lines,
+            tags,
+            distinct: &[],
+            uses: &[],
+        }
+    }
+
     /// Number of its tile, see [`super::Bins`].
     #[inline(always)]
     #[must_use]

@@ -219,11 +219,10 @@ impl Pipeline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Allocation;
+    use crate::config::{Allocation, TmuModel};
 
     const CONFIG: TmuConfig = TmuConfig {
-        l1_penalty_cycles: 20,
-        l2_penalty_cycles: 200,
+        model: TmuModel::Looping,
         loop_cycles: 36,
         threads: 4,
         retry_footprints: 4,

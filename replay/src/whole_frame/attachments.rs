@@ -2,7 +2,7 @@
 
 use super::vertices::ShadedView;
 use super::{Traffic, lines};
-use crate::memory::clients::{Client, FrameConfig, FrameMachine};
+use crate::access::{Client, FrameConfig, FrameMachine};
 use formats::textrace::geometry::ViewTarget;
 use formats::textrace::{Pass, PassKind};
 use formats::view::TILE_SIZE_PX;

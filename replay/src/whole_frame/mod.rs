@@ -12,8 +12,8 @@ mod write_back;
 #[cfg(test)]
 mod tests;
 
+use crate::access::{Client, ClientTraffic, FrameConfig, FrameMachine, GeometryCounts};
 use crate::config::RunConfig;
-use crate::memory::clients::{Client, ClientTraffic, FrameConfig, FrameMachine, GeometryCounts};
 use crate::order;
 use crate::stream::{StreamError, TileSource, shaded};
 use formats::textrace::PassKind;

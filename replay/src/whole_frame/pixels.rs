@@ -2,8 +2,8 @@
 
 use super::Traffic;
 use super::write_back::WriteBack;
+use crate::access::{Client, FrameConfig};
 use crate::config::RunConfig;
-use crate::memory::clients::{Client, FrameConfig};
 use crate::order::{Phase, TileRef};
 use crate::stream::{StreamError, TileSource};
 use formats::textrace::{Pass, Surfaces, Tile};

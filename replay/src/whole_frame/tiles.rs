@@ -3,9 +3,9 @@
 
 use super::vertices::{POSITION_BYTES, ShadedView};
 use super::{Traffic, lines};
-use crate::cache::{Lru, WaysOf};
+use crate::access::{Client, FrameConfig};
 use crate::config::RunConfig;
-use crate::memory::clients::{Client, FrameConfig};
+use crate::memory::{Lru, WaysOf};
 use crate::order::{Interleave, Phase, TileRef, WorkItem};
 use crate::stream::{StreamError, TileSource, interleaved};
 use formats::textrace::Tile;

@@ -1,8 +1,8 @@
 //! Vertex processing of a view: index and vertex fetch, reuse of shaded vertices, and what is written for the tiles.
 
 use super::{Traffic, lines};
-use crate::cache::{Lru, WaysOf};
-use crate::memory::clients::{Client, FrameConfig, FrameMachine, GeometryCounts};
+use crate::access::{Client, FrameConfig, FrameMachine, GeometryCounts};
+use crate::memory::{Lru, WaysOf};
 use formats::textrace::geometry::{Geometry, GeometryView, TileLists, ViewTarget};
 use formats::textrace::{Pass, Tables};
 use std::collections::VecDeque;

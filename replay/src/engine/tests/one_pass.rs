@@ -10,7 +10,7 @@ struct Twin {
 }
 
 impl Twin {
-    fn new(config: &CacheConfig) -> Self {
+    fn new(config: &LevelConfig) -> Self {
         Self {
             sets: vec![Vec::new(); config.sets("", 16).unwrap() as usize],
             ways: config.ways as usize,
@@ -32,8 +32,10 @@ impl Twin {
 
 /// Counters of both levels on the recorded stream, nothing left out.
 fn twin(sent: &[Sent], config: &RunConfig) -> (LevelCounters, LevelCounters) {
-    let mut l1: Vec<Twin> = (0..config.cores).map(|_| Twin::new(&config.l1)).collect();
-    let mut l2 = Twin::new(&config.l2);
+    let mut l1: Vec<Twin> = (0..config.cores)
+        .map(|_| Twin::new(&config.level.l1))
+        .collect();
+    let mut l2 = Twin::new(&config.level.l2);
     let (mut first, mut second) = (LevelCounters::default(), LevelCounters::default());
     for (core, _, lines) in sent {
         let missing: Vec<u32> = lines
@@ -80,8 +82,7 @@ fn a_thousand_sets_of_configurations_count_as_each_alone() {
         };
         let configs: Vec<RunConfig> = (0..=random.below(6))
             .map(|_| RunConfig {
-                l1: random.cache(32),
-                l2: random.cache(256),
+                level: Levels::two(random.cache(32), random.cache(256)),
                 tile_maps: random.below(3) == 0,
                 ..base
             })
@@ -105,7 +106,7 @@ fn what_cannot_share_a_pass_has_its_own() {
     let trace = small();
     let base = functional(Order::MORTON);
     let larger = |config: RunConfig| RunConfig {
-        l1: CacheConfig::lru(2 << 10),
+        level: Levels::two(LevelConfig::lru(2 << 10), config.level.l2),
         ..config
     };
     let with = |change: fn(&mut RunConfig)| {
@@ -117,7 +118,7 @@ fn what_cannot_share_a_pass_has_its_own() {
         base,
         larger(base),
         with(|c| c.order = Order::Z2_STA),
-        with(|c| c.l2.replacement = Replacement::FIFO),
+        with(|c| c.level.l2.replacement = Replacement::FIFO),
         with(|c| c.mode = Mode::Timed),
         larger(with(|c| c.mode = Mode::Timed)),
         with(|c| c.line_bytes = 32),

@@ -1,13 +1,14 @@
 //! The texture unit with a prefetching FIFO.
 
 use super::*;
-use crate::config::TmuConfig;
+use crate::config::{TmuConfig, TmuModel};
 
 fn config(fifo_footprints: u32, cores: u32) -> RunConfig {
     RunConfig {
-        mode: Mode::PrefetchFifo,
+        mode: Mode::Timed,
         cores,
         tmu: TmuConfig {
+            model: TmuModel::PrefetchFifo,
             fifo_footprints,
             ..TmuConfig::default()
         },
@@ -42,7 +43,7 @@ fn one_core_misses_what_functional_mode_misses() {
 fn a_fifo_of_one_footprint_hides_nothing() {
     let trace = small();
     let mut one = config(1, 1);
-    one.tmu.l2_penalty_cycles = 0;
+    one.memory_cycles = 0;
     let result = replay(&trace, &one).unwrap();
     // A miss takes 20 cycles, a hit one; none is in flight when the next footprint is looked up.
     let expected = result.footprints + 19 * result.l1.counters.footprint_misses;

@@ -1,8 +1,8 @@
 //! The plainest programs for each figure.
 
 use super::Access;
-use crate::cache::AnyCache;
 use crate::locality::{ByOrigin, MissSplit, Origin, StreamCache, WorkingSet};
+use crate::memory::AnyCache;
 use formats::view::Eye;
 use std::collections::{HashMap, HashSet};
 

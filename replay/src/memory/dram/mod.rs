@@ -1,7 +1,7 @@
 //! DRAM: what the lines that leave the last cache cost in row activations, time and energy.
 //!
 //! The model is open loop: requests arrive when the caches ask for them, and the caches' own latency
-//! ([`crate::config::TmuConfig::l2_penalty_cycles`]) stays what it is. Requests are reads of whole bursts.
+//! ([`crate::config::RunConfig::memory_cycles`]) stays what it is. Requests are reads of whole bursts.
 //!
 //! A channel schedules as FR-FCFS (Rixner et al., ISCA 2000): of the commands that may be issued first, reads of open
 //! rows go before others, and older requests before younger ones. A row is closed only when no queued request reads it.
@@ -17,6 +17,7 @@ pub use mapping::Mapping;
 pub use presets::{Device, DramPreset};
 pub use result::DramResult;
 
+use crate::config::{ConfigError, accept, in_range};
 use channel::Channel;
 use mapping::Mapper;
 use serde::{Deserialize, Serialize};
@@ -66,21 +67,19 @@ impl Default for DramConfig {
 }
 
 impl DramConfig {
-    /// The first value out of range: its key, what is accepted and what was found.
+    /// Checks every value.
     ///
     /// # Errors
-    /// See above.
-    pub fn check(&self) -> Result<(), (&'static str, &'static str, u32)> {
-        if !self.channels.is_power_of_two() || self.channels > 64 {
-            return Err(("dram.channels", "a power of two up to 64", self.channels));
-        }
-        if !(1..=1024).contains(&self.queue) {
-            return Err(("dram.queue", "1 to 1024", self.queue));
-        }
-        if !(1..=100_000).contains(&self.core_mhz) {
-            return Err(("dram.core_mhz", "1 to 100000", self.core_mhz));
-        }
-        Ok(())
+    /// The first one out of range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        accept(
+            self.channels.is_power_of_two() && self.channels <= 64,
+            "dram.channels",
+            "a power of two up to 64",
+            self.channels,
+        )?;
+        in_range("dram.queue", self.queue, 1..=1024)?;
+        in_range("dram.core_mhz", self.core_mhz, 1..=100_000)
     }
 }
 

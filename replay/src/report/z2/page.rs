@@ -332,7 +332,7 @@ fn configuration(report: &PaperReport) -> Markup {
     let text = toml::to_string(&report.config).unwrap_or_default();
     let orders: Vec<&str> = report.orders().into_iter().map(Order::title).collect();
     let caches = report.caches();
-    let mode = report.config.mode.name();
+    let mode = report.config.mode_name();
     html! {
         p {
             "Mode " (mode) "; varied: orders " (orders.join(", ")) "; L1/L2 " (caches.join(", ")) " KiB. "

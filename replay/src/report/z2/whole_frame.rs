@@ -2,8 +2,8 @@
 //! displays.
 
 use super::model::PaperReport;
+use crate::access::{Client, ClientTraffic};
 use crate::experiment::ResultRow;
-use crate::memory::clients::{Client, ClientTraffic};
 use crate::report::columns::Column;
 use crate::report::figures::whole_mj;
 use crate::report::html::{Section, figures};

@@ -1,0 +1,173 @@
+//! One cache level: a `[[level]]` table of a configuration.
+
+use super::{ConfigError, MOST_LINES, MOST_SETS, accept, is_zero};
+use crate::memory::Replacement;
+use crate::size::format_bytes;
+use serde::Serialize;
+
+/// A cache level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct LevelConfig {
+    /// Capacity in bytes.
+    pub size_bytes: u64,
+    /// Associativity.
+    pub ways: u32,
+    /// Replacement policy.
+    pub replacement: Replacement,
+    /// Lines that share a tag (a sectored cache); a miss fetches one of them.
+    #[serde(skip_serializing_if = "is_one")]
+    pub sectors: u32,
+    /// Lines of a fully associative victim cache beside it.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub victim_lines: u32,
+    /// Which lines of the levels above it holds.
+    #[serde(skip_serializing_if = "Inclusion::is_none")]
+    pub inclusion: Inclusion,
+    /// Line size in bytes, below the L2 only; none: that of the level above.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_bytes: Option<u32>,
+    /// One cache for all cores; if not, one for each core.
+    pub shared: bool,
+    /// Cycles that a line takes from this level to the level above; 0 for the L1.
+    pub hit_cycles: u32,
+}
+
+pub(super) fn is_one(value: &u32) -> bool {
+    *value == 1
+}
+
+impl LevelConfig {
+    /// A four-way LRU level of this size, shared, whose lines arrive at once.
+    #[must_use]
+    pub const fn lru(size_bytes: u64) -> Self {
+        Self {
+            size_bytes,
+            ways: 4,
+            replacement: Replacement::LRU,
+            sectors: 1,
+            victim_lines: 0,
+            inclusion: Inclusion::None,
+            line_bytes: None,
+            shared: true,
+            hit_cycles: 0,
+        }
+    }
+
+    /// True for LRU and one line per tag, alone: what stack distances describe.
+    #[must_use]
+    pub fn is_plain_lru(&self) -> bool {
+        self.replacement == Replacement::LRU
+            && (self.sectors, self.victim_lines) == (1, 0)
+            && self.inclusion.is_none()
+    }
+
+    /// Caches of the level in a machine of so many cores.
+    #[must_use]
+    pub const fn caches(&self, cores: u32) -> u32 {
+        if self.shared { 1 } else { cores }
+    }
+
+    /// Number of sets for this line size.
+    ///
+    /// # Errors
+    /// The sets must be a power of two, the ways such as the policy can have.
+    pub fn sets(&self, level: &'static str, line_bytes: u32) -> Result<u32, ConfigError> {
+        let (expected, accepts) = self.replacement.ways_rule();
+        if !accepts(self.ways) {
+            return Err(ConfigError::Ways {
+                level,
+                policy: self.replacement.name(),
+                expected,
+                found: self.ways,
+            });
+        }
+        self.check_parts(level)?;
+        let bytes_per_set = u64::from(self.ways) * u64::from(line_bytes) * u64::from(self.sectors);
+        let sets = self.size_bytes / bytes_per_set;
+        let is_whole = self.size_bytes.is_multiple_of(bytes_per_set);
+        if !is_whole || !sets.is_power_of_two() || sets > MOST_SETS {
+            return Err(ConfigError::Sets {
+                level,
+                size: format_bytes(self.size_bytes),
+                ways: self.ways,
+                line_bytes,
+                found: if is_whole {
+                    sets.to_string()
+                } else {
+                    (self.size_bytes as f64 / bytes_per_set as f64).to_string()
+                },
+            });
+        }
+        self.check_lines(level, line_bytes, 1)?;
+        Ok(sets as u32)
+    }
+
+    /// Checks that `caches` such caches have lines that this machine's memory can stand for.
+    pub(super) fn check_lines(
+        &self,
+        level: &'static str,
+        line_bytes: u32,
+        caches: u32,
+    ) -> Result<(), ConfigError> {
+        let lines = self.size_bytes / u64::from(line_bytes);
+        if lines.saturating_mul(caches.into()) > MOST_LINES {
+            return Err(ConfigError::Lines {
+                level,
+                size: format_bytes(self.size_bytes),
+                line_bytes,
+                caches,
+                found: lines,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks sectors, victim cache and time.
+    fn check_parts(&self, level: &'static str) -> Result<(), ConfigError> {
+        /// Sectors of a tag at most: a bit each.
+        const MOST_SECTORS: u32 = 64;
+        /// A victim cache is searched line by line.
+        const MOST_VICTIMS: u32 = 1024;
+        accept(
+            self.sectors.is_power_of_two() && self.sectors <= MOST_SECTORS,
+            "level.sectors",
+            "a power of two from 1 to 64",
+            format_args!("{} ({level})", self.sectors),
+        )?;
+        accept(
+            self.victim_lines <= MOST_VICTIMS,
+            "level.victim_lines",
+            "0 to 1024",
+            format_args!("{} ({level})", self.victim_lines),
+        )?;
+        accept(
+            self.hit_cycles <= 100_000,
+            "level.hit_cycles",
+            "0 to 100000",
+            format_args!("{} ({level})", self.hit_cycles),
+        )
+    }
+}
+
+/// Which lines of the levels above a level holds.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, serde::Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Inclusion {
+    /// Levels evict independently.
+    #[default]
+    None,
+    /// All of them: a line that the level evicts is invalidated in the levels above.
+    Inclusive,
+    /// None of them: the level holds what the level above evicted, and a hit moves the line up. Not for the L2.
+    Exclusive,
+}
+
+impl Inclusion {
+    /// True where levels evict independently.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+}

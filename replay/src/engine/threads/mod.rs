@@ -1,0 +1,175 @@
+//! Texture units on clocks: what threads do whose lines are not in the L1, a model a file (`tmu.model`).
+//!
+//! Each core's texture unit runs on its own clock. What the cores share, the L2 and the list of items, sees them in the
+//! order of time: it is the turn of the core whose clock is furthest behind. All else a core does on its own, so it runs
+//! on until it wants something shared and another core is behind.
+
+mod first_miss;
+mod items;
+mod looping;
+mod prefetch_fifo;
+
+use super::Machine;
+use super::batch::Outcome;
+use super::counts::CacheCounts;
+use crate::config::{Allocation, Assign, ConfigError, RunConfig, TmuModel};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, SecondLevel};
+use crate::order::Phase;
+use crate::stream::{Cores, StreamError, furthest_behind};
+use first_miss::FirstMiss;
+use formats::layout::Layout;
+use items::{Items, prefetch_upcoming};
+use looping::Looping;
+use prefetch_fifo::PrefetchFifo;
+use std::sync::Arc;
+
+/// The texture units of all cores, and the caches that they share.
+trait ThreadModel: Send {
+    /// A phase begins at a cycle.
+    fn start_phase(&mut self, cycle: u64);
+
+    /// The clock of each core.
+    fn clocks(&self) -> Vec<u64>;
+
+    /// Runs a core until it wants something shared after `until`: its cycle; the end of time if it is done.
+    fn run_core(
+        &mut self,
+        core: usize,
+        until: u64,
+        work: &mut Cores<'_>,
+        items: &mut Items<'_>,
+    ) -> Result<u64, StreamError>;
+
+    /// The cycle in which the last core was done.
+    fn end_phase(&mut self) -> u64;
+
+    /// Empties all caches and drops the lines in flight.
+    fn flush(&mut self);
+
+    /// What was counted until a cycle.
+    fn outcome(&self, cycles: u64) -> Outcome;
+}
+
+/// A machine whose texture units have clocks.
+struct Clocked<M> {
+    model: M,
+    /// Cycles until the last core was done.
+    cycles: u64,
+}
+
+impl<M: ThreadModel> Machine for Clocked<M> {
+    /// A phase starts when the last core is done with the one before.
+    fn run(
+        &mut self,
+        work: &mut Cores<'_>,
+        phases: &[Phase],
+        assign: Assign,
+    ) -> Result<(), StreamError> {
+        for phase in phases {
+            self.model.start_phase(self.cycles);
+            // A core that is done is at the end of time.
+            let mut clocks = self.model.clocks();
+            let mut items = Items::new(phase, assign, clocks.len());
+            while let Some((core, until)) = furthest_behind(&clocks) {
+                clocks[core] = self.model.run_core(core, until, work, &mut items)?;
+            }
+            self.cycles = self.model.end_phase();
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) {
+        self.model.flush();
+    }
+
+    fn outcome(&self, _config: &RunConfig) -> Outcome {
+        self.model.outcome(self.cycles)
+    }
+}
+
+/// L1 caches that fill later, over an L2 that does.
+struct Shared<D> {
+    l1: Vec<D>,
+    l2: SecondLevel<D>,
+    /// Cycles that a line takes from the L2 to an L1.
+    l2_cycles: u64,
+    counts: CacheCounts,
+}
+
+impl<D: DelayedFill> Shared<D> {
+    /// Lines arrive in an L1 within `l1_usual_cycles` after a miss of both levels, mostly.
+    fn new<C: Delay<Delayed = D>>(
+        caches: Caches<C>,
+        config: &RunConfig,
+        counts: CacheCounts,
+        path: MissPath,
+        [l1_usual_cycles, l2_usual_cycles]: [u64; 2],
+    ) -> Self {
+        let Caches { l1, l2 } = caches.delayed(l1_usual_cycles, l2_usual_cycles);
+        Self {
+            l1,
+            l2: SecondLevel::new(l2, path),
+            l2_cycles: config.level.l2.hit_cycles.into(),
+            counts,
+        }
+    }
+
+    /// Takes lines out of the L1 caches that lower levels have evicted.
+    #[inline(always)]
+    fn follow_evictions(&mut self, now: u64) {
+        let l1 = &mut self.l1;
+        self.l2.invalidate_l1(|line| {
+            let removed = l1.iter_mut().map(|cache| cache.remove(line, now));
+            removed.map(u64::from).sum()
+        });
+    }
+
+    fn flush(&mut self) {
+        self.l1.iter_mut().for_each(D::clear);
+        self.l2.clear();
+    }
+}
+
+/// The machine of a configuration whose texture units have clocks.
+///
+/// # Errors
+/// A geometry that cannot be built.
+pub(super) fn machine(
+    config: &RunConfig,
+    counts: CacheCounts,
+    layout: Option<&Arc<Layout>>,
+) -> Result<Box<dyn Machine>, ConfigError> {
+    let caches = Caches::build(config)?;
+    let allocates_on_miss = config.tmu.allocation == Allocation::OnMiss;
+    if allocates_on_miss || config.tmu.model == TmuModel::PrefetchFifo {
+        return machine_of(config, caches.allocate_on_miss(), counts, layout);
+    }
+    match caches.all_four_way() {
+        Ok(caches) => machine_of(config, caches, counts, layout),
+        Err(caches) => machine_of(config, caches, counts, layout),
+    }
+}
+
+/// The machine of a configuration with these caches.
+///
+/// # Errors
+/// A level below the L2 that cannot be built.
+pub(super) fn machine_of<C: Delay>(
+    config: &RunConfig,
+    caches: Caches<C>,
+    counts: CacheCounts,
+    layout: Option<&Arc<Layout>>,
+) -> Result<Box<dyn Machine>, ConfigError>
+where
+    C::Delayed: 'static,
+{
+    fn clocked(model: impl ThreadModel + 'static) -> Box<dyn Machine> {
+        Box::new(Clocked { model, cycles: 0 })
+    }
+    let path = MissPath::build(config, layout)?;
+    Ok(match config.tmu.model {
+        TmuModel::Looping => clocked(Looping::new(caches, config, counts, path)),
+        TmuModel::FirstMiss => clocked(FirstMiss::new(caches, config, counts, path)),
+        TmuModel::PrefetchFifo => clocked(PrefetchFifo::new(caches, config, counts, path)),
+    })
+}

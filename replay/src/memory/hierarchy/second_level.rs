@@ -1,0 +1,372 @@
+//! The L2 as the cores' L1 caches see it: one cache for all cores or one for each, their prefetchers and the path of
+//! their misses.
+
+use super::below::Below;
+use super::caches::of_core;
+use super::inclusion::Evictions;
+use crate::config::{ConfigError, PrefetchConfig, RunConfig};
+use crate::memory::Cache;
+use crate::memory::in_flight::{DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
+use crate::memory::policy::EMPTY;
+use crate::memory::prefetch::{Demand, Prefetcher};
+use crate::result::{MemoryResult, MshrResult, PrefetchResult, Timeline};
+use formats::layout::Layout;
+use std::collections::HashSet;
+use std::sync::Arc;
+
+/// What a configuration has beside and below the L2.
+pub struct MissPath {
+    below: Option<Below>,
+    /// By cache of the L2; empty without one.
+    prefetch: Vec<Prefetch>,
+    /// By cache of the L2, where their number is limited.
+    mshrs: Vec<LimitedMshrs>,
+    /// Where levels depend on what others evict.
+    evictions: Option<Evictions>,
+    /// True with a prefetcher or with evictions to follow: what comes after the answer to a request.
+    has_consequences: bool,
+    memory_cycles: u64,
+    /// Fetches by interval of time, where they are recorded.
+    fetched_lines: Option<Vec<u32>>,
+}
+
+impl MissPath {
+    /// Memory right below the L2, which is only counted.
+    #[must_use]
+    pub fn memory_alone() -> Self {
+        Self {
+            below: None,
+            prefetch: Vec::new(),
+            mshrs: Vec::new(),
+            evictions: None,
+            has_consequences: false,
+            memory_cycles: 0,
+            fetched_lines: None,
+        }
+    }
+
+    /// Empty levels below the L2; `layout` says where textures lie, if lines are textures.
+    ///
+    /// # Errors
+    /// A geometry that cannot be built.
+    pub fn build(config: &RunConfig, layout: Option<&Arc<Layout>>) -> Result<Self, ConfigError> {
+        let caches = 0..config.level.l2.caches(config.cores);
+        let mshrs = config.tmu.l2_mshrs;
+        let limited = caches.clone().filter(|_| mshrs > 0);
+        let prefetchers = caches.filter_map(|_| config.prefetch.as_ref());
+        Ok(Self {
+            below: Below::build(config)?,
+            prefetch: prefetchers
+                .map(|prefetch| Prefetch::new(prefetch, config.line_bytes, layout))
+                .collect(),
+            mshrs: limited.map(|_| LimitedMshrs::new(mshrs)).collect(),
+            evictions: Evictions::build(config),
+            has_consequences: config.prefetch.is_some() || config.level.depend_on_evictions(),
+            memory_cycles: config.memory_cycles.into(),
+            fetched_lines: config.timeline.then(Vec::new),
+        })
+    }
+
+    /// True where lines leave L1 caches because other levels evict them.
+    #[must_use]
+    pub fn invalidates(&self) -> bool {
+        self.evictions.is_some()
+    }
+
+    /// When a line that the L2 requests `now` is there.
+    #[inline(always)]
+    fn fetch(&mut self, core: usize, line: u32, now: u64) -> u64 {
+        if !self.mshrs.is_empty() {
+            return self.fetch_by_mshr(core, line, now);
+        }
+        self.read(core, line, now)
+    }
+
+    #[inline(never)]
+    fn fetch_by_mshr(&mut self, core: usize, line: u32, now: u64) -> u64 {
+        let start = of_core(&mut self.mshrs, core).start(now);
+        let arrival = self.read(core, line, start);
+        of_core(&mut self.mshrs, core).enter(arrival);
+        arrival
+    }
+
+    /// True if a fetch would wait for an MSHR.
+    fn is_busy(&mut self, core: usize, now: u64) -> bool {
+        !self.mshrs.is_empty() && of_core(&mut self.mshrs, core).are_in_use(now)
+    }
+
+    /// When a line is there that the path reads `now`.
+    #[inline(always)]
+    fn read(&mut self, core: usize, line: u32, now: u64) -> u64 {
+        if let Some(fetched_lines) = &mut self.fetched_lines {
+            let interval = (now / Timeline::INTERVAL_CYCLES) as usize;
+            if fetched_lines.len() <= interval {
+                fetched_lines.resize(interval + 1, 0);
+            }
+            fetched_lines[interval] += 1;
+        }
+        match &mut self.below {
+            None => now + self.memory_cycles,
+            Some(below) => below.read_at(core, line, now),
+        }
+    }
+}
+
+/// A prefetcher and the state of what it fetched.
+struct Prefetch {
+    prefetcher: Box<dyn Prefetcher>,
+    /// Prefetched lines without a demand request so far, whether they are still there or not.
+    unused: HashSet<u32>,
+    /// Lines that the last request asked to prefetch.
+    wanted: Vec<u32>,
+    counts: PrefetchResult,
+}
+
+impl Prefetch {
+    fn new(config: &PrefetchConfig, line_bytes: u32, layout: Option<&Arc<Layout>>) -> Self {
+        Self {
+            prefetcher: config.build(line_bytes, layout.cloned()),
+            unused: HashSet::new(),
+            wanted: Vec::new(),
+            counts: PrefetchResult::default(),
+        }
+    }
+
+    /// Counts a demand request and collects what is to be prefetched.
+    fn observe(&mut self, line: u32, answer: Answer) {
+        let is_first = self.unused.remove(&line);
+        let demand = match answer {
+            Answer::Miss(_) => Demand::Miss,
+            _ if is_first => Demand::FirstUse,
+            _ => Demand::Hit,
+        };
+        self.counts.evicted_lines += u64::from(is_first && demand == Demand::Miss);
+        self.counts.useful_lines += u64::from(demand == Demand::FirstUse);
+        let late = is_first && matches!(answer, Answer::InFlight(_));
+        self.counts.late_lines += u64::from(late);
+        self.wanted.clear();
+        self.prefetcher.observe(line, demand, &mut self.wanted);
+    }
+
+    fn fetched(&mut self, line: u32) {
+        self.counts.lines += 1;
+        self.unused.insert(line);
+    }
+}
+
+/// How the L2 answers a request of an L1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// The line is there.
+    Hit,
+    /// It is in flight and arrives then.
+    InFlight(u64),
+    /// It is fetched and arrives then.
+    Miss(u64),
+}
+
+/// The L2 and what lies beside and below it.
+pub struct SecondLevel<C> {
+    /// One, or one for each core.
+    caches: Vec<C>,
+    path: MissPath,
+}
+
+impl<C> SecondLevel<C> {
+    /// Empty caches over a path for their misses.
+    pub fn new(caches: Vec<C>, path: MissPath) -> Self {
+        Self { caches, path }
+    }
+
+    /// The cache that a core uses.
+    #[inline(always)]
+    pub fn cache(&mut self, core: usize) -> &mut C {
+        of_core(&mut self.caches, core)
+    }
+
+    /// What was counted beside and below the L2, all requests answered.
+    #[must_use]
+    pub fn result(&self) -> MemoryResult {
+        let path = &self.path;
+        let (lower_levels, dram) =
+            (path.below.as_ref()).map_or_else(Default::default, Below::result);
+        let prefetch = path.prefetch.iter().map(|prefetch| prefetch.counts);
+        let mshrs = path.mshrs.iter().map(|mshrs| mshrs.counts);
+        MemoryResult {
+            prefetch: prefetch.reduce(PrefetchResult::plus),
+            l2_mshrs: mshrs.reduce(MshrResult::plus),
+            invalidated_lines: (path.evictions.as_ref())
+                .map(|evictions| evictions.invalidated_lines),
+            lower_levels,
+            dram,
+        }
+    }
+
+    /// Fetches by interval of time; nothing where they are not recorded.
+    #[must_use]
+    pub fn fetched_lines(&self) -> &[u32] {
+        self.path.fetched_lines.as_deref().unwrap_or_default()
+    }
+
+    /// Lines of the next work item that are prefetched when an item starts, at most.
+    #[must_use]
+    pub fn lines_of_next_item(&self) -> usize {
+        let prefetch = self.path.prefetch.first();
+        prefetch.map_or(0, |prefetch| prefetch.prefetcher.lines_of_next_item())
+    }
+
+    /// Takes lines that inclusive levels have evicted out of the L1 caches: `remove` takes one out of all of them and returns
+    /// how many held it.
+    #[inline(always)]
+    pub fn invalidate_l1(&mut self, remove: impl FnMut(u32) -> u64) {
+        if let Some(evictions) = &mut self.path.evictions
+            && evictions.are_pending()
+        {
+            evictions.invalidate_l1(remove);
+        }
+    }
+
+    fn clear_path(&mut self) {
+        self.path.below.iter_mut().for_each(Below::clear);
+        self.path.mshrs.iter_mut().for_each(LimitedMshrs::clear);
+        for prefetch in &mut self.path.prefetch {
+            prefetch.unused.clear();
+        }
+    }
+}
+
+/// Where time passes.
+impl<D: DelayedFill> SecondLevel<D> {
+    /// Answers a core's request; a line that misses is fetched.
+    #[inline(always)]
+    pub fn request(&mut self, core: usize, line: u32, now: u64) -> Answer {
+        let cache = of_core(&mut self.caches, core);
+        let answer = match cache.look_up(line, now) {
+            0 => Answer::Hit,
+            NOT_IN_FLIGHT => {
+                let arrival = self.path.fetch(core, line, now);
+                cache.enter(line, now, arrival);
+                Answer::Miss(arrival)
+            }
+            arrival => Answer::InFlight(arrival),
+        };
+        if self.path.has_consequences {
+            self.prefetch(core, line, now, answer);
+            self.follow_evictions(now);
+        }
+        answer
+    }
+
+    #[inline(never)]
+    fn follow_evictions(&mut self, now: u64) {
+        if let Some(evictions) = &mut self.path.evictions {
+            for cache in &mut self.caches {
+                cache.take_evicted(&mut evictions.evicted);
+            }
+            evictions.follow(self.path.below.as_mut(), |line| {
+                let removed = self.caches.iter_mut().map(|cache| cache.remove(line, now));
+                removed.map(u64::from).sum()
+            });
+        }
+    }
+
+    #[inline(never)]
+    fn prefetch(&mut self, core: usize, line: u32, now: u64, answer: Answer) {
+        if !self.path.prefetch.is_empty() {
+            of_core(&mut self.path.prefetch, core).observe(line, answer);
+            self.fetch_wanted(core, now);
+        }
+    }
+
+    /// Fetches lines of the work item that comes next, as an item starts.
+    pub fn prefetch_item(&mut self, core: usize, lines: &[u32], now: u64) {
+        if !self.path.prefetch.is_empty() {
+            let wanted = &mut of_core(&mut self.path.prefetch, core).wanted;
+            wanted.clear();
+            wanted.extend_from_slice(lines);
+            self.fetch_wanted(core, now);
+            self.follow_evictions(now);
+        }
+    }
+
+    fn fetch_wanted(&mut self, core: usize, now: u64) {
+        let wanted = std::mem::take(&mut of_core(&mut self.path.prefetch, core).wanted);
+        for &line in &wanted {
+            let cache = of_core(&mut self.caches, core);
+            if line != EMPTY && !cache.holds(line, now) {
+                if self.path.is_busy(core, now) {
+                    of_core(&mut self.path.prefetch, core).counts.dropped_lines += 1;
+                    continue;
+                }
+                cache.enter(line, now, self.path.fetch(core, line, now));
+                of_core(&mut self.path.prefetch, core).fetched(line);
+            }
+        }
+        of_core(&mut self.path.prefetch, core).wanted = wanted;
+    }
+
+    /// Empties the levels and drops the lines in flight.
+    pub fn clear(&mut self) {
+        self.caches.iter_mut().for_each(D::clear);
+        self.clear_path();
+    }
+}
+
+/// Where time does not pass: what is fetched is there at once.
+impl<C: Cache> SecondLevel<C> {
+    /// A core looks up a line, and fills it if it misses. True for a hit.
+    #[inline(always)]
+    pub fn access(&mut self, core: usize, line: u32) -> bool {
+        let hit = of_core(&mut self.caches, core).access(line);
+        if !hit && let Some(below) = &mut self.path.below {
+            below.read(core, line);
+        }
+        if self.path.has_consequences {
+            self.prefetch_at_once(core, line, hit);
+            self.follow_evictions_at_once();
+        }
+        hit
+    }
+
+    #[inline(never)]
+    fn follow_evictions_at_once(&mut self) {
+        if let Some(evictions) = &mut self.path.evictions {
+            for cache in &mut self.caches {
+                cache.take_evicted(&mut evictions.evicted);
+            }
+            evictions.follow(self.path.below.as_mut(), |line| {
+                let removed = self.caches.iter_mut().map(|cache| cache.remove(line));
+                removed.map(u64::from).sum()
+            });
+        }
+    }
+
+    #[inline(never)]
+    fn prefetch_at_once(&mut self, core: usize, line: u32, hit: bool) {
+        if self.path.prefetch.is_empty() {
+            return;
+        }
+        let prefetch = of_core(&mut self.path.prefetch, core);
+        prefetch.observe(line, if hit { Answer::Hit } else { Answer::Miss(0) });
+        for index in 0..prefetch.wanted.len() {
+            let line = prefetch.wanted[index];
+            let cache = of_core(&mut self.caches, core);
+            if line != EMPTY && !cache.contains(line) {
+                if let Some(below) = &mut self.path.below {
+                    below.read(core, line);
+                }
+                cache.fill(line);
+                prefetch.fetched(line);
+            }
+        }
+    }
+
+    /// Empties the levels.
+    pub fn empty(&mut self) {
+        self.caches.iter_mut().for_each(C::clear);
+        self.clear_path();
+    }
+}
+
+#[cfg(test)]
+mod tests;
