@@ -1,12 +1,13 @@
 //! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
 
+mod dram;
 mod error;
+mod frame;
 mod level;
 mod levels;
 mod prefetch;
 mod tmu;
 
-use crate::access::FrameConfig;
 use crate::memory::dram::DramConfig;
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +21,8 @@ pub use formats::footprint::{
 };
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
 use formats::view::TILE_SIZE_PX;
-pub use level::{Inclusion, LevelConfig};
+pub use frame::{FrameConfig, FrameMachine};
+pub use level::{Inclusion, LevelClients, LevelConfig};
 pub use levels::Levels;
 pub use prefetch::{PrefetchConfig, Prefetching};
 pub use tmu::{Allocation, TmuConfig, TmuModel};
@@ -261,9 +263,9 @@ impl RunConfig {
             self.tile_px,
         )?;
         accept(
-            self.frame.is_none() || self.tile_px == TILE_SIZE_PX,
+            self.frame.is_none() || self.tile_px >= TILE_SIZE_PX,
             "tile_px",
-            "16 with [frame], whose primitive lists are recorded by tile",
+            "16, 32 or 64 with [frame], whose primitive lists are recorded by tiles of 16",
             self.tile_px,
         )?;
         let align = self.layout.base_align_bytes;

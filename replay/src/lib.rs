@@ -1,7 +1,7 @@
 //! Trace to answer: replays texture traces through caches and a texture unit in any tile order,
 //! and ray traces through a model of a mobile ray-tracing GPU.
 
-pub mod access;
+mod access;
 pub mod accuracy;
 pub mod addresses;
 pub mod cli;
@@ -25,4 +25,3 @@ pub mod size;
 pub mod stream;
 pub mod techniques;
 mod tmu;
-mod whole_frame;

@@ -1,6 +1,6 @@
 //! What a replay yields: plain data that the models fill and the printers read.
 
-use crate::access::{ClientTraffic, GeometryCounts};
+use crate::memory::Client;
 use crate::memory::dram::DramResult;
 use formats::textrace::TraceMeta;
 use serde::{Deserialize, Serialize};
@@ -123,6 +123,42 @@ pub struct LowerLevelResult {
     pub line_misses: u64,
     /// Look-ups of a line whose fetch was in flight (timed and first-miss mode only).
     pub secondary_misses: u64,
+}
+
+/// Traffic of a client between chip and memory, over all frames.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClientTraffic {
+    /// Who.
+    pub client: Client,
+    /// Bytes read.
+    pub read_bytes: u64,
+    /// Bytes written.
+    pub write_bytes: u64,
+    /// Energy of these bytes in the DRAM, millijoules ([`Device::pj_per_byte`]).
+    ///
+    /// [`Device::pj_per_byte`]: crate::memory::dram::Device::pj_per_byte
+    pub energy_mj: f64,
+}
+
+impl ClientTraffic {
+    /// Read and written.
+    #[must_use]
+    pub const fn bytes(&self) -> u64 {
+        self.read_bytes + self.write_bytes
+    }
+}
+
+/// What vertex processing and binning did, over all frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GeometryCounts {
+    /// Triangles of the draws that were submitted, over all views.
+    pub triangles_submitted: u64,
+    /// Those that enter any tile.
+    pub triangles_binned: u64,
+    /// Vertex shader invocations.
+    pub vertices_shaded: u64,
+    /// Entries of all primitive lists.
+    pub list_entries: u64,
 }
 
 /// What is counted beside and below the L2: nothing unless a configuration has more than two caches and memory.

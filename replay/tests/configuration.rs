@@ -2,11 +2,11 @@
 //! from the types themselves. `UPDATE_DOCS=1` rewrites the page; review the diff.
 
 use clap::ValueEnum;
-use replay::access::{FrameConfig, FrameMachine};
 use replay::config::{
-    Allocation, Assign, BetweenFrames, CountBy, Hsr, Inclusion, Levels, Mode, Order,
+    Allocation, Assign, BetweenFrames, CountBy, Hsr, Inclusion, LevelClients, Levels, Mode, Order,
     PrefetchConfig, Prefetching, Replacement, RunConfig, TmuModel,
 };
+use replay::config::{FrameConfig, FrameMachine};
 use replay::memory::dram::{DramConfig, DramPreset, Mapping, PagePolicy};
 use std::fmt::Write as _;
 use std::fs;
@@ -126,6 +126,7 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
         "BetweenFrames" => of::<BetweenFrames>(),
         "CountBy" => of::<CountBy>(),
         "Inclusion" => of::<Inclusion>(),
+        "LevelClients" => of::<LevelClients>(),
         "DramPreset" => of::<DramPreset>(),
         "Mapping" => of::<Mapping>(),
         "PagePolicy" => of::<PagePolicy>(),
@@ -220,12 +221,14 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             "between_frames" => Value::try_from(BetweenFrames::default()).ok(),
             "count_by" => Value::try_from(CountBy::default()).ok(),
             "tile_px" => Some(Value::Integer(16)),
+            "frame.color_compressed_permille" => Some(Value::Integer(1000)),
             "tmu.fifo_footprints" => Some(Value::Integer(64)),
             "tmu.l2_mshrs" => Some(Value::Integer(0)),
             _ => match name {
                 "sectors" => Some(Value::Integer(1)),
                 "victim_lines" => Some(Value::Integer(0)),
                 "inclusion" => Value::try_from(Inclusion::default()).ok(),
+                "clients" => Value::try_from(LevelClients::default()).ok(),
                 _ => None,
             },
         };
@@ -259,7 +262,7 @@ fn page() -> String {
         "replay/src/config/level.rs",
         "replay/src/config/prefetch.rs",
         "replay/src/config/tmu.rs",
-        "replay/src/access/mod.rs",
+        "replay/src/config/frame.rs",
         "replay/src/memory/dram/mod.rs",
         "replay/src/memory/dram/mapping.rs",
         "replay/src/memory/dram/presets.rs",
@@ -305,9 +308,9 @@ fn every_key_has_a_line_that_says_what_it_is() {
         .lines()
         .filter(|line| line.starts_with("| `"))
         .collect();
-    // Three keys have no default, and eleven are written where they are another.
+    // Three keys have no default, and thirteen are written where they are another.
     let written = count(&defaults());
-    assert_eq!(keys.len(), written + 14);
+    assert_eq!(keys.len(), written + 16);
     for line in keys {
         let about = line.split(" | ").last().unwrap();
         assert!(about.len() > 8, "{line}");

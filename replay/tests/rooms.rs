@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 /// From the bottom up. A room may use rooms below it; those on one floor may use each other.
 const FLOORS: [&[&str]; 12] = [
     &["files", "model_version", "palette", "registry", "size"],
-    &["access", "config", "memory", "order", "result"],
+    &["config", "memory", "order", "result"],
     &["paper", "preset", "tmu"],
     &["stream"],
-    &["whole_frame"],
+    &["access"],
     &["engine"],
     &["addresses", "compare", "locality"],
     &["sgrt"],

@@ -8,7 +8,7 @@ use formats::layout::{Layout, LayoutConfig};
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
 use formats::view::Eye;
-use replay::access::{FrameConfig, FrameMachine};
+use replay::config::{FrameConfig, FrameMachine};
 use replay::config::{Hsr, Levels, Mode, PrefetchConfig, RunConfig, TmuConfig, TmuModel};
 use replay::memory::dram::DramConfig;
 use replay::sgrt::compose::Reuse;

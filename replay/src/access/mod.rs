@@ -1,221 +1,259 @@
-//! The clients of memory in a whole frame, and the machine that they belong to.
+//! The clients of memory beside the texture units: what vertex processing, tiles, attachments and composition read and
+//! write, in the order of rendering.
+//!
+//! [`FrameClients`] follows the engine: a frame starts, cores take work items, the frame ends. Each step yields accesses of
+//! whole lines, in order. Each client has caches of its own, so that no client evicts another's lines there; what leaves them
+//! goes to the levels that all clients share, if there are any, and to DRAM.
 
-use crate::config::{ConfigError, accept, in_range};
-use serde::{Deserialize, Serialize};
+mod attachments;
+mod buffers;
+mod compression;
+mod lists;
+mod pixels;
+mod tiles;
+mod vertices;
+mod write_back;
 
-/// Who reads or writes memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Client {
-    /// Texture units.
-    Texture,
-    /// Index fetch of vertex processing.
-    Index,
-    /// Vertex fetch of vertex processing.
-    Vertex,
-    /// Positions and varyings of shaded vertices, written by vertex processing and read by each tile.
-    ShadedVertex,
-    /// The primitive lists of the tiles.
-    PrimitiveList,
-    /// Colour attachments.
-    Colour,
-    /// Depth attachments, shadow maps included.
-    Depth,
-    /// The G-buffer of deferred shading.
-    GBuffer,
-    /// Composition of layers and the lens warp.
-    Composition,
-}
+#[cfg(test)]
+mod tests;
 
-impl Client {
-    /// Every client, in the order of tables.
-    pub const ALL: [Self; 9] = [
-        Self::Texture,
-        Self::Index,
-        Self::Vertex,
-        Self::ShadedVertex,
-        Self::PrimitiveList,
-        Self::Colour,
-        Self::Depth,
-        Self::GBuffer,
-        Self::Composition,
-    ];
+use crate::config::{FrameConfig, FrameMachine, RunConfig};
+use crate::memory::{Access, Client};
+use crate::order::{TileRef, WorkItem};
+use crate::result::{ClientTraffic, GeometryCounts};
+use crate::stream::{Rendered, StreamError, TileSource, rendered};
+pub use compression::permille as compressed_permille;
 
-    /// Name in tables and files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Texture => "texture",
-            Self::Index => "index",
-            Self::Vertex => "vertex",
-            Self::ShadedVertex => "shaded-vertex",
-            Self::PrimitiveList => "primitive-list",
-            Self::Colour => "colour",
-            Self::Depth => "depth",
-            Self::GBuffer => "g-buffer",
-            Self::Composition => "composition",
-        }
-    }
-}
+use attachments::Attachments;
+use buffers::Buffers;
+use formats::textrace::PassKind;
+use formats::textrace::geometry::{Geometry, ViewTarget};
+use pixels::Pixels;
+use tiles::Tiles;
+use vertices::{Reuse, ShadedView};
 
-/// Traffic of a client between chip and memory, over all frames.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ClientTraffic {
-    /// Who.
-    pub client: Client,
-    /// Bytes read.
-    pub read_bytes: u64,
-    /// Bytes written.
-    pub write_bytes: u64,
-    /// Energy of these bytes in the DRAM, millijoules ([`Device::pj_per_byte`]).
-    ///
-    /// [`Device::pj_per_byte`]: crate::memory::dram::Device::pj_per_byte
-    pub energy_mj: f64,
-}
-
-impl ClientTraffic {
+/// Bytes by client, and the accesses since they were last taken.
+#[derive(Debug)]
+struct Traffic {
     /// Read and written.
-    #[must_use]
-    pub const fn bytes(&self) -> u64 {
-        self.read_bytes + self.write_bytes
+    bytes: [[u64; 2]; Client::ALL.len()],
+    accesses: Vec<Access>,
+    line_bytes: u64,
+}
+
+impl Traffic {
+    fn read(&mut self, client: Client, address: u64, bytes: u64) {
+        self.access(client, false, address, bytes);
     }
-}
 
-/// What vertex processing and binning did, over all frames.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct GeometryCounts {
-    /// Triangles of the draws that were submitted, over all views.
-    pub triangles_submitted: u64,
-    /// Those that enter any tile.
-    pub triangles_binned: u64,
-    /// Vertex shader invocations.
-    pub vertices_shaded: u64,
-    /// Entries of all primitive lists.
-    pub list_entries: u64,
-}
+    fn write(&mut self, client: Client, address: u64, bytes: u64) {
+        self.access(client, true, address, bytes);
+    }
 
-/// How a frame is rendered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum FrameMachine {
-    /// Tile by tile on chip; a G-buffer, if there is one, stays in pixel-local storage.
-    #[default]
-    TileBased,
-    /// Tile by tile, with a G-buffer that is written to memory and read again.
-    TileBasedGBuffer,
-    /// Colour and depth through caches of their own; shaded vertices stay on chip.
-    Immediate,
-}
-
-/// The machine around the texture units, for the traffic of a whole frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct FrameConfig {
-    /// How the frame is rendered.
-    pub machine: FrameMachine,
-    /// Both eyes' vertices are read and shaded once; positions are still written for each eye.
-    pub multiview: bool,
-    /// Layers are composed and the lens warp reads each picture and writes the display's.
-    pub composition: bool,
-    /// Bytes of a pixel of a colour attachment.
-    pub color_bytes: u32,
-    /// Bytes of a pixel of a depth attachment.
-    pub depth_bytes: u32,
-    /// Bytes of a pixel of the G-buffer.
-    pub g_buffer_bytes: u32,
-    /// Samples of a pixel. A tile-based machine resolves them on chip.
-    pub samples: u32,
-    /// Depth of pictures and layers is written to memory; that of shadow maps always is.
-    pub store_depth: bool,
-    /// Line size of all but the texture caches.
-    pub line_bytes: u32,
-    /// Shaded vertices that are kept for reuse within a draw (first in, first out).
-    pub post_transform_entries: u32,
-    /// Vertex fetch cache, 4-way LRU.
-    pub vertex_cache_bytes: u64,
-    /// Bytes of a shaded vertex besides its position of 16 bytes.
-    pub varying_bytes: u32,
-    /// Cache of each core for shaded vertices, 4-way LRU.
-    pub shaded_vertex_cache_bytes: u64,
-    /// Bytes of an entry of a primitive list.
-    pub list_entry_bytes: u32,
-    /// Colour cache and depth cache of each core of an immediate machine, 4-way LRU, write-back.
-    pub pixel_cache_bytes: u64,
-}
-
-impl Default for FrameConfig {
-    fn default() -> Self {
-        Self {
-            machine: FrameMachine::TileBased,
-            multiview: false,
-            composition: true,
-            color_bytes: 4,
-            depth_bytes: 4,
-            g_buffer_bytes: 16,
-            samples: 1,
-            store_depth: false,
-            line_bytes: 64,
-            post_transform_entries: 32,
-            vertex_cache_bytes: 8 << 10,
-            varying_bytes: 32,
-            shaded_vertex_cache_bytes: 16 << 10,
-            list_entry_bytes: 4,
-            pixel_cache_bytes: 16 << 10,
+    /// Whole lines, from that of the first byte on.
+    fn access(&mut self, client: Client, write: bool, address: u64, bytes: u64) {
+        if bytes == 0 {
+            return;
         }
+        let first = address / self.line_bytes * self.line_bytes;
+        let bytes = (address + bytes - first).next_multiple_of(self.line_bytes);
+        self.bytes[client as usize][usize::from(write)] += bytes;
+        self.accesses.push(Access {
+            client,
+            write,
+            address: first,
+            bytes,
+        });
     }
 }
 
-impl FrameConfig {
-    /// Checks every value.
+/// The clients of one replay.
+pub struct FrameClients<'a> {
+    source: &'a dyn TileSource,
+    geometry: &'a Geometry,
+    /// The quads that hidden-surface removal leaves, in tiles of the configuration's size.
+    rendered: Rendered<'a>,
+    config: RunConfig,
+    machine: FrameConfig,
+    buffers: Buffers,
+    traffic: Traffic,
+    counts: GeometryCounts,
+    views: Vec<ShadedView>,
+    attachments: Attachments,
+    /// Of a tile-based machine.
+    tiles: Option<Tiles>,
+    /// Of an immediate machine.
+    pixels: Option<Pixels>,
+    /// The item of each core that is not resolved yet.
+    current: Vec<Option<WorkItem>>,
+}
+
+impl<'a> FrameClients<'a> {
+    /// The clients of a machine that renders `source`, whose textures lie below `texture_bytes`.
     ///
     /// # Errors
-    /// The first one out of range.
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        let line = self.line_bytes;
-        accept(
-            [32, 64, 128].contains(&line),
-            "frame.line_bytes",
-            "32, 64 or 128",
-            line,
-        )?;
-        accept(
-            [1, 2, 4, 8].contains(&self.samples),
-            "frame.samples",
-            "1, 2, 4 or 8",
-            self.samples,
-        )?;
-        for (key, value, least, most) in [
-            ("frame.color_bytes", self.color_bytes, 1, 64),
-            ("frame.depth_bytes", self.depth_bytes, 1, 64),
-            ("frame.g_buffer_bytes", self.g_buffer_bytes, 1, 64),
-            (
-                "frame.post_transform_entries",
-                self.post_transform_entries,
-                3,
-                4096,
-            ),
-            ("frame.varying_bytes", self.varying_bytes, 0, 1024),
-            ("frame.list_entry_bytes", self.list_entry_bytes, 1, 64),
-        ] {
-            in_range(key, value, least..=most)?;
+    /// A trace without geometry, or without the fragments that hidden-surface removal needs.
+    pub fn new(
+        source: &'a dyn TileSource,
+        config: &RunConfig,
+        machine: FrameConfig,
+        texture_bytes: u64,
+    ) -> Result<Self, StreamError> {
+        let geometry = source.geometry().ok_or_else(missing)?;
+        Ok(Self {
+            source,
+            geometry,
+            rendered: rendered(source, config)?,
+            config: *config,
+            machine,
+            buffers: Buffers::new(geometry, texture_bytes, machine.line_bytes.into()),
+            traffic: Traffic {
+                bytes: Default::default(),
+                accesses: Vec::new(),
+                line_bytes: machine.line_bytes.into(),
+            },
+            counts: GeometryCounts::default(),
+            views: Vec::new(),
+            attachments: Attachments::default(),
+            tiles: None,
+            pixels: None,
+            current: vec![None; config.cores as usize],
+        })
+    }
+
+    /// Runs vertex processing and binning for the views of a frame, and renders its shadow maps.
+    ///
+    /// # Errors
+    /// Lists that cannot be read.
+    pub fn start_frame(&mut self, frame: u32) -> Result<(), StreamError> {
+        self.views.clear();
+        self.buffers.start_frame();
+        let tables = self.source.tables();
+        for (number, view) in self.geometry.views.iter().enumerate() {
+            if view.frame != frame {
+                continue;
+            }
+            let recorded = self.source.tile_lists(number)?;
+            let lists = lists::regrouped(recorded, view.size_px, self.config.tile_px);
+            let pass = match view.target {
+                ViewTarget::Pass(pass) => tables.passes.get(pass as usize),
+                ViewTarget::ShadowMap(_) => None,
+            };
+            // With multiview, a later picture or layer of the same number takes over what an earlier one read.
+            let partner = self.views.iter().position(|other| {
+                self.machine.multiview
+                    && pass.zip(other.pass(tables)).is_some_and(|(a, b)| {
+                        a.eye != b.eye
+                            && (a.kind, a.layer) == (b.kind, b.layer)
+                            && a.kind != PassKind::Shadow
+                    })
+            });
+            let reuse = match partner {
+                Some(partner) => Reuse::Of(&self.views[partner], partner),
+                None => Reuse::None,
+            };
+            let mut vertices = vertices::Stage {
+                geometry: self.geometry,
+                tables,
+                machine: &self.machine,
+                buffers: &mut self.buffers,
+                traffic: &mut self.traffic,
+                counts: &mut self.counts,
+            };
+            let shaded = vertices.shade(*view, lists, &reuse);
+            self.views.push(shaded);
         }
-        for (key, bytes) in [
-            ("frame.vertex_cache_bytes", self.vertex_cache_bytes),
-            (
-                "frame.shaded_vertex_cache_bytes",
-                self.shaded_vertex_cache_bytes,
-            ),
-            ("frame.pixel_cache_bytes", self.pixel_cache_bytes),
-        ] {
-            let lines = bytes / u64::from(line);
-            let is_whole = bytes.is_multiple_of(line.into()) && lines.is_power_of_two();
-            accept(
-                is_whole && (4..=1 << 16).contains(&lines),
-                key,
-                "4 to 65536 lines in a power-of-two number of 4-way sets",
-                bytes,
-            )?;
+        self.attachments =
+            Attachments::new(&self.views, &self.machine, &self.config, &mut self.buffers);
+        if self.machine.machine == FrameMachine::Immediate {
+            self.pixels = Some(Pixels::new(
+                tables,
+                &self.views,
+                &self.config,
+                &self.machine,
+                &mut self.buffers,
+            ));
+        } else {
+            let mut tiles = Tiles::new(&self.config, &self.machine);
+            tiles.shadow_maps(&self.views, &mut self.traffic);
+            self.tiles = Some(tiles);
+        }
+        self.attachments.shadow_maps(&mut self.traffic);
+        Ok(())
+    }
+
+    /// A core is done with its item and takes another.
+    ///
+    /// # Errors
+    /// A tile that cannot be read.
+    pub fn start_item(&mut self, core: usize, item: &WorkItem) -> Result<(), StreamError> {
+        self.resolve(core);
+        self.current[core] = Some(*item);
+        if let Some(tiles) = &mut self.tiles {
+            tiles.item(core, item, &self.rendered, &self.views, &mut self.traffic)?;
+        }
+        if let Some(pixels) = &mut self.pixels {
+            pixels.item(core, item, &self.rendered, &mut self.traffic)?;
         }
         Ok(())
     }
+
+    /// Writes the tiles of the core's item, which are done.
+    fn resolve(&mut self, core: usize) {
+        if let Some(item) = self.current[core].take() {
+            for TileRef { pass, tile } in item.tiles() {
+                self.attachments.resolve(pass, tile, &mut self.traffic);
+            }
+        }
+    }
+
+    /// The cores are done: the last tiles are written, then lighting and composition read them.
+    pub fn end_frame(&mut self) {
+        for core in 0..self.current.len() {
+            self.resolve(core);
+        }
+        let passes = &self.source.tables().passes;
+        if let Some(pixels) = self.pixels.take() {
+            pixels.finish(&mut self.traffic);
+        }
+        self.attachments.finish(passes, &mut self.traffic);
+        self.tiles = None;
+    }
+
+    /// Sends the accesses since the last call, in their order, to memory, which returns the bytes that caches on chip serve:
+    /// these are no traffic.
+    pub fn send(&mut self, mut memory: impl FnMut(&Access) -> u64) {
+        for access in self.traffic.accesses.drain(..) {
+            let served = memory(&access);
+            self.traffic.bytes[access.client as usize][usize::from(access.write)] -= served;
+        }
+    }
+
+    /// Traffic of each client that has any, where the texture units read so many bytes, and what vertex processing did.
+    #[must_use]
+    pub fn result(&self, texture_bytes: u64) -> (Vec<ClientTraffic>, GeometryCounts) {
+        let dram = self.config.dram.unwrap_or_default();
+        let pj_per_byte = dram.preset.device().pj_per_byte();
+        let mut bytes = self.traffic.bytes;
+        bytes[Client::Texture as usize][0] += texture_bytes;
+        let clients = Client::ALL.into_iter().zip(bytes);
+        let clients = clients.map(|(client, [read_bytes, write_bytes])| ClientTraffic {
+            client,
+            read_bytes,
+            write_bytes,
+            energy_mj: (read_bytes + write_bytes) as f64 * pj_per_byte * 1e-9,
+        });
+        (
+            clients.filter(|client| client.bytes() > 0).collect(),
+            self.counts,
+        )
+    }
+}
+
+/// A trace whose geometry is asked for and absent.
+#[must_use]
+pub fn missing() -> StreamError {
+    StreamError::Tables(
+        "expected geometry for the traffic of a whole frame (`tracegen raster --geometry`), found none".to_owned(),
+    )
 }

@@ -1,6 +1,6 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
-use crate::access::FrameMachine;
+use crate::config::FrameMachine;
 use crate::config::{
     Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, CountBy, FilterOverride, Hsr,
     LodFormula, Mode, Order, Prefetching, Replacement, RunConfig, TextureOrder, TmuModel,

@@ -30,6 +30,9 @@ pub struct LevelConfig {
     pub shared: bool,
     /// Cycles that a line takes from this level to the level above; 0 for the L1.
     pub hit_cycles: u32,
+    /// Whose lines it holds; without effect unless there is a `[frame]`.
+    #[serde(skip_serializing_if = "LevelClients::is_textures")]
+    pub clients: LevelClients,
 }
 
 pub(super) fn is_one(value: &u32) -> bool {
@@ -50,6 +53,7 @@ impl LevelConfig {
             line_bytes: None,
             shared: true,
             hit_cycles: 0,
+            clients: LevelClients::Textures,
         }
     }
 
@@ -146,6 +150,27 @@ impl LevelConfig {
             "0 to 100000",
             format_args!("{} ({level})", self.hit_cycles),
         )
+    }
+}
+
+/// Whose lines a level holds.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, serde::Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum LevelClients {
+    /// Those of the texture units.
+    #[default]
+    Textures,
+    /// Those of all clients of memory, whose own caches lie above it. Writes pass through and allocate nothing.
+    All,
+}
+
+impl LevelClients {
+    /// True for a level of the texture units alone.
+    #[must_use]
+    pub fn is_textures(&self) -> bool {
+        *self == Self::Textures
     }
 }
 

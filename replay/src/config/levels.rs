@@ -1,6 +1,6 @@
 //! The cache levels of a machine: the `[[level]]` tables of a configuration, the L1 first.
 
-use super::{ConfigError, Inclusion, LevelConfig, accept};
+use super::{ConfigError, Inclusion, LevelClients, LevelConfig, accept};
 use crate::memory::Replacement;
 use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -34,6 +34,8 @@ struct LevelTable {
     line_bytes: Option<u32>,
     shared: Option<bool>,
     hit_cycles: Option<u32>,
+    #[serde(default)]
+    clients: LevelClients,
 }
 
 impl LevelTable {
@@ -48,6 +50,7 @@ impl LevelTable {
             line_bytes: self.line_bytes,
             shared: self.shared.unwrap_or(usual.shared),
             hit_cycles: self.hit_cycles.unwrap_or(usual.hit_cycles),
+            clients: self.clients,
             ..usual
         }
     }
@@ -196,6 +199,12 @@ impl Levels {
                 "false in the L1, which belongs to a texture unit, and true below a shared level",
                 found(&level.shared),
             )?;
+            accept(
+                !is_first || level.clients.is_textures(),
+                "level.clients",
+                "textures in the L1, which belongs to a texture unit",
+                found(&"all"),
+            )?;
             let inclusion = format!("{:?} ({name})", level.inclusion).to_lowercase();
             for (is_refused, expected) in [
                 (is_first, "none in the L1"),
@@ -244,6 +253,9 @@ impl Levels {
             }
             if !level.shared {
                 text += ", one per core";
+            }
+            if !level.clients.is_textures() {
+                text += ", all clients";
             }
             text
         };

@@ -10,12 +10,12 @@ use super::functional::Functional;
 use super::scheduler::{Stage, run_within_memory};
 use super::wave::Wave;
 use super::{AtOnce, Machine, ReplayError, threads};
+use crate::access::{self, FrameClients};
 use crate::config::{ConfigError, Mode, RunConfig, TmuConfig};
 use crate::memory::{Caches, Hierarchy, MissPath};
 use crate::result::{FirstLookups, MemoryResult, RunResult, Timeline, TmuResult};
 use crate::stream::{Bins, Expander, LineMemory, TileSource};
 use crate::tmu::PipelineStats;
-use crate::whole_frame;
 use formats::layout::Layout;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -209,7 +209,7 @@ fn checked(job: &Job<'_>) -> Result<Work, (usize, ReplayError)> {
     for (index, config) in job.configs.iter().enumerate() {
         config.validate().map_err(|error| (index, error.into()))?;
         if config.frame.is_some() && job.trace.geometry().is_none() {
-            return Err((index, whole_frame::missing().into()));
+            return Err((index, access::missing().into()));
         }
     }
     Ok(Work {
@@ -308,6 +308,8 @@ pub(super) struct Pass<'a> {
     configs: &'a [RunConfig],
     /// Built when it first runs.
     pub(super) machine: Option<Box<dyn Machine>>,
+    /// The other clients of memory, where a configuration has a `[frame]`.
+    pub(super) clients: Option<FrameClients<'a>>,
 }
 
 /// The passes of a stream's configurations.
@@ -328,11 +330,12 @@ pub(super) fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>>
         points,
         configs,
         machine: None,
+        clients: None,
     };
     groups.into_iter().map(pass).collect()
 }
 
-impl Pass<'_> {
+impl<'a> Pass<'a> {
     /// What all its configurations agree on.
     pub(super) fn config(&self) -> &RunConfig {
         &self.configs[self.points[0]]
@@ -352,6 +355,21 @@ impl Pass<'_> {
         let l1 = self.geometries()?.into_iter().map(|(l1, _)| l1);
         let sets = l1.map(|(sets, ways)| (ways >= 4).then_some(sets));
         sets.min().flatten()
+    }
+
+    /// The clients beside the texture units.
+    pub(super) fn build_clients(
+        &mut self,
+        source: &'a dyn TileSource,
+        expander: &Expander<'_>,
+    ) -> Result<(), ReplayError> {
+        let config = *self.config();
+        if let Some(machine) = config.frame {
+            let texture_bytes = expander.lines() * u64::from(config.line_bytes);
+            let clients = FrameClients::new(source, &config, machine, texture_bytes)?;
+            self.clients = Some(clients);
+        }
+        Ok(())
     }
 
     pub(super) fn build(&self, expander: &Expander<'_>) -> Result<Box<dyn Machine>, ReplayError> {
@@ -400,5 +418,5 @@ impl Pass<'_> {
 
 /// A shared pass does not see the misses of one L2 in their order.
 fn shares_passes(config: &RunConfig) -> bool {
-    matches!(config.mode, Mode::Functional) && !config.follows_l2_misses()
+    config.mode == Mode::Functional && !config.follows_l2_misses() && config.frame.is_none()
 }

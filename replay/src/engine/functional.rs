@@ -3,9 +3,10 @@
 use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
 use super::{AtOnce, Machine};
+use crate::access::FrameClients;
 use crate::config::{Assign, RunConfig};
 use crate::memory::{Cache, Hierarchy};
-use crate::order::Phase;
+use crate::order::{Phase, WorkItem};
 use crate::stream::{Consumer, Cores, QuadLines, StreamError, Tag, interleave};
 
 /// L1 caches over a shared L2.
@@ -68,14 +69,49 @@ impl<C: Cache> Consumer for Functional<C> {
     }
 }
 
+/// Caches and the other clients of memory, which follow the cores' items.
+struct WithClients<'m, 'f, C> {
+    caches: &'m mut Functional<C>,
+    clients: &'m mut FrameClients<'f>,
+}
+
+impl<C: Cache> Consumer for WithClients<'_, '_, C> {
+    fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
+        self.caches.quad(core, quad);
+    }
+
+    fn start_item(&mut self, core: usize, item: &WorkItem) -> Result<(), StreamError> {
+        self.clients.start_item(core, item)?;
+        let caches = &mut self.caches.caches;
+        (self.clients).send(|access| caches.client_access(core, access));
+        caches.follow_evictions();
+        Ok(())
+    }
+}
+
 impl<C: Cache> Machine for Functional<C> {
     fn run(
         &mut self,
         cores: &mut Cores<'_>,
         phases: &[Phase],
         assign: Assign,
+        clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError> {
-        interleave(cores, phases, assign, self)
+        match clients {
+            None => interleave(cores, phases, assign, self),
+            Some(clients) => {
+                let mut both = WithClients {
+                    caches: self,
+                    clients,
+                };
+                interleave(cores, phases, assign, &mut both)
+            }
+        }
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>) {
+        clients.send(|access| self.caches.client_access(0, access));
+        self.caches.follow_evictions();
     }
 
     fn flush(&mut self) {

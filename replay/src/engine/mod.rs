@@ -16,6 +16,7 @@ pub use batch::{Job, Work, replay_all, replay_jobs, sharing};
 pub use counts::Misses;
 pub use lines::{LineOutcome, LineReplay};
 
+use crate::access::FrameClients;
 use crate::config::{Assign, ConfigError, RunConfig};
 use crate::order::Phase;
 use crate::result::RunResult;
@@ -53,13 +54,17 @@ pub fn replay(trace: &dyn TileSource, config: &RunConfig) -> Result<RunResult, R
 /// What runs the work of the cores: caches, with or without clocks, for one or more
 /// configurations.
 trait Machine: Send {
-    /// Runs a frame's phases, one after another.
+    /// Runs a frame's phases, one after another. The other clients of memory, if they are simulated, follow the cores' items.
     fn run(
         &mut self,
         cores: &mut Cores<'_>,
         phases: &[Phase],
         assign: Assign,
+        clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError>;
+
+    /// The other clients access memory before the first item of a frame, or after the last one.
+    fn client_accesses(&mut self, _clients: &mut FrameClients<'_>) {}
 
     /// Empties the caches, between frames.
     fn flush(&mut self);

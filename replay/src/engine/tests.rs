@@ -382,7 +382,9 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
     let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
     let mut cores = Cores::new(&frame, config.cores as usize);
-    machine.run(&mut cores, &phases, config.assign).unwrap();
+    machine
+        .run(&mut cores, &phases, config.assign, None)
+        .unwrap();
     let outcome = machine.outcome(config);
     let (tmu, cycles) = (outcome.tmu, outcome.cycles);
     RunResult {

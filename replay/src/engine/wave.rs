@@ -8,7 +8,6 @@ use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
 use crate::order::{self, Phase};
 use crate::result::RunResult;
 use crate::stream::{Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, rendered};
-use crate::whole_frame::traffic;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -21,10 +20,10 @@ pub(super) struct Wave<'a> {
     pub(super) report_stage: &'a (dyn Fn(Stage) + Sync),
 }
 
-impl Wave<'_> {
+impl<'a> Wave<'a> {
     /// Runs the passes, of which there is one at least. While a frame is replayed, the next one is expanded, if
     /// there is memory for it.
-    pub(super) fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
+    pub(super) fn run(&self, mut passes: Vec<Pass<'a>>) -> Result<(), ReplayError> {
         let rendered = rendered(self.job.trace, passes[0].config())?;
         let trace_passes = &rendered.tables().passes;
         let expander = expander_for(Expander::new(&rendered, passes[0].config())?, &passes);
@@ -43,7 +42,7 @@ impl Wave<'_> {
             let plans = orders.plans(trace_passes, number);
             let waiting = AtomicUsize::new(passes.len());
             let is_last = index + 1 == frames.len();
-            let replay = |pass: &mut Pass<'_>, frame: &Frame<'_>| {
+            let replay = |pass: &mut Pass<'a>, frame: &Frame<'_>| {
                 if waiting.fetch_sub(1, Ordering::Relaxed) == 1 && is_last {
                     (self.report_stage)(Stage::LastReplayStarted);
                 }
@@ -55,10 +54,22 @@ impl Wave<'_> {
                         }
                         machine
                     }
-                    None => pass.build(&expander)?,
+                    None => {
+                        pass.build_clients(self.job.trace, &expander)?;
+                        pass.build(&expander)?
+                    }
                 };
                 let mut cores = Cores::new(frame, config.cores as usize);
-                machine.run(&mut cores, orders.plan(&plans, &config), config.assign)?;
+                if let Some(clients) = &mut pass.clients {
+                    clients.start_frame(number)?;
+                    machine.client_accesses(clients);
+                }
+                let phases = orders.plan(&plans, &config);
+                machine.run(&mut cores, phases, config.assign, pass.clients.as_mut())?;
+                if let Some(clients) = &mut pass.clients {
+                    clients.end_frame();
+                    machine.client_accesses(clients);
+                }
                 Ok::<_, ReplayError>(machine)
             };
             // The last pass frees the frame's memory, also while this thread is busy.
@@ -125,9 +136,9 @@ impl Wave<'_> {
             let l2_misses = result.l2.misses;
             result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
             result.memory = outcome.memory;
-            if let Some(machine) = &config.frame {
-                let whole = traffic(self.job.trace, config, machine, result.external_bytes)?;
-                (result.clients, result.geometry) = (whole.clients, Some(whole.geometry));
+            if let Some(clients) = &pass.clients {
+                let (traffic, geometry) = clients.result(result.external_bytes);
+                (result.clients, result.geometry) = (traffic, Some(geometry));
             }
             (self.job.finished)(index, result);
         }

@@ -9,6 +9,7 @@
 //! | `dram/` | channels, banks and rows |
 //! | `fast/` | LRU caches in one pass, sets filled one by one: equal to the plain ones, as tests hold |
 
+mod access;
 mod cache;
 pub mod dram;
 mod fast;
@@ -20,6 +21,7 @@ mod sectored;
 mod victim;
 mod watched;
 
+pub use access::{Access, Client};
 pub use cache::{AnyCache, Cache};
 pub use fast::Forest;
 pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, SecondLevel};

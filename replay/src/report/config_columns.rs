@@ -114,6 +114,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("frame.multiview", |c| c.frame.map(|frame| frame.multiview)),
         key("frame.composition", |c| c.frame.map(|frame| frame.composition)),
         key("frame.color_bytes", |c| c.frame.map(|frame| u64::from(frame.color_bytes))),
+        key("frame.color_compressed_permille", |c| c.frame.map(|frame| u64::from(frame.color_compressed_permille))),
         key("frame.depth_bytes", |c| c.frame.map(|frame| u64::from(frame.depth_bytes))),
         key("frame.g_buffer_bytes", |c| c.frame.map(|frame| u64::from(frame.g_buffer_bytes))),
         key("frame.samples", |c| c.frame.map(|frame| u64::from(frame.samples))),

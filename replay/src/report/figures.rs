@@ -2,8 +2,8 @@
 
 use super::columns::{Column, Row, Show, pick};
 use super::{config_columns, memory_columns};
-use crate::access::ClientTraffic;
 use crate::experiment::ResultRow;
+use crate::result::ClientTraffic;
 use crate::result::{Part, RunResult};
 use crate::tmu::closed_form;
 

@@ -9,6 +9,14 @@ use crate::order::{Phase, WorkItem};
 pub trait Consumer {
     /// `core` runs a quad.
     fn quad(&mut self, core: usize, quad: QuadLines<'_>);
+
+    /// `core` takes a work item.
+    ///
+    /// # Errors
+    /// A tile that cannot be read.
+    fn start_item(&mut self, _core: usize, _item: &WorkItem) -> Result<(), StreamError> {
+        Ok(())
+    }
 }
 
 /// Sends all quads of `phases` to `consumer`. What comes when does not depend on the consumer.
@@ -49,6 +57,7 @@ fn first_idle(
                 *clock += u64::from(quad.footprints.max(1));
                 consumer.quad(behind, quad);
             } else if let Some(item) = items.next() {
+                consumer.start_item(behind, item)?;
                 cores.load(behind, item)?;
             } else {
                 *clock = u64::MAX;
@@ -81,6 +90,7 @@ fn lockstep(
 ) -> Result<(), StreamError> {
     for items in phase.chunks(cores.count()) {
         for (core, item) in items.iter().enumerate() {
+            consumer.start_item(core, item)?;
             cores.load(core, item)?;
         }
         let mut busy: Vec<usize> = (0..items.len()).collect();

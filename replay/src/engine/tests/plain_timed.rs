@@ -259,6 +259,7 @@ impl Machine for PlainTimed {
         work: &mut Cores<'_>,
         phases: &[Phase],
         assign: Assign,
+        _clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError> {
         let cores = self.units.len();
         for phase in phases {

@@ -1,21 +1,29 @@
 //! Who takes the next work item, where the cores come for it one by one.
 
+use crate::access::FrameClients;
 use crate::config::Assign;
 use crate::memory::{DelayedFill, SecondLevel};
 use crate::order::WorkItem;
 use crate::stream::{Cores, StreamError};
 
 /// The items of a phase that are left.
-pub(super) struct Items<'a> {
+pub(super) struct Items<'a, 'f> {
     items: &'a [WorkItem],
     assign: Assign,
     /// First idle: the next item of all. Static: the next item by core.
     next: Vec<usize>,
     cores: usize,
+    /// The other clients of memory, which follow the items.
+    clients: Option<&'a mut FrameClients<'f>>,
 }
 
-impl<'a> Items<'a> {
-    pub(super) fn new(items: &'a [WorkItem], assign: Assign, cores: usize) -> Self {
+impl<'a, 'f> Items<'a, 'f> {
+    pub(super) fn new(
+        items: &'a [WorkItem],
+        assign: Assign,
+        cores: usize,
+        clients: Option<&'a mut FrameClients<'f>>,
+    ) -> Self {
         let next = match assign {
             Assign::FirstIdle => vec![0],
             Assign::Static => (0..cores).collect(),
@@ -25,6 +33,7 @@ impl<'a> Items<'a> {
             assign,
             next,
             cores,
+            clients,
         }
     }
 
@@ -49,15 +58,22 @@ impl<'a> Items<'a> {
     }
 }
 
-/// As a core starts an item `now`: prefetches lines of the one that comes next, if the L2's prefetcher wants them.
+/// A core starts an item `now`: the other clients do their part of it, and lines of the item that comes next are prefetched, if
+/// the L2's prefetcher wants them.
 #[inline(always)]
-pub(super) fn prefetch_upcoming<D: DelayedFill>(
+pub(super) fn start_item<D: DelayedFill>(
     l2: &mut SecondLevel<D>,
     work: &mut Cores<'_>,
-    items: &Items<'_>,
+    items: &mut Items<'_, '_>,
     core: usize,
+    item: &WorkItem,
     now: u64,
 ) -> Result<(), StreamError> {
+    work.load(core, item)?;
+    if let Some(clients) = &mut items.clients {
+        clients.start_item(core, item)?;
+        clients.send(|access| l2.client_access(core, access, now));
+    }
     let most = l2.lines_of_next_item();
     if most > 0
         && let Some(item) = items.upcoming(core)

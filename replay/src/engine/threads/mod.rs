@@ -12,13 +12,14 @@ mod prefetch_fifo;
 use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
+use crate::access::FrameClients;
 use crate::config::{Allocation, Assign, ConfigError, RunConfig, TmuModel};
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, SecondLevel};
 use crate::order::Phase;
 use crate::stream::{Cores, StreamError, furthest_behind};
 use first_miss::FirstMiss;
 use formats::layout::Layout;
-use items::{Items, prefetch_upcoming};
+use items::{Items, start_item};
 use looping::Looping;
 use prefetch_fifo::PrefetchFifo;
 use std::sync::Arc;
@@ -37,11 +38,14 @@ trait ThreadModel: Send {
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
-        items: &mut Items<'_>,
+        items: &mut Items<'_, '_>,
     ) -> Result<u64, StreamError>;
 
     /// The cycle in which the last core was done.
     fn end_phase(&mut self) -> u64;
+
+    /// The other clients access memory while no core works, as fast as memory can; the cores go on at a cycle.
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64);
 
     /// Empties all caches and drops the lines in flight.
     fn flush(&mut self);
@@ -64,18 +68,23 @@ impl<M: ThreadModel> Machine for Clocked<M> {
         work: &mut Cores<'_>,
         phases: &[Phase],
         assign: Assign,
+        mut clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError> {
         for phase in phases {
             self.model.start_phase(self.cycles);
             // A core that is done is at the end of time.
             let mut clocks = self.model.clocks();
-            let mut items = Items::new(phase, assign, clocks.len());
+            let mut items = Items::new(phase, assign, clocks.len(), clients.as_deref_mut());
             while let Some((core, until)) = furthest_behind(&clocks) {
                 clocks[core] = self.model.run_core(core, until, work, &mut items)?;
             }
             self.cycles = self.model.end_phase();
         }
         Ok(())
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>) {
+        self.model.client_accesses(clients, self.cycles);
     }
 
     fn flush(&mut self) {
@@ -122,6 +131,11 @@ impl<D: DelayedFill> Shared<D> {
             let removed = l1.iter_mut().map(|cache| cache.remove(line, now));
             removed.map(u64::from).sum()
         });
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
+        clients.send(|access| self.l2.idle_client_access(access));
+        self.l2.catch_up(cycle);
     }
 
     fn flush(&mut self) {

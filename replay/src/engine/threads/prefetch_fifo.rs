@@ -4,7 +4,8 @@
 //! are merged with its fetch.
 
 use super::first_miss::Thread;
-use super::{Items, Shared, ThreadModel, prefetch_upcoming};
+use super::{Items, Shared, ThreadModel, start_item};
+use crate::access::FrameClients;
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::batch::Outcome;
 use crate::engine::counts::{CacheCounts, FootprintMisses};
@@ -124,7 +125,7 @@ impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
-        items: &mut Items<'_>,
+        items: &mut Items<'_, '_>,
     ) -> Result<u64, StreamError> {
         loop {
             let unit = &mut self.units[core];
@@ -138,8 +139,7 @@ impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
                 unit.stats.threads += u64::from(quad.footprints > 0);
                 unit.quad.begin(quad);
             } else if let Some(item) = items.next(core) {
-                work.load(core, item)?;
-                prefetch_upcoming(&mut self.shared.l2, work, items, core, now)?;
+                start_item(&mut self.shared.l2, work, items, core, item, now)?;
             } else {
                 return Ok(u64::MAX);
             }
@@ -153,6 +153,10 @@ impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
         }
         let exits = self.units.iter().map(|unit| unit.last_exit);
         exits.max().unwrap_or(*start)
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
+        self.shared.client_accesses(clients, cycle);
     }
 
     fn flush(&mut self) {

@@ -18,11 +18,15 @@ pub struct Counts {
     pub row_conflicts: u64,
     /// Rows opened.
     pub activates: u64,
+    /// Writes.
+    pub writes: u64,
+    /// Writes whose row was open.
+    pub write_row_hits: u64,
     /// Refreshes of all banks.
     pub refreshes: u64,
     /// Clock at which the last data was there.
     pub end: u64,
-    /// Requests by their latency in clocks, arrival to last data.
+    /// Reads by their latency in clocks, arrival to last data.
     pub latencies: Vec<u64>,
 }
 
@@ -38,7 +42,8 @@ struct Request {
 /// What a request found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Needed {
-    Read,
+    /// A read or a write.
+    Data,
     Activate,
     Precharge,
 }
@@ -47,7 +52,7 @@ enum Needed {
 #[derive(Clone, Copy, Debug, Default)]
 struct Bank {
     row: Option<u64>,
-    read_from: u64,
+    data_from: u64,
     activate_from: u64,
     precharge_from: u64,
 }
@@ -61,12 +66,16 @@ pub struct Channel {
     banks: Vec<Bank>,
     /// By group.
     read_from: Vec<u64>,
+    write_from: Vec<u64>,
     activate_from: Vec<u64>,
     /// Clocks of the last four activates.
     window: VecDeque<u64>,
-    queue: Vec<Request>,
-    /// Those that found the queue full, and no time where none was given.
-    backlog: VecDeque<(Place, Option<u64>)>,
+    reads: Vec<Request>,
+    writes: Vec<Request>,
+    /// True while writes are served.
+    is_writing: bool,
+    /// Those that found their queue full (true for writes), and no time where none was given.
+    backlog: VecDeque<(Place, bool, Option<u64>)>,
     /// The next clock that has no command.
     now: u64,
     refresh_due: u64,
@@ -84,9 +93,12 @@ impl Channel {
             policy,
             banks: vec![Bank::default(); device.banks() as usize],
             read_from: vec![0; groups],
+            write_from: vec![0; groups],
             activate_from: vec![0; groups],
             window: VecDeque::with_capacity(4),
-            queue: Vec::with_capacity(capacity),
+            reads: Vec::with_capacity(capacity),
+            writes: Vec::new(),
+            is_writing: false,
             backlog: VecDeque::new(),
             now: 0,
             refresh_due: u64::from(device.refi),
@@ -94,12 +106,17 @@ impl Channel {
         }
     }
 
+    /// The next clock that has no command.
+    pub fn now(&self) -> u64 {
+        self.now
+    }
+
     /// A request arrives at a clock, or as soon as there is room.
-    pub fn arrive(&mut self, place: Place, clock: Option<u64>) {
+    pub fn arrive(&mut self, place: Place, write: bool, clock: Option<u64>) {
         if let Some(clock) = clock {
             // What the channel does before is not changed by what comes later.
-            while !self.queue.is_empty() && self.step(Some(clock)) {}
-            if self.queue.is_empty() {
+            while self.is_busy() && self.step(Some(clock)) {}
+            if !self.is_busy() {
                 // Idle until now, but for refreshes.
                 while self.refresh_due <= clock {
                     self.now = self.now.max(self.refresh_due);
@@ -108,29 +125,59 @@ impl Channel {
                 self.now = self.now.max(clock);
             }
         } else {
-            while self.queue.len() >= self.capacity {
+            while self.queue(write).len() >= self.capacity || !self.backlog.is_empty() {
                 self.step(None);
             }
         }
-        self.backlog.push_back((place, clock));
+        self.backlog.push_back((place, write, clock));
         self.admit();
+    }
+
+    fn is_busy(&self) -> bool {
+        !(self.reads.is_empty() && self.writes.is_empty())
+    }
+
+    fn queue(&mut self, write: bool) -> &mut Vec<Request> {
+        match write {
+            true => &mut self.writes,
+            false => &mut self.reads,
+        }
+    }
+
+    /// The queue that is served.
+    fn served(&self) -> &[Request] {
+        match self.is_writing {
+            true => &self.writes,
+            false => &self.reads,
+        }
+    }
+
+    /// Turns to the other queue where its time has come.
+    fn turn(&mut self) {
+        let writes = self.writes.len();
+        self.is_writing = match self.is_writing {
+            false => 5 * writes > 4 * self.capacity || (self.reads.is_empty() && writes > 0),
+            true => writes > 0 && (5 * writes >= self.capacity || self.reads.is_empty()),
+        };
     }
 
     /// Answers everything that is queued.
     pub fn drain(&mut self) {
-        while !self.queue.is_empty() {
+        while self.is_busy() {
             self.step(None);
         }
     }
 
     /// Requests enter the queue while there is room.
     fn admit(&mut self) {
-        while self.queue.len() < self.capacity
-            && let Some((place, clock)) = self.backlog.pop_front()
+        while let Some(&(place, write, clock)) = self.backlog.front()
+            && self.queue(write).len() < self.capacity
         {
-            self.queue.push(Request {
+            self.backlog.pop_front();
+            let arrival = clock.unwrap_or(self.now);
+            self.queue(write).push(Request {
                 place,
-                arrival: clock.unwrap_or(self.now),
+                arrival,
                 needed: None,
             });
         }
@@ -143,13 +190,14 @@ impl Channel {
             self.refresh();
             return true;
         }
+        self.turn();
         let mut best: Option<(u64, bool, usize, Needed)> = None;
-        for (index, request) in self.queue.iter().enumerate() {
+        for (index, request) in self.served().iter().enumerate() {
             let Some((from, needed)) = self.next_command(request) else {
                 continue;
             };
             let from = from.max(self.now).max(request.arrival);
-            let other = needed != Needed::Read;
+            let other = needed != Needed::Data;
             // The queue is in the order of arrival.
             if best.is_none_or(|(clock, is_other, ..)| (from, other) < (clock, is_other)) {
                 best = Some((from, other, index, needed));
@@ -166,12 +214,14 @@ impl Channel {
             return false;
         }
         self.now = clock + 1;
-        self.queue[index].needed.get_or_insert(needed);
-        let place = self.queue[index].place;
+        let write = self.is_writing;
+        let request = &mut self.queue(write)[index];
+        request.needed.get_or_insert(needed);
+        let place = request.place;
         match needed {
             Needed::Precharge => self.precharge(place.bank as usize, clock),
             Needed::Activate => self.activate(place, clock),
-            Needed::Read => self.read(index, clock),
+            Needed::Data => self.transfer(index, clock),
         }
         true
     }
@@ -184,14 +234,17 @@ impl Channel {
         } = request.place;
         let (bank_state, group) = (&self.banks[bank as usize], group as usize);
         match bank_state.row {
-            Some(open) if open == row => Some((
-                bank_state.read_from.max(self.read_from[group]),
-                Needed::Read,
-            )),
+            Some(open) if open == row => {
+                let of_bus = match self.is_writing {
+                    true => self.write_from[group],
+                    false => self.read_from[group],
+                };
+                Some((bank_state.data_from.max(of_bus), Needed::Data))
+            }
             Some(open) => {
                 let is_wanted =
                     |other: &Request| other.place.bank == bank && other.place.row == open;
-                (!self.queue.iter().any(is_wanted))
+                (!self.served().iter().any(is_wanted))
                     .then_some((bank_state.precharge_from, Needed::Precharge))
             }
             None => {
@@ -215,7 +268,7 @@ impl Channel {
         let device = &self.device;
         let bank = &mut self.banks[place.bank as usize];
         bank.row = Some(place.row);
-        bank.read_from = clock + u64::from(device.rcd);
+        bank.data_from = clock + u64::from(device.rcd);
         bank.precharge_from = clock + u64::from(device.ras);
         for (group, from) in (0..).zip(&mut self.activate_from) {
             let gap = if group == place.group {
@@ -232,24 +285,60 @@ impl Channel {
         self.counts.activates += 1;
     }
 
-    fn read(&mut self, index: usize, clock: u64) {
-        let device = self.device;
-        let request = self.queue.remove(index);
+    /// Reads or writes the burst of a request.
+    fn transfer(&mut self, index: usize, clock: u64) {
+        let (device, write) = (self.device, self.is_writing);
+        let request = self.queue(write).remove(index);
         let place = request.place;
-        for (group, from) in (0..).zip(&mut self.read_from) {
-            let gap = if group == place.group {
-                device.ccd_l
-            } else {
-                device.ccd_s
+        let burst = u64::from(device.burst);
+        let latency = u64::from(if write { device.cwl } else { device.cl });
+        let data = clock + latency + burst;
+        for group in 0..device.groups as usize {
+            let is_same = group == place.group as usize;
+            let [ccd, wtr] = match is_same {
+                true => [device.ccd_l, device.wtr_l],
+                false => [device.ccd_s, device.wtr_s],
             };
-            *from = (*from).max(clock + u64::from(gap.max(device.burst)));
+            let same_way = clock + u64::from(ccd.max(device.burst));
+            let other_way = match write {
+                true => data + u64::from(wtr),
+                // The bus is free for two clocks between data that is read and data that is written.
+                false => (data + 2).saturating_sub(u64::from(device.cwl)),
+            };
+            let [reads, writes] = match write {
+                true => [other_way, same_way],
+                false => [same_way, other_way],
+            };
+            self.read_from[group] = self.read_from[group].max(reads);
+            self.write_from[group] = self.write_from[group].max(writes);
         }
         let bank = &mut self.banks[place.bank as usize];
-        bank.precharge_from = bank.precharge_from.max(clock + u64::from(device.rtp));
-        let data = clock + u64::from(device.cl) + u64::from(device.burst);
+        let recovered = match write {
+            true => data + u64::from(device.wr),
+            false => clock + u64::from(device.rtp),
+        };
+        bank.precharge_from = bank.precharge_from.max(recovered);
+        self.count(&request, data);
+        self.admit();
+        let wants =
+            |other: &Request| other.place.bank == place.bank && other.place.row == place.row;
+        if self.policy == PagePolicy::Closed && !self.reads.iter().chain(&self.writes).any(wants) {
+            // With the transfer, as auto-precharge: it takes no command of its own.
+            let from = self.banks[place.bank as usize].precharge_from;
+            self.precharge(place.bank as usize, from);
+        }
+    }
+
+    fn count(&mut self, request: &Request, data: u64) {
         let counts = &mut self.counts;
-        counts.reads += 1;
         counts.end = counts.end.max(data);
+        let is_hit = !matches!(request.needed, Some(Needed::Precharge | Needed::Activate));
+        if self.is_writing {
+            counts.writes += 1;
+            counts.write_row_hits += u64::from(is_hit);
+            return;
+        }
+        counts.reads += 1;
         match request.needed {
             Some(Needed::Precharge) => counts.row_conflicts += 1,
             Some(Needed::Activate) => counts.row_empty += 1,
@@ -262,14 +351,6 @@ impl Channel {
             counts.latencies.resize(latency + 1, 0);
         }
         counts.latencies[latency] += 1;
-        self.admit();
-        let is_last = !(self.queue.iter())
-            .any(|other| other.place.bank == place.bank && other.place.row == place.row);
-        if self.policy == PagePolicy::Closed && is_last {
-            // With the read, as auto-precharge: it takes no command of its own.
-            let from = self.banks[place.bank as usize].precharge_from;
-            self.precharge(place.bank as usize, from);
-        }
     }
 
     /// Closes all rows and refreshes all banks.

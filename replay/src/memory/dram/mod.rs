@@ -1,7 +1,10 @@
 //! DRAM: what the lines that leave the last cache cost in row activations, time and energy.
 //!
 //! The model is open loop: requests arrive when the caches ask for them, and the caches' own latency
-//! ([`crate::config::RunConfig::memory_cycles`]) stays what it is. Requests are reads of whole bursts.
+//! (`memory_cycles`) stays what it is. Requests are reads and writes of whole bursts.
+//!
+//! Writes wait in a queue of their own. A channel turns to them when that queue is four fifths full or no read waits, and back
+//! to reads when it is down to a fifth, as Ramulator does.
 //!
 //! A channel schedules as FR-FCFS (Rixner et al., ISCA 2000): of the commands that may be issued first, reads of open
 //! rows go before others, and older requests before younger ones. A row is closed only when no queued request reads it.
@@ -17,7 +20,6 @@ pub use mapping::Mapping;
 pub use presets::{Device, DramPreset};
 pub use result::DramResult;
 
-use crate::config::{ConfigError, accept, in_range};
 use channel::Channel;
 use mapping::Mapper;
 use serde::{Deserialize, Serialize};
@@ -66,23 +68,6 @@ impl Default for DramConfig {
     }
 }
 
-impl DramConfig {
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first one out of range.
-    pub fn check(&self) -> Result<(), ConfigError> {
-        accept(
-            self.channels.is_power_of_two() && self.channels <= 64,
-            "dram.channels",
-            "a power of two up to 64",
-            self.channels,
-        )?;
-        in_range("dram.queue", self.queue, 1..=1024)?;
-        in_range("dram.core_mhz", self.core_mhz, 1..=100_000)
-    }
-}
-
 /// The channels of a memory.
 #[derive(Clone, Debug)]
 pub struct Dram {
@@ -94,6 +79,8 @@ pub struct Dram {
     requests: u64,
     /// Clock of the last request that had a time.
     last: u64,
+    /// Clocks that requests without a time took which the GPU's cycles do not count.
+    late_by: u64,
 }
 
 impl Dram {
@@ -110,27 +97,39 @@ impl Dram {
             line_bytes,
             requests: 0,
             last: 0,
+            late_by: 0,
         }
     }
 
-    /// A line is asked for at a cycle of the GPU; one before the last request's counts as that. Without a time it arrives
-    /// as soon as the channel's queue has a place.
+    /// A line is read at a cycle of the GPU; one before the last request's counts as that. Without a time it arrives as
+    /// soon as the channel's queue has a place.
     pub fn read(&mut self, line: u32, cycle: Option<u64>) {
-        self.requests += 1;
-        let first = u64::from(line) * u64::from(self.line_bytes);
-        let last = first + u64::from(self.line_bytes) - 1;
+        let bytes = self.line_bytes.into();
+        self.request(u64::from(line) * bytes, bytes, false, cycle);
+    }
+
+    /// Bytes are read or written, line by line.
+    pub fn request(&mut self, address: u64, bytes: u64, write: bool, cycle: Option<u64>) {
+        self.requests += bytes.div_ceil(self.line_bytes.into());
         let burst = u64::from(self.device.burst_bytes);
         let clock = cycle.map(|cycle| {
             let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
-            self.last = self
-                .last
-                .max((ps / u128::from(self.device.clock_ps)) as u64);
+            let clock = (ps / u128::from(self.device.clock_ps)) as u64 + self.late_by;
+            self.last = self.last.max(clock);
             self.last
         });
-        for number in first / burst..=last / burst {
+        for number in address / burst..=(address + bytes - 1) / burst {
             let place = self.mapper.place(number);
-            self.channels[place.channel as usize].arrive(place, clock);
+            self.channels[place.channel as usize].arrive(place, write, clock);
         }
+    }
+
+    /// Requests without a time took as long as they took: what comes at `cycle` or later comes so much later.
+    pub fn catch_up(&mut self, cycle: u64) {
+        let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
+        let clock = (ps / u128::from(self.device.clock_ps)) as u64;
+        let now = self.channels.iter().map(Channel::now).max().unwrap_or(0);
+        self.late_by = self.late_by.max(now.saturating_sub(clock));
     }
 
     /// What was counted, all requests answered.

@@ -49,6 +49,14 @@ pub struct Device {
     pub ras: u32,
     /// Read to precharge.
     pub rtp: u32,
+    /// Write to its first data.
+    pub cwl: u32,
+    /// Last data of a write to precharge.
+    pub wr: u32,
+    /// Last data of a write to a read, another group.
+    pub wtr_s: u32,
+    /// Last data of a write to a read, the same group.
+    pub wtr_l: u32,
     /// Read to read, another group.
     pub ccd_s: u32,
     /// Read to read, the same group.
@@ -67,6 +75,8 @@ pub struct Device {
     pub activate_nj: f64,
     /// Reading and driving a burst, nanojoules.
     pub read_nj: f64,
+    /// Driving and writing a burst, nanojoules.
+    pub write_nj: f64,
     /// Refresh of all banks, nanojoules.
     pub refresh_nj: f64,
     /// Standing by with open rows, milliwatts.
@@ -74,7 +84,7 @@ pub struct Device {
 }
 
 impl Device {
-    /// Energy of reading a byte, where every second burst opens a row; standing by and refresh are left out.
+    /// Energy of reading or writing a byte, where every second burst opens a row; standing by and refresh are left out.
     #[must_use]
     pub fn pj_per_byte(&self) -> f64 {
         1000.0 * (self.read_nj + 0.5 * self.activate_nj) / f64::from(self.burst_bytes)
@@ -99,6 +109,10 @@ impl DramPreset {
                 rp: 29,
                 ras: 68,
                 rtp: 12,
+                cwl: 14,
+                wr: 29,
+                wtr_s: 16,
+                wtr_l: 16,
                 ccd_s: 8,
                 ccd_l: 8,
                 rrd_s: 16,
@@ -108,6 +122,7 @@ impl DramPreset {
                 refi: 6246,
                 activate_nj: 1.5,
                 read_nj: 1.3,
+                write_nj: 1.3,
                 refresh_nj: 30.0,
                 background_mw: 15.0,
             },
@@ -124,6 +139,10 @@ impl DramPreset {
                 rp: 15,
                 ras: 34,
                 rtp: 6,
+                cwl: 11,
+                wr: 28,
+                wtr_s: 5,
+                wtr_l: 10,
                 ccd_s: 2,
                 ccd_l: 4,
                 rrd_s: 4,
@@ -133,6 +152,7 @@ impl DramPreset {
                 refi: 3123,
                 activate_nj: 1.5,
                 read_nj: 1.0,
+                write_nj: 1.0,
                 refresh_nj: 30.0,
                 background_mw: 15.0,
             },
@@ -149,6 +169,10 @@ impl DramPreset {
                 rp: 16,
                 ras: 39,
                 rtp: 9,
+                cwl: 12,
+                wr: 18,
+                wtr_s: 3,
+                wtr_l: 9,
                 ccd_s: 4,
                 ccd_l: 6,
                 rrd_s: 4,
@@ -158,6 +182,7 @@ impl DramPreset {
                 refi: 9360,
                 activate_nj: 10.0,
                 read_nj: 8.0,
+                write_nj: 8.0,
                 refresh_nj: 700.0,
                 background_mw: 400.0,
             },
@@ -174,6 +199,10 @@ impl DramPreset {
                 rp: 26,
                 ras: 53,
                 rtp: 4,
+                cwl: 6,
+                wr: 26,
+                wtr_s: 9,
+                wtr_l: 11,
                 ccd_s: 2,
                 ccd_l: 3,
                 rrd_s: 7,
@@ -183,6 +212,7 @@ impl DramPreset {
                 refi: 3333,
                 activate_nj: 2.0,
                 read_nj: 1.9,
+                write_nj: 1.9,
                 refresh_nj: 50.0,
                 background_mw: 150.0,
             },

@@ -15,8 +15,17 @@ pub struct DramResult {
     pub requests: u64,
     /// Bursts read; a line that is smaller than a burst takes a whole one.
     pub reads: u64,
-    /// Bytes that the data buses carried.
+    /// Bytes that the data buses carried to the chip.
     pub read_bytes: u64,
+    /// Bursts written.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub writes: u64,
+    /// Bytes that the data buses carried from the chip.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub write_bytes: u64,
+    /// Writes whose row was open.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub write_row_hits: u64,
     /// Reads whose row was open.
     pub row_hits: u64,
     /// Reads that opened a row in a bank without one.
@@ -41,8 +50,12 @@ pub struct DramResult {
     pub latency_p50_ns: f64,
     /// 99 of 100 requests take no longer.
     pub latency_p99_ns: f64,
-    /// Activates, reads, refreshes and standing by.
+    /// Activates, reads, writes, refreshes and standing by.
     pub energy_mj: f64,
+}
+
+fn is_zero(value: &u64) -> bool {
+    *value == 0
 }
 
 impl DramResult {
@@ -59,7 +72,9 @@ impl DramResult {
         let end = channels.iter().map(|c| c.counts.end).max().unwrap_or(0);
         let clock_ns = f64::from(device.clock_ps) * 1e-3;
         let time_s = end as f64 * clock_ns * 1e-9;
-        let read_bytes = reads * u64::from(device.burst_bytes);
+        let writes = sum(|c| c.counts.writes);
+        let [read_bytes, write_bytes] =
+            [reads, writes].map(|bursts| bursts * u64::from(device.burst_bytes));
         let mut latencies: Vec<u64> = Vec::new();
         for channel in channels {
             let of = &channel.counts.latencies;
@@ -88,6 +103,7 @@ impl DramResult {
         let row_hits = sum(|c| c.counts.row_hits);
         let nj = activates as f64 * device.activate_nj
             + reads as f64 * device.read_nj
+            + writes as f64 * device.write_nj
             + refreshes as f64 * device.refresh_nj;
         let background_mj = device.background_mw * time_s * f64::from(config.channels);
         Self {
@@ -95,6 +111,9 @@ impl DramResult {
             requests,
             reads,
             read_bytes,
+            writes,
+            write_bytes,
+            write_row_hits: sum(|c| c.counts.write_row_hits),
             row_hits,
             row_empty: sum(|c| c.counts.row_empty),
             row_conflicts: sum(|c| c.counts.row_conflicts),
@@ -105,7 +124,7 @@ impl DramResult {
             bandwidth_gb_per_s: if end == 0 {
                 0.0
             } else {
-                read_bytes as f64 / time_s * 1e-9
+                (read_bytes + write_bytes) as f64 / time_s * 1e-9
             },
             peak_gb_per_s: f64::from(config.channels) * device.peak_bytes_per_s() * 1e-9,
             latency_mean_ns: over_reads(total as f64 * clock_ns),
@@ -128,6 +147,15 @@ impl fmt::Display for DramResult {
             self.activates,
             self.row_conflicts
         )?;
+        if self.writes > 0 {
+            writeln!(
+                f,
+                "{} writes, {:.2} MB; row hits {:.2} %",
+                self.writes,
+                self.write_bytes as f64 * 1e-6,
+                100.0 * self.write_row_hits as f64 / self.writes as f64
+            )?;
+        }
         writeln!(
             f,
             "{:.2} of {:.2} GB/s; latency mean {:.1}, median {:.1}, 99 % {:.1} ns; {:.4} mJ",

@@ -88,7 +88,7 @@ fn a_stream_opens_each_row_once_and_fills_the_bus_but_for_refreshes() {
         );
         stream
             .clone()
-            .for_each(|burst| channel.arrive(mapper.place(burst), None));
+            .for_each(|burst| channel.arrive(mapper.place(burst), false, None));
         channel.drain();
         assert_eq!(channel.counts.activates, u64::from(rows), "{preset:?}");
         // A row lies in one group, whose reads are ccd_l apart; where the queue holds bursts of the next row, reads of two
@@ -160,7 +160,7 @@ fn four_activates_fit_a_window() {
         let mut channel = Channel::new(device, 32, PagePolicy::Open);
         let mapper = Mapper::new(config.mapping, 1, &device);
         let banks = u64::from(device.banks());
-        (0..banks).for_each(|burst| channel.arrive(mapper.place(burst), None));
+        (0..banks).for_each(|burst| channel.arrive(mapper.place(burst), false, None));
         channel.drain();
         let last = channel.counts.end - u64::from(device.rcd + device.cl + device.burst);
         let least = (banks - 1) / 4 * u64::from(device.faw.max(4 * device.rrd_s));
@@ -264,6 +264,93 @@ fn every_burst_has_a_place_of_its_own() {
                 "{preset:?} {mapping:?}"
             );
             assert_eq!(rows.len() as u32, 4 * device.banks() * 4);
+        }
+    }
+}
+
+/// Transfers of whole bursts, all at once: read or written.
+fn mixed(config: &DramConfig, bursts: impl Iterator<Item = (u32, bool)>) -> DramResult {
+    let bytes = u64::from(config.preset.device().burst_bytes);
+    let mut dram = Dram::new(config, bytes as u32);
+    bursts.for_each(|(burst, write)| dram.request(u64::from(burst) * bytes, bytes, write, None));
+    dram.result()
+}
+
+#[test]
+fn writes_alone_saturate_the_bus_as_reads_do() {
+    for preset in ALL {
+        let [reads, writes] =
+            [false, true].map(|write| mixed(&config(preset), (0..20_000).map(|b| (b, write))));
+        assert_eq!((writes.writes, writes.reads), (20_000, 0));
+        assert_eq!((reads.writes, reads.reads), (0, 20_000));
+        assert_eq!(reads.write_bytes + writes.read_bytes, 0);
+        let ratio = writes.bandwidth_gb_per_s / reads.bandwidth_gb_per_s;
+        assert!((ratio - 1.0).abs() < 0.02, "{preset:?}: {ratio}");
+    }
+}
+
+/// A read that follows a write of an open row comes after the write's data and the turn of the bus.
+#[test]
+fn a_read_after_a_write_waits_for_its_data_and_the_turn_of_the_bus() {
+    for preset in ALL {
+        let device = preset.device();
+        let mapper = Mapper::new(Mapping::default(), 1, &device);
+        let mut channel = Channel::new(device, 32, PagePolicy::Open);
+        channel.arrive(mapper.place(0), true, Some(0));
+        // The write's data transfer has begun when the read arrives.
+        let arrival = u64::from(device.rcd + 1);
+        channel.arrive(mapper.place(1), false, Some(arrival));
+        channel.drain();
+        let write_end = u64::from(device.rcd + device.cwl + device.burst);
+        let read = write_end + u64::from(device.wtr_l);
+        let end = read + u64::from(device.cl + device.burst);
+        assert_eq!(channel.counts.end, end, "{preset:?}");
+        assert_eq!((channel.counts.row_hits, channel.counts.writes), (1, 1));
+    }
+}
+
+/// A row that was written must be restored before it is closed.
+#[test]
+fn another_row_waits_until_what_was_written_is_restored() {
+    for preset in ALL {
+        let device = preset.device();
+        let row = device.row_bytes / device.burst_bytes * device.banks();
+        let [read_first, write_first] = [false, true]
+            .map(|write| mixed(&config(preset), [(0, write), (row, write)].into_iter()));
+        let clocks = |result: &DramResult| {
+            (result.time_us * 1e6 / f64::from(device.clock_ps)).round() as u32
+        };
+        let after_read = device.ras.max(device.rcd + device.rtp);
+        let after_write = device
+            .ras
+            .max(device.rcd + device.cwl + device.burst + device.wr);
+        let again = device.rp + device.rcd + device.burst;
+        assert_eq!(
+            clocks(&read_first),
+            after_read + again + device.cl,
+            "{preset:?}"
+        );
+        assert_eq!(
+            clocks(&write_first),
+            after_write + again + device.cwl,
+            "{preset:?}"
+        );
+    }
+}
+
+#[test]
+fn every_request_is_answered_once_whatever_the_mixture() {
+    for preset in ALL {
+        for queue in [1, 8, 32] {
+            let config = DramConfig {
+                queue,
+                ..config(preset)
+            };
+            let bursts = (0..5000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 12, i % 3 == 0));
+            let found = mixed(&config, bursts);
+            assert_eq!((found.writes, found.reads), (1667, 3333));
+            assert_eq!(found.row_hits + found.row_empty + found.row_conflicts, 3333);
+            assert!(found.write_row_hits <= 1667 && found.activates > 1000);
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::caches::Caches;
 use super::second_level::{MissPath, SecondLevel};
 use crate::config::{ConfigError, RunConfig};
-use crate::memory::Cache;
+use crate::memory::{Access, Cache};
 use crate::result::MemoryResult;
 
 /// Where an access found its line.
@@ -85,6 +85,11 @@ impl<C: Cache> Hierarchy<C> {
     #[inline(always)]
     pub fn access_l2(&mut self, core: usize, line: u32) -> bool {
         self.l2.access(core, line)
+    }
+
+    /// Another client than the texture units reads or writes: the bytes that caches serve.
+    pub fn client_access(&mut self, core: usize, access: &Access) -> u64 {
+        self.l2.client_access_at_once(core, access)
     }
 
     /// Takes lines out of the L1 caches that lower levels have evicted.

@@ -5,7 +5,7 @@ use crate::config::{ConfigError, Inclusion, RunConfig};
 use crate::memory::dram::{Dram, DramResult};
 use crate::memory::in_flight::{Mshrs, NOT_IN_FLIGHT};
 use crate::memory::policy::EMPTY;
-use crate::memory::{AnyCache, Cache};
+use crate::memory::{Access, AnyCache, Cache};
 use crate::result::LowerLevelResult;
 use std::ops::RangeInclusive;
 
@@ -27,6 +27,7 @@ struct Level {
     /// Its lines are so much longer than the L2's: the number of bits that a line number loses.
     shift: u32,
     inclusion: Inclusion,
+    is_for_all_clients: bool,
     hit_cycles: u64,
     look_ups: u64,
     misses: u64,
@@ -67,6 +68,7 @@ impl Below {
                 line_bytes,
                 shift: line_bytes.ilog2() - config.line_bytes.ilog2(),
                 inclusion: level.inclusion,
+                is_for_all_clients: !level.clients.is_textures(),
                 hit_cycles: level.hit_cycles.into(),
                 look_ups: 0,
                 misses: 0,
@@ -113,6 +115,58 @@ impl Below {
             level.enter(core, line, now, arrival);
         }
         arrival
+    }
+
+    /// Another client than the texture units reads or writes: the bytes that levels for all clients serve. Writes pass through.
+    pub fn client_access(&mut self, core: usize, access: &Access, now: Option<u64>) -> u64 {
+        let Some(first) = self
+            .levels
+            .iter()
+            .position(|level| level.is_for_all_clients)
+        else {
+            self.memory(access.address, access.bytes, access.write, now);
+            return 0;
+        };
+        if access.write {
+            self.memory(access.address, access.bytes, true, now);
+            return 0;
+        }
+        let line_bytes = u64::from(self.levels[first].line_bytes);
+        let lines =
+            access.address / line_bytes..(access.address + access.bytes).div_ceil(line_bytes);
+        let mut served = 0;
+        for line in lines {
+            let l2_line = (line << self.levels[first].shift) as u32;
+            let mut levels = self.levels.iter_mut();
+            let hit =
+                levels.position(|level| level.is_for_all_clients && level.holds(core, l2_line));
+            served += if hit.is_some() { line_bytes } else { 0 };
+            for index in 0..hit.unwrap_or(self.levels.len()) {
+                let level = &self.levels[index];
+                if level.is_for_all_clients && level.inclusion != Inclusion::Exclusive {
+                    self.fill_level(core, index, l2_line);
+                }
+            }
+            if hit.is_none() {
+                let last = self.levels.iter().rfind(|level| level.is_for_all_clients);
+                let bytes = last.map_or(line_bytes, |last| u64::from(last.line_bytes));
+                self.memory(line * line_bytes / bytes * bytes, bytes, false, now);
+            }
+        }
+        served.min(access.bytes)
+    }
+
+    fn memory(&mut self, address: u64, bytes: u64, write: bool, now: Option<u64>) {
+        if let Some(dram) = &mut self.dram {
+            dram.request(address, bytes, write, now);
+        }
+    }
+
+    /// See [`Dram::catch_up`].
+    pub fn catch_up(&mut self, cycle: u64) {
+        if let Some(dram) = &mut self.dram {
+            dram.catch_up(cycle);
+        }
     }
 
     /// The first level that holds a line; their number if none does. A line that an exclusive level holds leaves it.
@@ -207,6 +261,12 @@ impl Level {
     /// The cache that a core uses.
     fn cache(&mut self, core: usize) -> &mut Box<dyn Cache> {
         &mut of_core(&mut self.caches, core).cache
+    }
+
+    /// Looks up the line that holds a line of the L2 for another client, which is not counted. True for a hit.
+    fn holds(&mut self, core: usize, line: u32) -> bool {
+        let line = line >> self.shift;
+        self.cache(core).lookup(line)
     }
 
     /// Looks up the line that holds a line of the L2. True for a hit.

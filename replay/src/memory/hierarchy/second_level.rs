@@ -5,10 +5,10 @@ use super::below::Below;
 use super::caches::of_core;
 use super::inclusion::Evictions;
 use crate::config::{ConfigError, PrefetchConfig, RunConfig};
-use crate::memory::Cache;
 use crate::memory::in_flight::{DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
 use crate::memory::policy::EMPTY;
 use crate::memory::prefetch::{Demand, Prefetcher};
+use crate::memory::{Access, Cache};
 use crate::result::{MemoryResult, MshrResult, PrefetchResult, Timeline};
 use formats::layout::Layout;
 use std::collections::HashSet;
@@ -26,6 +26,9 @@ pub struct MissPath {
     /// True with a prefetcher or with evictions to follow: what comes after the answer to a request.
     has_consequences: bool,
     memory_cycles: u64,
+    line_bytes: u64,
+    /// True where the L2 holds lines of all clients.
+    is_for_all_clients: bool,
     /// Fetches by interval of time, where they are recorded.
     fetched_lines: Option<Vec<u32>>,
 }
@@ -41,6 +44,8 @@ impl MissPath {
             evictions: None,
             has_consequences: false,
             memory_cycles: 0,
+            line_bytes: 1,
+            is_for_all_clients: false,
             fetched_lines: None,
         }
     }
@@ -63,6 +68,8 @@ impl MissPath {
             evictions: Evictions::build(config),
             has_consequences: config.prefetch.is_some() || config.level.depend_on_evictions(),
             memory_cycles: config.memory_cycles.into(),
+            line_bytes: config.line_bytes.into(),
+            is_for_all_clients: !config.level.l2.clients.is_textures(),
             fetched_lines: config.timeline.then(Vec::new),
         })
     }
@@ -71,6 +78,12 @@ impl MissPath {
     #[must_use]
     pub fn invalidates(&self) -> bool {
         self.evictions.is_some()
+    }
+
+    /// A client reads or writes past the L2: the bytes that lower levels serve.
+    fn client_access(&mut self, core: usize, access: &Access, now: Option<u64>) -> u64 {
+        let below = self.below.as_mut();
+        below.map_or(0, |below| below.client_access(core, access, now))
     }
 
     /// When a line that the L2 requests `now` is there.
@@ -178,6 +191,19 @@ impl<C> SecondLevel<C> {
         Self { caches, path }
     }
 
+    /// Requests without a time took as long as they took: what comes at `cycle` or later comes so much later to DRAM.
+    pub fn catch_up(&mut self, cycle: u64) {
+        if let Some(below) = &mut self.path.below {
+            below.catch_up(cycle);
+        }
+    }
+
+    /// Another client than the texture units reads or writes past the L2, while no core works: the bytes that lower levels
+    /// serve.
+    pub fn idle_client_access(&mut self, access: &Access) -> u64 {
+        self.path.client_access(0, access, None)
+    }
+
     /// The cache that a core uses.
     #[inline(always)]
     pub fn cache(&mut self, core: usize) -> &mut C {
@@ -278,6 +304,18 @@ impl<D: DelayedFill> SecondLevel<D> {
         }
     }
 
+    /// Another client than the texture units reads or writes: the bytes that caches serve.
+    pub fn client_access(&mut self, core: usize, access: &Access, now: u64) -> u64 {
+        if access.write || !self.path.is_for_all_clients {
+            return self.path.client_access(core, access, Some(now));
+        }
+        let line_bytes = self.path.line_bytes;
+        let last = access.address + access.bytes - 1;
+        let lines = access.address / line_bytes..=last / line_bytes;
+        let hits = lines.filter(|&line| self.request(core, line as u32, now) == Answer::Hit);
+        (hits.count() as u64 * line_bytes).min(access.bytes)
+    }
+
     /// Fetches lines of the work item that comes next, as an item starts.
     pub fn prefetch_item(&mut self, core: usize, lines: &[u32], now: u64) {
         if !self.path.prefetch.is_empty() {
@@ -326,6 +364,18 @@ impl<C: Cache> SecondLevel<C> {
             self.follow_evictions_at_once();
         }
         hit
+    }
+
+    /// Another client than the texture units reads or writes: the bytes that caches serve.
+    pub fn client_access_at_once(&mut self, core: usize, access: &Access) -> u64 {
+        if access.write || !self.path.is_for_all_clients {
+            return self.path.client_access(core, access, None);
+        }
+        let line_bytes = self.path.line_bytes;
+        let last = access.address + access.bytes - 1;
+        let lines = access.address / line_bytes..=last / line_bytes;
+        let hits = lines.filter(|&line| self.access(core, line as u32));
+        (hits.count() as u64 * line_bytes).min(access.bytes)
     }
 
     #[inline(never)]

@@ -2,14 +2,15 @@
 //! displays.
 
 use super::model::PaperReport;
-use crate::access::{Client, ClientTraffic};
 use crate::experiment::ResultRow;
+use crate::memory::Client;
 use crate::report::columns::Column;
 use crate::report::figures::whole_mj;
 use crate::report::html::{Section, figures};
 use crate::report::plots::stacked::StackedChart;
 use crate::report::plots::{PlotError, SeriesStyle};
 use crate::report::table::Table;
+use crate::result::ClientTraffic;
 use maud::html;
 
 /// Frame rates of headsets, Hz.

@@ -12,6 +12,7 @@ mod tally;
 
 use self::pending::{Pending, Under};
 use self::tally::{Access, ByTile, Level};
+use crate::access::FrameClients;
 use crate::config::{Assign, LevelConfig, RunConfig};
 use crate::engine::batch::Outcome;
 use crate::engine::counts::{CacheCounts, CellMisses, TileMisses};
@@ -172,6 +173,7 @@ impl Machine for OnePass {
         cores: &mut Cores<'_>,
         phases: &[Phase],
         assign: Assign,
+        _clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError> {
         let answer = interleave(cores, phases, assign, self);
         self.drain();

@@ -65,6 +65,11 @@ impl<D: DelayedFill> Memory<D> {
         .over(footprints)
     }
 
+    /// The caches.
+    pub fn shared(&mut self) -> &mut Shared<D> {
+        &mut self.shared
+    }
+
     /// The L2 and what lies beside and below it.
     pub fn l2(&mut self) -> &mut SecondLevel<D> {
         &mut self.shared.l2

@@ -8,7 +8,8 @@
 mod memory;
 mod thread;
 
-use super::{Items, ThreadModel, prefetch_upcoming};
+use super::{Items, ThreadModel, start_item};
+use crate::access::FrameClients;
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::batch::Outcome;
 use crate::engine::counts::CacheCounts;
@@ -136,7 +137,7 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
-        items: &mut Items<'_>,
+        items: &mut Items<'_, '_>,
     ) -> Result<u64, StreamError> {
         loop {
             let unit = &mut self.units[core];
@@ -158,9 +159,8 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
                     } else if unit.clock > until {
                         return Ok(unit.clock);
                     } else if let Some(item) = items.next(core) {
-                        work.load(core, item)?;
                         let now = unit.clock;
-                        prefetch_upcoming(self.memory.l2(), work, items, core, now)?;
+                        start_item(self.memory.l2(), work, items, core, item, now)?;
                     } else {
                         unit.drained = true;
                     }
@@ -171,6 +171,10 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
 
     fn end_phase(&mut self) -> u64 {
         self.units.iter().map(|unit| unit.clock).max().unwrap_or(0)
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
+        self.memory.shared().client_accesses(clients, cycle);
     }
 
     fn flush(&mut self) {

@@ -88,6 +88,11 @@ impl<D: DelayedFill> Memory<D> {
         self.shared.l2.fetched_lines()
     }
 
+    /// The caches.
+    pub fn shared(&mut self) -> &mut Shared<D> {
+        &mut self.shared
+    }
+
     /// The L2 and what lies beside and below it.
     pub fn l2(&mut self) -> &mut SecondLevel<D> {
         &mut self.shared.l2

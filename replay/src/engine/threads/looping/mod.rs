@@ -5,7 +5,8 @@ mod asking;
 mod memory;
 mod timeline;
 
-use super::{Items, ThreadModel, prefetch_upcoming};
+use super::{Items, ThreadModel, start_item};
+use crate::access::FrameClients;
 use crate::config::RunConfig;
 use crate::engine::batch::Outcome;
 use crate::engine::counts::CacheCounts;
@@ -57,7 +58,7 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
-        items: &mut Items<'_>,
+        items: &mut Items<'_, '_>,
     ) -> Result<u64, StreamError> {
         let unit = &mut self.units[core];
         if std::mem::take(&mut self.asking[core])
@@ -95,8 +96,7 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
                         if let Some(recorder) = &mut self.recorder {
                             recorder.start(core, now, unit.stats(), item);
                         }
-                        work.load(core, item)?;
-                        prefetch_upcoming(self.memory.l2(), work, items, core, now)?;
+                        start_item(self.memory.l2(), work, items, core, item, now)?;
                     } else {
                         unit.drain();
                     }
@@ -112,6 +112,10 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
             }
         }
         self.units.iter().map(Pipeline::clock).max().unwrap_or(0)
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
+        self.memory.shared().client_accesses(clients, cycle);
     }
 
     fn flush(&mut self) {

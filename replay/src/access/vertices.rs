@@ -1,8 +1,10 @@
 //! Vertex processing of a view: index and vertex fetch, reuse of shaded vertices, and what is written for the tiles.
 
-use super::{Traffic, lines};
-use crate::access::{Client, FrameConfig, FrameMachine, GeometryCounts};
-use crate::memory::{Lru, WaysOf};
+use super::Traffic;
+use super::buffers::Buffers;
+use crate::config::{FrameConfig, FrameMachine};
+use crate::memory::{Client, Lru, WaysOf};
+use crate::result::GeometryCounts;
 use formats::textrace::geometry::{Geometry, GeometryView, TileLists, ViewTarget};
 use formats::textrace::{Pass, Tables};
 use std::collections::VecDeque;
@@ -21,6 +23,11 @@ pub(super) struct ShadedView {
     pub vertices: Vec<[u32; 3]>,
     /// View whose varyings are this one's (multiview), by its place in the frame.
     pub varyings_of: Option<usize>,
+    /// First bytes of the shaded positions and varyings.
+    pub positions: u64,
+    pub varyings: u64,
+    /// First byte of each tile's list.
+    list_addresses: Vec<u64>,
 }
 
 /// What a view takes over from another.
@@ -30,43 +37,40 @@ pub(super) enum Reuse<'a> {
     Of(&'a ShadedView, usize),
 }
 
-impl ShadedView {
+/// Vertex processing, and the sums that it adds to.
+pub(super) struct Stage<'a> {
+    pub geometry: &'a Geometry,
+    pub tables: &'a Tables,
+    pub machine: &'a FrameConfig,
+    pub buffers: &'a mut Buffers,
+    pub traffic: &'a mut Traffic,
+    pub counts: &'a mut GeometryCounts,
+}
+
+impl Stage<'_> {
     /// Shades the draws of a view, in order.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "what a view is made of, and the two sums that it adds to"
-    )]
-    pub fn new(
-        geometry: &Geometry,
-        tables: &Tables,
-        view: GeometryView,
-        lists: TileLists,
-        machine: &FrameConfig,
-        reuse: &Reuse<'_>,
-        traffic: &mut Traffic,
-        counts: &mut GeometryCounts,
-    ) -> Self {
+    pub fn shade(&mut self, view: GeometryView, lists: TileLists, reuse: &Reuse<'_>) -> ShadedView {
         let mut kept = lists.primitives.clone();
         kept.sort_unstable();
         kept.dedup();
-        let line_bytes = u64::from(machine.line_bytes);
-        let sets = (machine.vertex_cache_bytes / line_bytes / 4) as u32;
+        let line_bytes = u64::from(self.machine.line_bytes);
+        let sets = (self.machine.vertex_cache_bytes / line_bytes / 4) as u32;
         let mut fetch = Lru::<WaysOf<4>, u64>::new(sets, WaysOf);
-        let mut shader = Shader::new(machine.post_transform_entries as usize);
-        let bases = bases(geometry, line_bytes);
+        let mut shader = Shader::new(self.machine.post_transform_entries as usize);
         let mut vertices = Vec::with_capacity(kept.len());
         let (mut written, mut next) = (0_u32, 0);
         for &draw in &lists.draws {
-            let mesh = geometry.draw_meshes[draw as usize] as usize;
+            let mesh = self.geometry.draw_meshes[draw as usize] as usize;
             let (of, first) = (
-                &geometry.meshes[mesh],
-                tables.draws[draw as usize].first_primitive,
+                &self.geometry.meshes[mesh],
+                self.tables.draws[draw as usize].first_primitive,
             );
-            counts.triangles_submitted += of.indices.len() as u64 / 3;
+            self.counts.triangles_submitted += of.indices.len() as u64 / 3;
             let shared = matches!(reuse, Reuse::Of(other, _) if other.lists.draws.binary_search(&draw).is_ok());
             if !shared {
                 let bytes = of.indices.len() as u64 * u64::from(of.index_bytes);
-                traffic.read(Client::Index, lines(bytes, machine));
+                self.traffic
+                    .read(Client::Index, self.buffers.indices[mesh], bytes);
             }
             shader.start_draw();
             for (primitive, triangle) in (first..).zip(of.indices.chunks_exact(3)) {
@@ -75,12 +79,14 @@ impl ShadedView {
                 for (slot, &vertex) in slots.iter_mut().zip(triangle) {
                     let (entry, is_new) = shader.shade(vertex);
                     if is_new && !shared {
-                        counts.vertices_shaded += 1;
-                        let at = bases[mesh] + u64::from(vertex) * u64::from(of.vertex_bytes);
+                        self.counts.vertices_shaded += 1;
+                        let at = self.buffers.vertices[mesh]
+                            + u64::from(vertex) * u64::from(of.vertex_bytes);
                         let last = at + u64::from(of.vertex_bytes) - 1;
                         for line in at / line_bytes..=last / line_bytes {
                             if !fetch.access(line) {
-                                traffic.read(Client::Vertex, line_bytes);
+                                let first = line * line_bytes;
+                                self.traffic.read(Client::Vertex, first, line_bytes);
                             }
                         }
                     }
@@ -96,35 +102,65 @@ impl ShadedView {
                 }
             }
         }
-        counts.triangles_binned += kept.len() as u64;
-        counts.list_entries += lists.primitives.len() as u64;
-        let varyings_of = match reuse {
-            Reuse::Of(_, place) => Some(*place),
-            Reuse::None => None,
-        };
-        if machine.machine != FrameMachine::Immediate {
-            traffic.write(
-                Client::ShadedVertex,
-                lines(u64::from(written) * POSITION_BYTES, machine),
-            );
-            let varyings = u64::from(written) * u64::from(machine.varying_bytes);
-            // A shadow map has depth alone.
-            let is_picture = matches!(view.target, ViewTarget::Pass(_));
-            if is_picture && varyings_of.is_none() {
-                traffic.write(Client::ShadedVertex, lines(varyings, machine));
-            }
-            for tile in 0..view.tile_count() {
-                let bytes = lists.tile(tile).len() as u64 * u64::from(machine.list_entry_bytes);
-                traffic.write(Client::PrimitiveList, lines(bytes, machine));
-            }
-        }
-        Self {
+        self.counts.triangles_binned += kept.len() as u64;
+        self.counts.list_entries += lists.primitives.len() as u64;
+        let mut shaded = ShadedView {
             view,
-            lists,
             kept,
             vertices,
-            varyings_of,
+            varyings_of: match reuse {
+                Reuse::Of(_, place) => Some(*place),
+                Reuse::None => None,
+            },
+            positions: 0,
+            varyings: 0,
+            list_addresses: vec![0; lists.starts.len().saturating_sub(1)],
+            lists,
+        };
+        if self.machine.machine != FrameMachine::Immediate {
+            self.write(&mut shaded, written.into());
         }
+        shaded
+    }
+
+    /// Writes positions, varyings and primitive lists for the tiles.
+    fn write(&mut self, of: &mut ShadedView, vertices: u64) {
+        let (buffers, traffic) = (&mut *self.buffers, &mut *self.traffic);
+        let bytes = vertices * POSITION_BYTES;
+        of.positions = buffers.place(bytes);
+        traffic.write(Client::ShadedVertex, of.positions, bytes);
+        // A shadow map has depth alone.
+        let is_picture = matches!(of.view.target, ViewTarget::Pass(_));
+        if is_picture && of.varyings_of.is_none() {
+            let bytes = vertices * u64::from(self.machine.varying_bytes);
+            of.varyings = buffers.place(bytes);
+            traffic.write(Client::ShadedVertex, of.varyings, bytes);
+        }
+        // Each tile's list begins a line.
+        let entry_bytes = u64::from(self.machine.list_entry_bytes);
+        let line_bytes = u64::from(self.machine.line_bytes);
+        let sizes: Vec<u64> = (0..of.tile_count())
+            .map(|tile| of.lists.tile(tile).len() as u64 * entry_bytes)
+            .collect();
+        let all = sizes.iter().map(|bytes| bytes.next_multiple_of(line_bytes));
+        let mut next = buffers.place(all.sum());
+        for (address, bytes) in of.list_addresses.iter_mut().zip(sizes) {
+            *address = next;
+            traffic.write(Client::PrimitiveList, next, bytes);
+            next += bytes.next_multiple_of(line_bytes);
+        }
+    }
+}
+
+impl ShadedView {
+    /// Tiles of the view.
+    pub fn tile_count(&self) -> usize {
+        self.list_addresses.len()
+    }
+
+    /// First byte of a tile's list.
+    pub fn list_address(&self, tile: usize) -> u64 {
+        self.list_addresses.get(tile).copied().unwrap_or(0)
     }
 
     /// The pass that the view renders; a shadow map has none.
@@ -140,18 +176,6 @@ impl ShadedView {
         let place = self.kept.binary_search(&primitive).ok()?;
         self.vertices.get(place).copied()
     }
-}
-
-/// First byte of each mesh's vertices, line by line.
-fn bases(geometry: &Geometry, line_bytes: u64) -> Vec<u64> {
-    let mut next = 0;
-    let base = |mesh: &formats::textrace::geometry::MeshGeometry| {
-        let base = next;
-        next +=
-            (u64::from(mesh.vertices) * u64::from(mesh.vertex_bytes)).next_multiple_of(line_bytes);
-        base
-    };
-    geometry.meshes.iter().map(base).collect()
 }
 
 /// Shaded vertices that are still there, first in, first out (Hoppe 1999).

@@ -86,6 +86,55 @@ fn strip(triangles: u32) -> MeshGeometry {
     }
 }
 
+/// Traffic by client, and what vertex processing did.
+#[derive(Debug)]
+struct WholeFrame {
+    clients: Vec<ClientTraffic>,
+    geometry: GeometryCounts,
+}
+
+/// All frames; items go to the cores in turn. The accesses add up to the traffic.
+fn traffic(
+    source: &dyn TileSource,
+    config: &RunConfig,
+    machine: &FrameConfig,
+    texture_bytes: u64,
+) -> Result<WholeFrame, StreamError> {
+    let mut of = FrameClients::new(source, config, *machine, 1 << 20)?;
+    let order = config.order.build(config.seed);
+    let mut sums = [[0; 2]; Client::ALL.len()];
+    for frame in [0] {
+        of.start_frame(frame)?;
+        let phases = crate::order::plan_frame(&*order, &source.tables().passes, frame);
+        for (number, item) in phases.iter().flatten().enumerate() {
+            of.start_item(number % config.cores as usize, item)?;
+        }
+        of.end_frame();
+        of.send(|access| {
+            assert!(
+                access.address >= 1 << 20 && access.address % 64 == 0,
+                "{access:?}"
+            );
+            sums[access.client as usize][usize::from(access.write)] += access.bytes;
+            0
+        });
+    }
+    let (clients, geometry) = of.result(texture_bytes);
+    for client in &clients {
+        let [read, written] = sums[client.client as usize];
+        let texture = if client.client == Client::Texture {
+            texture_bytes
+        } else {
+            0
+        };
+        assert_eq!(
+            [client.read_bytes, client.write_bytes],
+            [read + texture, written]
+        );
+    }
+    Ok(WholeFrame { clients, geometry })
+}
+
 fn count(trace: &Trace, machine: &FrameConfig, order: Order) -> WholeFrame {
     let config = RunConfig {
         order,
