@@ -227,6 +227,7 @@ impl Plan {
             let mapped = [Order::MORTON, Order::Z2_STA].contains(&point.config.order);
             if mapped && point.change.is_none() && Some(caches(point)) == first {
                 point.config.tile_maps = true;
+                point.config.timeline = point.config.is_looping();
             }
         }
         self

@@ -6,6 +6,7 @@ use crate::experiment::ResultRow;
 use crate::result::ClientTraffic;
 use crate::result::{Part, RunResult};
 use crate::tmu::closed_form;
+use formats::texture::TexelFormat;
 
 /// A column of point results.
 pub type Figure<'a> = Column<'static, ResultRow<'a>>;
@@ -47,6 +48,10 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("external traffic over the bound"),
         Figure::real("over_base", "external", "\u{d7} base", 3, |r| over(r.result.external_bytes, r.unchanged?.external_bytes))
             .about("external traffic over that of the same settings without the change"),
+        Figure::real("static_footprints_per_pixel", "static", "footprints/pixel", 2, |r| complexity(r, false))
+            .about("footprints of loaded textures for each covered pixel: static texture complexity (Z2 paper, table 1)"),
+        Figure::real("dynamic_footprints_per_pixel", "dynamic", "footprints/pixel", 2, |r| complexity(r, true))
+            .about("footprints of shadow maps for each covered pixel: dynamic texture complexity (Z2 paper, table 1)"),
         Figure::real("first_l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.result))
             .about("footprints whose first look-up found a line absent or in flight"),
         Figure::real("first_l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.result))
@@ -79,6 +84,18 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("cycles until the last core is done"),
     ]);
     figures
+}
+
+/// Footprints of shadow maps, or of all other textures, over covered pixels; none where counts are by draw.
+fn complexity(row: &ResultRow, of_shadow_maps: bool) -> Option<f64> {
+    let parts = &row.result.by_texture;
+    let textures = row.subject.source.tables().textures.iter();
+    let wanted = textures
+        .zip(parts)
+        .filter(|(texture, _)| (texture.format == TexelFormat::R32f) == of_shadow_maps);
+    let footprints: u64 = wanted.map(|(_, part)| part.l1.footprints).sum();
+    let is_counted = !parts.is_empty() && row.result.lanes > 0;
+    is_counted.then(|| footprints as f64 / row.result.lanes as f64)
 }
 
 /// A sum over the clients of memory, where the whole frame was counted.
