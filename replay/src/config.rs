@@ -1,4 +1,4 @@
-//! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
+//! The configuration of one replay. The default is the Z2 paper's machine (section 4.1).
 
 mod dram;
 mod error;
@@ -27,21 +27,21 @@ pub use levels::Levels;
 pub use prefetch::{PrefetchConfig, Prefetching};
 pub use tmu::{Allocation, TmuConfig, TmuModel};
 
-/// How time passes in a replay.
+/// How time is modelled.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// Each core's texture unit (`tmu.model`) has a clock, which decides how the cores' accesses interleave.
+    /// Each core's texture unit (`tmu.model`) has a clock. The clocks decide how the cores' accesses interleave.
     #[default]
     Timed,
-    /// Without latencies: a footprint is a unit of time, and a miss fills at once.
+    /// No latencies: each footprint takes one unit of time and misses fill immediately.
     Functional,
 }
 
 impl Mode {
-    /// Its name in configuration files.
+    /// Name in configuration files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -51,32 +51,31 @@ impl Mode {
     }
 }
 
-/// How work items are given to cores.
+/// How work items are assigned to cores.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Assign {
-    /// The next item goes to the core that becomes idle first.
+    /// The next item goes to the first idle core.
     #[default]
     FirstIdle,
     /// Round robin (with LRTA and two cores: left tiles on core 0, right tiles on core 1).
     Static,
 }
 
-/// Which of the fragments that draws cover are shaded.
+/// Which of the covered fragments are shaded.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Hsr {
-    /// All of them; needs a trace that was captured without the depth test.
+    /// All of them. Needs a trace captured without the depth test.
     None,
-    /// Those that pass the depth test when they are drawn: what a trace holds.
+    /// Those that pass the depth test when drawn, as recorded in the trace.
     #[default]
     EarlyZ,
-    /// Of each pixel the last opaque one and what is drawn over it, as tile-based deferred
-    /// renderers do.
+    /// Per pixel, the last opaque fragment and the fragments blended over it, as in tile-based deferred renderers.
     Deferred,
 }
 
@@ -86,16 +85,16 @@ impl Hsr {
     }
 }
 
-/// What becomes of the caches between the frames of a trace.
+/// What happens to cache contents between the frames of a trace.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum BetweenFrames {
-    /// They keep their lines, so that a frame finds what the one before has left.
+    /// Caches keep their lines, so that a frame can hit lines of the frame before.
     #[default]
     Keep,
-    /// They are emptied, as where other work runs between two frames.
+    /// Caches are emptied, as if other work ran between the frames.
     Flush,
 }
 
@@ -105,7 +104,7 @@ impl BetweenFrames {
     }
 }
 
-/// What a replay breaks its counts down by, beside views and tiles.
+/// What counts are broken down by, in addition to views and tiles.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
@@ -132,15 +131,15 @@ fn is_recorded_tile(tile_px: &u32) -> bool {
     *tile_px == TILE_SIZE_PX
 }
 
-/// Everything that decides the result of a replay of a given trace.
+/// The complete configuration of a replay.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunConfig {
-    /// How time passes.
+    /// How time is modelled.
     pub mode: Mode,
     /// Tile order.
     pub order: Order,
-    /// Seed of the random order and of random replacement.
+    /// Seed of the random tile order and of random replacement.
     pub seed: u64,
     /// Shader cores, each with its own L1 and texture unit.
     pub cores: u32,
@@ -150,7 +149,7 @@ pub struct RunConfig {
     pub line_bytes: u32,
     /// Cache levels, two to six, the L1 first.
     pub level: Levels,
-    /// Cycles that a line takes from memory to the last level.
+    /// Cycles in which a line travels from memory to the last level.
     pub memory_cycles: u32,
     /// Filter and level of detail.
     pub sampling: SamplingConfig,
@@ -158,30 +157,31 @@ pub struct RunConfig {
     pub layout: LayoutConfig,
     /// Texture unit.
     pub tmu: TmuConfig,
-    /// Width and height of a tile in pixels; other tiles than the recorded ones of 16 pixels are regrouped.
+    /// Width and height of a tile in pixels. Sizes other than the recorded 16 regroup the recorded tiles.
     #[serde(skip_serializing_if = "is_recorded_tile")]
     pub tile_px: u32,
-    /// Also count by tile.
+    /// Also count per tile.
     pub tile_maps: bool,
-    /// What counts are broken down by.
+    /// What counts are broken down by, in addition to views and tiles.
     #[serde(skip_serializing_if = "CountBy::is_default")]
     pub count_by: CountBy,
-    /// Also record which core works on which tiles when (timed mode, `--timeline`); no key of a file.
+    /// Also record when each core works on which tiles (timed mode, `--timeline`); not a key of
+    /// configuration files.
     #[serde(skip)]
     pub timeline: bool,
-    /// Hidden-surface removal; results name it where it is not the default.
+    /// Hidden-surface removal. Results name it if it is not the default.
     #[serde(skip_serializing_if = "Hsr::is_default")]
     pub hsr: Hsr,
-    /// The caches between frames; results name it where it is not the default.
+    /// Cache contents between frames. Results name it if it is not the default.
     #[serde(skip_serializing_if = "BetweenFrames::is_default")]
     pub between_frames: BetweenFrames,
-    /// The prefetcher of the L2; without it, only what is requested is fetched.
+    /// The prefetcher of the L2. Without it, only requested lines are fetched.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prefetch: Option<PrefetchConfig>,
-    /// The DRAM below the caches; without it, lines that leave the chip are only counted.
+    /// The DRAM model below the caches. Without it, lines from memory are only counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dram: Option<DramConfig>,
-    /// The machine around the texture units; without it, texture traffic alone is counted.
+    /// The machine around the texture units. Without it, only texture traffic is counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame: Option<FrameConfig>,
 }
@@ -213,27 +213,27 @@ impl Default for RunConfig {
     }
 }
 
-/// More sets of a cache than this are taken for a mistake.
+/// Upper limit for the sets of a cache. More are taken for a mistake.
 const MOST_SETS: u64 = 1 << 24;
 
-/// More lines of all caches of a level together than this are taken for a mistake: the tags of as many take
-/// up to some 300 MiB of this machine's memory.
+/// Upper limit for the lines of all caches of a level. Their tags take up to about 300 MiB of this
+/// machine's memory.
 const MOST_LINES: u64 = 1 << 24;
 
 impl RunConfig {
-    /// The texture units that time passes for; none in functional mode.
+    /// The model of the texture units, or none in functional mode.
     #[must_use]
     pub fn tmu_model(&self) -> Option<TmuModel> {
         (self.mode == Mode::Timed).then_some(self.tmu.model)
     }
 
-    /// True where threads loop until their lines have arrived: the headline model.
+    /// True for the headline model, in which threads loop until their lines are filled.
     #[must_use]
     pub fn is_looping(&self) -> bool {
         self.tmu_model() == Some(TmuModel::Looping)
     }
 
-    /// The mode and, where it is not the usual one, the model of the texture unit.
+    /// The mode or, if it is not the default, the model of the texture unit.
     #[must_use]
     pub fn mode_name(&self) -> &'static str {
         match self.tmu_model() {
@@ -289,19 +289,19 @@ impl RunConfig {
         prefetch.map_or(Ok(()), |prefetch| prefetch.check(self.mode))
     }
 
-    /// True where a miss changes a cache at once, so that a thread's later look-ups see it.
+    /// True if a miss fills the cache immediately, so that later look-ups of the same thread hit.
     #[must_use]
     pub fn misses_change_caches_at_once(&self) -> bool {
         self.level.l2.hit_cycles == 0 || self.tmu.allocation == Allocation::OnMiss
     }
 
-    /// True where the order of the L2's misses matters: they go to further levels or to DRAM, or prefetch others.
+    /// True if the order of the L2's misses matters, because further levels, DRAM or a prefetcher see them.
     #[must_use]
     pub fn follows_l2_misses(&self) -> bool {
         self.simulates_below_l2() || self.prefetch.is_some() || self.level.depend_on_evictions()
     }
 
-    /// True where the misses of the L2 go to further levels or to DRAM.
+    /// True if L2 misses go to further levels or to DRAM.
     #[must_use]
     pub const fn simulates_below_l2(&self) -> bool {
         self.dram.is_some() || self.level.has_lower()

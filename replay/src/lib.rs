@@ -1,5 +1,5 @@
-//! Trace to answer: replays texture traces through caches and a texture unit in any tile order,
-//! and ray traces through a model of a mobile ray-tracing GPU.
+//! Replays texture traces through caches and a texture unit in any tile order, and ray traces
+//! through a model of a mobile ray-tracing GPU.
 
 mod access;
 pub mod accuracy;

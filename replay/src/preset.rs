@@ -1,4 +1,4 @@
-//! Machines by name: what a configuration starts from in place of the defaults.
+//! Named machines: configurations to start from instead of the defaults.
 
 use crate::config::{BlockOrder, Mode, RunConfig, TmuModel};
 use crate::registry::{Named, registry};
@@ -27,16 +27,17 @@ const fn row(
 }
 
 impl Preset {
-    /// A configuration with what the preset sets.
+    /// Returns `config` with the preset's values.
     #[must_use]
     pub fn over(self, config: RunConfig) -> RunConfig {
         (self.row().over)(config)
     }
 }
 
-/// The nearest stated model. Its one free number is the loop; `docs/paper-comparison.md` says what it
-/// was calibrated on, and why textures begin at multiples of 64 KiB. The paper's shadow rows save nothing or lose: of
-/// the layouts of a shadow map that were tried, a linear one comes nearest to that.
+/// The model that comes closest to the paper's table. `loop_cycles` is its one free parameter;
+/// `docs/paper-comparison.md` describes its calibration and why textures begin at multiples of 64
+/// KiB. In the paper, shadow rows gain nothing or lose. Of the shadow map layouts tried, the linear
+/// one comes closest to that.
 fn z2_paper(mut config: RunConfig) -> RunConfig {
     config.mode = Mode::Timed;
     config.tmu.model = TmuModel::FirstMiss;
@@ -52,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_preset_is_a_machine_that_can_be_built() {
+    fn every_preset_is_valid_and_differs_from_the_default() {
         for preset in Preset::all() {
             let config = preset.over(RunConfig::default());
             config.validate().unwrap();

@@ -1,4 +1,4 @@
-//! What tiles write when they are done, the G-buffer in memory, and composition.
+//! Tile writes to attachments, the G-buffer in memory, and composition.
 
 use super::Traffic;
 use super::buffers::Buffers;
@@ -8,27 +8,27 @@ use crate::memory::Client;
 use formats::textrace::geometry::ViewTarget;
 use formats::textrace::{Pass, PassKind};
 
-/// The attachments of a frame's views. Tiles are cleared on chip, so nothing is loaded; an immediate machine writes its pictures
-/// pixel by pixel.
+/// The attachments of a frame's views. Tiles are cleared on chip, so nothing is loaded. An immediate
+/// machine writes its pictures pixel by pixel instead.
 #[derive(Default)]
 pub(super) struct Attachments {
     machine: FrameConfig,
     tile_px: u32,
     views: Vec<View>,
-    /// The display's pictures, by composed view.
+    /// The display's pictures, per composed view.
     displays: Vec<u64>,
 }
 
 /// A view's buffers.
 struct View {
-    /// None: a shadow map.
+    /// None for a shadow map.
     pass: Option<u32>,
     size_px: [u32; 2],
     columns: u32,
     colour: u64,
     depth: u64,
     g_buffer: u64,
-    /// Tiles that were written, by number.
+    /// Tiles already written, by number.
     is_resolved: Vec<bool>,
 }
 
@@ -70,8 +70,8 @@ impl Attachments {
         }
     }
 
-    /// A tile of an attachment: its first byte and its bytes inside the picture. The tiles of an attachment lie one behind the
-    /// other.
+    /// First byte and number of bytes inside the picture of a tile of an attachment. The tiles of an
+    /// attachment are stored consecutively.
     fn tile(&self, view: &View, base: u64, pixel_bytes: u32, tile: u32) -> [u64; 2] {
         let at = [tile % view.columns, tile / view.columns];
         let side = |axis: usize| (view.size_px[axis] - at[axis] * self.tile_px).min(self.tile_px);
@@ -80,7 +80,7 @@ impl Attachments {
         [base + u64::from(tile) * whole, bytes]
     }
 
-    /// A tile of a picture as it lies in memory.
+    /// A tile of a picture in memory.
     fn picture_tile(&self, view: &View, tile: u32) -> [u64; 2] {
         let [first, bytes] = self.tile(view, view.colour, self.machine.color_bytes, tile);
         let permille = u64::from(self.machine.color_compressed_permille);
@@ -97,7 +97,7 @@ impl Attachments {
         }
     }
 
-    /// Writes a tile that is done.
+    /// Writes a finished tile.
     pub fn resolve(&mut self, pass: u32, tile: u32, traffic: &mut Traffic) {
         let Some(index) = self.views.iter().position(|view| view.pass == Some(pass)) else {
             return;
@@ -127,7 +127,7 @@ impl Attachments {
         }
     }
 
-    /// Writes the tiles that no core took, reads the G-buffer for lighting, and composes what is shown.
+    /// Writes the tiles that no core rendered, reads the G-buffer for lighting, and composes the shown pictures.
     pub fn finish(&mut self, passes: &[Pass], traffic: &mut Traffic) {
         for index in 0..self.views.len() {
             if let Some(pass) = self.views[index].pass {
@@ -145,7 +145,7 @@ impl Attachments {
                         traffic.read(client, first, bytes);
                     };
                     read(Client::GBuffer, view.g_buffer, machine.g_buffer_bytes);
-                    // Lighting needs depth again.
+                    // Lighting also reads depth.
                     read(Client::Depth, view.depth, machine.depth_bytes);
                 }
             }
@@ -155,7 +155,7 @@ impl Attachments {
         }
     }
 
-    /// Layers are read and pictures made of them; then the warp reads pictures and writes the display's.
+    /// Composition reads layers and writes pictures; the warp then reads pictures and writes the display's.
     fn compose(&self, passes: &[Pass], traffic: &mut Traffic) {
         let is_layer = |view: &View| {
             let pass = view.pass.and_then(|pass| passes.get(pass as usize));
@@ -177,7 +177,7 @@ impl Attachments {
             if is_layer {
                 picture(false);
             }
-            // Where only layers were rendered, each is as large as the picture that is made of it.
+            // If only layers were rendered, each is as large as its picture.
             let is_picture = !is_layer || !has_pictures;
             if is_picture && has_layers {
                 picture(true);

@@ -1,16 +1,16 @@
-//! Where the buffers of a frame lie: behind the textures, those of meshes first, then what each frame writes anew.
+//! Buffer addresses of a frame: after the textures, first the mesh buffers, then the buffers written in each frame.
 
 use formats::textrace::geometry::Geometry;
 
-/// Buffers start at multiples of a page.
+/// Buffers are aligned to pages.
 const PAGE_BYTES: u64 = 4096;
 
 /// First bytes of the buffers.
 #[derive(Debug)]
 pub(super) struct Buffers {
-    /// Of each mesh's indices.
+    /// Of the indices of each mesh.
     pub indices: Vec<u64>,
-    /// Of each mesh's vertices, mesh after mesh in whole lines.
+    /// Of the vertices of each mesh, in whole lines.
     pub vertices: Vec<u64>,
     first_of_frame: u64,
     next: u64,
@@ -43,12 +43,12 @@ impl Buffers {
         }
     }
 
-    /// The buffers of the last frame are free.
+    /// Frees the buffers of the previous frame.
     pub fn start_frame(&mut self) {
         self.next = self.first_of_frame;
     }
 
-    /// A buffer of this frame.
+    /// Allocates a buffer for this frame.
     pub fn place(&mut self, bytes: u64) -> u64 {
         let first = self.next;
         self.next = (first + bytes).next_multiple_of(PAGE_BYTES);

@@ -1,18 +1,19 @@
-//! Lossless compression of colour tiles, measured on a rendered picture.
+//! Lossless compression of colour tiles, measured for a rendered picture.
 //!
-//! Blocks of 4x4 pixels are stored as a minimum for each channel and the differences from it, in as many bits as the largest
-//! one needs (Rasmusson, Hasselgren and Akenine-Möller, Graphics Hardware 2007, section 3, without their prediction). A tile has a
-//! header of 16 bytes and whole lines of blocks; one that would not become smaller is stored as it is.
+//! Blocks of 4x4 pixels are stored as a minimum per channel and the differences from it, in as many bits as
+//! the largest difference needs (Rasmusson, Hasselgren and Akenine-Möller, Graphics Hardware 2007, section
+//! 3, without their prediction). A tile has a 16-byte header and whole lines of blocks. A tile that would
+//! not shrink is stored uncompressed.
 
 /// Width and height of a block.
 const BLOCK_PX: usize = 4;
-/// Of a tile: where its blocks lie.
+/// Header of a tile with the locations of its blocks.
 const HEADER_BYTES: usize = 16;
-/// Of a block: the minimum and four bits for the number of bits, of each of four channels.
+/// Bits per block for its minima and for the 4-bit widths of its four channels.
 const BLOCK_BASE_BITS: usize = 4 * (8 + 4);
 
-/// Bytes of all tiles of a picture after compression, in thousandths of those before. `rgb` has three bytes for each pixel, row
-/// by row; memory has a constant fourth one.
+/// Compressed size of a picture's tiles, in thousandths of the uncompressed size. `rgb` has three bytes per
+/// pixel, row by row; memory has a constant fourth one.
 pub fn permille(rgb: &[u8], width: usize, tile_px: u32, line_bytes: u32) -> u32 {
     let height = rgb.len() / (3 * width.max(1));
     let (tile, line) = (tile_px as usize, line_bytes as usize);
@@ -63,8 +64,8 @@ mod tests {
     use super::permille;
 
     #[test]
-    fn one_colour_leaves_a_header_and_minima_and_noise_stays_as_it_is() {
-        // 16 blocks of 6 bytes and the header: 112 bytes in two lines of 64, of 1024.
+    fn one_colour_needs_a_header_and_minima_and_noise_is_not_compressed() {
+        // 16 blocks of 6 bytes and the header take 112 bytes, two lines of 64, of 1024.
         assert_eq!(permille(&[90; 3 * 32 * 16], 32, 16, 64), 125);
         let noise: Vec<u8> = (0..3 * 32 * 16_u32)
             .map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
@@ -74,13 +75,14 @@ mod tests {
 
     #[test]
     fn a_ramp_needs_the_bits_of_its_steps_within_a_block() {
-        // Red grows by one from pixel to pixel: two bits for 0 to 3, 16 x 2 bits for a block beside the 48 of its minima.
+        // Red grows by one per pixel. Values 0 to 3 take two bits: 16 x 2 bits per block in addition to the
+        // 48 of its minima.
         let ramp: Vec<u8> = (0..16_u8)
             .flat_map(|_| (0..16_u8).flat_map(|x| [x, 7, 7]))
             .collect();
         let bytes = (16 + 16 * (48 + 32) / 8_u32).next_multiple_of(64);
         assert_eq!(permille(&ramp, 16, 16, 64), (1000 * bytes).div_ceil(1024));
-        // A cut tile counts what is in the picture.
+        // Only the part inside the picture counts.
         assert_eq!(permille(&[0; 3 * 8 * 4], 8, 16, 64), 500);
     }
 }

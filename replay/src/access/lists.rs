@@ -1,10 +1,10 @@
-//! Primitive lists of tiles of another size than the recorded ones.
+//! Primitive lists for tiles larger than the recorded ones.
 
 use formats::textrace::geometry::TileLists;
 use formats::view::TILE_SIZE_PX;
 
-/// The lists of larger tiles: each has the primitives of the recorded tiles in it, once each. Tiles that are smaller than the
-/// recorded ones cannot be told apart: a configuration refuses them.
+/// The lists of larger tiles: each contains the primitives of its recorded tiles once. The configuration
+/// refuses smaller tiles, because recorded lists cannot be split.
 pub(super) fn regrouped(recorded: TileLists, size_px: [u32; 2], tile_px: u32) -> TileLists {
     let factor = tile_px / TILE_SIZE_PX;
     if factor <= 1 {

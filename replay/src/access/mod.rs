@@ -1,9 +1,10 @@
-//! The clients of memory beside the texture units: what vertex processing, tiles, attachments and composition read and
-//! write, in the order of rendering.
+//! The clients of memory other than the texture units: reads and writes of vertex processing, tiles,
+//! attachments and composition, in rendering order.
 //!
-//! [`FrameClients`] follows the engine: a frame starts, cores take work items, the frame ends. Each step yields accesses of
-//! whole lines, in order. Each client has caches of its own, so that no client evicts another's lines there; what leaves them
-//! goes to the levels that all clients share, if there are any, and to DRAM.
+//! [`FrameClients`] follows the engine: a frame starts, cores take work items, the frame ends. Each step
+//! produces accesses of whole lines, in order. Each client has its own caches, so that clients do not evict
+//! each other's lines there. Misses and write-backs go to the levels shared by all clients, if configured,
+//! and to DRAM.
 
 mod attachments;
 mod buffers;
@@ -32,10 +33,10 @@ use pixels::Pixels;
 use tiles::Tiles;
 use vertices::{Reuse, ShadedView};
 
-/// Bytes by client, and the accesses since they were last taken.
+/// Bytes by client, and the accesses since the last transfer to memory.
 #[derive(Debug)]
 struct Traffic {
-    /// Read and written.
+    /// Bytes read and written.
     bytes: [[u64; 2]; Client::ALL.len()],
     accesses: Vec<Access>,
     line_bytes: u64,
@@ -50,7 +51,7 @@ impl Traffic {
         self.access(client, true, address, bytes);
     }
 
-    /// Whole lines, from that of the first byte on.
+    /// Accesses whole lines, starting with the line of the first byte.
     fn access(&mut self, client: Client, write: bool, address: u64, bytes: u64) {
         if bytes == 0 {
             return;
@@ -71,7 +72,7 @@ impl Traffic {
 pub struct FrameClients<'a> {
     source: &'a dyn TileSource,
     geometry: &'a Geometry,
-    /// The quads that hidden-surface removal leaves, in tiles of the configuration's size.
+    /// The quads that remain after hidden-surface removal, in tiles of the configured size.
     rendered: Rendered<'a>,
     config: RunConfig,
     machine: FrameConfig,
@@ -80,11 +81,11 @@ pub struct FrameClients<'a> {
     counts: GeometryCounts,
     views: Vec<ShadedView>,
     attachments: Attachments,
-    /// Of a tile-based machine.
+    /// Present on a tile-based machine.
     tiles: Option<Tiles>,
-    /// Of an immediate machine.
+    /// Present on an immediate machine.
     pixels: Option<Pixels>,
-    /// The item of each core that is not resolved yet.
+    /// The unresolved item of each core.
     current: Vec<Option<WorkItem>>,
 }
 
@@ -121,10 +122,10 @@ impl<'a> FrameClients<'a> {
         })
     }
 
-    /// Runs vertex processing and binning for the views of a frame, and renders its shadow maps.
+    /// Performs vertex processing and binning for the views of a frame, and renders its shadow maps.
     ///
     /// # Errors
-    /// Lists that cannot be read.
+    /// Unreadable lists.
     pub fn start_frame(&mut self, frame: u32) -> Result<(), StreamError> {
         self.views.clear();
         self.buffers.start_frame();
@@ -139,7 +140,7 @@ impl<'a> FrameClients<'a> {
                 ViewTarget::Pass(pass) => tables.passes.get(pass as usize),
                 ViewTarget::ShadowMap(_) => None,
             };
-            // With multiview, a later picture or layer of the same number takes over what an earlier one read.
+            // With multiview, a later picture or layer with the same number reuses the reads of an earlier one.
             let partner = self.views.iter().position(|other| {
                 self.machine.multiview
                     && pass.zip(other.pass(tables)).is_some_and(|(a, b)| {
@@ -182,10 +183,10 @@ impl<'a> FrameClients<'a> {
         Ok(())
     }
 
-    /// A core is done with its item and takes another.
+    /// Ends the core's item and starts another.
     ///
     /// # Errors
-    /// A tile that cannot be read.
+    /// An unreadable tile.
     pub fn start_item(&mut self, core: usize, item: &WorkItem) -> Result<(), StreamError> {
         self.resolve(core);
         self.current[core] = Some(*item);
@@ -198,7 +199,7 @@ impl<'a> FrameClients<'a> {
         Ok(())
     }
 
-    /// Writes the tiles of the core's item, which are done.
+    /// Writes the finished tiles of the core's item.
     fn resolve(&mut self, core: usize) {
         if let Some(item) = self.current[core].take() {
             for TileRef { pass, tile } in item.tiles() {
@@ -207,7 +208,7 @@ impl<'a> FrameClients<'a> {
         }
     }
 
-    /// The cores are done: the last tiles are written, then lighting and composition read them.
+    /// Ends the frame: writes the last tiles, which lighting and composition then read.
     pub fn end_frame(&mut self) {
         for core in 0..self.current.len() {
             self.resolve(core);
@@ -220,8 +221,8 @@ impl<'a> FrameClients<'a> {
         self.tiles = None;
     }
 
-    /// Sends the accesses since the last call, in their order, to memory, which returns the bytes that caches on chip serve:
-    /// these are no traffic.
+    /// Sends the accesses since the last call to `memory`, in order. `memory` returns the bytes that caches
+    /// on chip serve, which are not traffic.
     pub fn send(&mut self, mut memory: impl FnMut(&Access) -> u64) {
         for access in self.traffic.accesses.drain(..) {
             let served = memory(&access);
@@ -229,7 +230,7 @@ impl<'a> FrameClients<'a> {
         }
     }
 
-    /// Traffic of each client that has any, where the texture units read so many bytes, and what vertex processing did.
+    /// Traffic of each active client, given the texture units' bytes, and the counts of vertex processing.
     #[must_use]
     pub fn result(&self, texture_bytes: u64) -> (Vec<ClientTraffic>, GeometryCounts) {
         let dram = self.config.dram.unwrap_or_default();
@@ -250,7 +251,7 @@ impl<'a> FrameClients<'a> {
     }
 }
 
-/// A trace whose geometry is asked for and absent.
+/// The error for a trace without the requested geometry.
 #[must_use]
 pub fn missing() -> StreamError {
     StreamError::Tables(

@@ -1,4 +1,4 @@
-//! Colour and depth of an immediate machine: quad by quad through write-back caches.
+//! Colour and depth of an immediate machine, quad by quad through write-back caches.
 
 use super::Traffic;
 use super::buffers::Buffers;
@@ -12,15 +12,15 @@ use formats::textrace::geometry::ViewTarget;
 use formats::textrace::{Surfaces, Tables, Tile};
 use std::collections::{BTreeMap, HashSet};
 
-/// The pictures and layers of a frame. Every recorded quad passes the depth test; lines are cleared without traffic until they
-/// are written for the first time, and at the end of the frame colour that was never drawn is.
+/// The pictures and layers of a frame. Every recorded quad passes the depth test. Lines are cleared without
+/// traffic until first written; at the end of the frame, colour that was never drawn is written too.
 pub(super) struct Pixels {
     blended: Blended,
     colour: Attachment,
     depth: Attachment,
-    /// Of each pass that is shown: width and height, and the pixels of the resolved picture.
+    /// Size and resolved picture of each shown pass.
     passes: Vec<([u32; 2], u64)>,
-    /// Bytes of a pixel before and after the resolve; none without one.
+    /// Bytes per pixel before and after the resolve; none without multisampling.
     resolve_bytes: Option<[u64; 2]>,
     tile: Tile,
 }
@@ -67,7 +67,7 @@ impl Pixels {
         }
     }
 
-    /// A core draws the quads of an item.
+    /// Draws the quads of an item on a core.
     pub fn item(
         &mut self,
         core: usize,
@@ -82,13 +82,13 @@ impl Pixels {
                 let records = &tile.records[run.first as usize..(run.first + run.count) as usize];
                 let mut last = None;
                 for record in records {
-                    // Several groups of one quad are one access.
+                    // Several uv groups of a quad are one access.
                     let place = [record.x, record.y].map(u32::from);
                     if last.replace(place) == Some(place) {
                         continue;
                     }
                     let quad = place.map(|p| 2 * p);
-                    // Depth is tested, then written unless the draw blends.
+                    // Depth is tested, and written unless the draw blends.
                     let blends = self.blended.has(run.draw);
                     self.depth.quad(core, at, quad, [true, !blends], traffic);
                     self.colour.quad(core, at, quad, [blends, true], traffic);
@@ -98,7 +98,7 @@ impl Pixels {
         Ok(())
     }
 
-    /// Writes back what is changed and clears the colour that nothing was drawn into; then samples are resolved.
+    /// Writes back modified lines, clears the colour of undrawn lines, and resolves samples.
     pub fn finish(mut self, traffic: &mut Traffic) {
         self.colour.flush(traffic);
         self.colour.clear_rest(&self.passes, traffic);
@@ -115,7 +115,7 @@ impl Pixels {
     }
 }
 
-/// Draws that are not opaque.
+/// Whether each draw is not opaque.
 struct Blended(Vec<bool>);
 
 impl Blended {
@@ -133,12 +133,12 @@ impl Blended {
     }
 }
 
-/// An attachment of every pass: caches by core, and the lines that memory holds.
+/// An attachment of every pass, with one cache per core and the lines present in memory.
 struct Attachment {
     client: Client,
     caches: Vec<WriteBack>,
     in_memory: HashSet<u64>,
-    /// Pixels of a line: columns and rows, powers of two.
+    /// Pixels per line: columns and rows, powers of two.
     block: [u32; 2],
     line_bytes: u64,
     tile_px: u32,
@@ -167,7 +167,7 @@ impl Attachment {
         columns * rows
     }
 
-    /// The line of a pixel: lines of a tile lie one behind the other, and the tiles, too.
+    /// The line of a pixel. Lines of a tile are consecutive, and so are the tiles.
     fn line(&self, at: TileRef, [x, y]: [u32; 2]) -> u64 {
         let columns = self.tile_px / self.block[0];
         let in_tile = y / self.block[1] * columns + x / self.block[0];
@@ -175,7 +175,8 @@ impl Attachment {
         first + u64::from(at.tile) * self.lines_of_tile() + u64::from(in_tile)
     }
 
-    /// A quad at its top left pixel in a tile. `reads` what was drawn before, `writes` a new value.
+    /// Accesses a quad at its top left pixel in a tile. `reads`: earlier values are read; `writes`: new
+    /// values are written.
     fn quad(
         &mut self,
         core: usize,
@@ -203,7 +204,7 @@ impl Attachment {
         }
     }
 
-    /// Writes back what is changed.
+    /// Writes back modified lines.
     fn flush(&mut self, traffic: &mut Traffic) {
         for cache in &mut self.caches {
             for line in cache.flush() {
@@ -213,7 +214,7 @@ impl Attachment {
         }
     }
 
-    /// Writes the lines of the passes that nothing was drawn into.
+    /// Writes the lines of the passes that were never drawn.
     fn clear_rest(&self, passes: &[([u32; 2], u64)], traffic: &mut Traffic) {
         let lines = |(size_px, _): &([u32; 2], u64)| {
             let [columns, rows] =

@@ -1,4 +1,4 @@
-//! Closed forms.
+//! Compares traffic with closed forms.
 
 use super::*;
 use crate::config::Order;
@@ -36,7 +36,7 @@ impl TileSource for Trace {
     }
 }
 
-/// Two pictures of a size, drawn by one mesh; each tile has the primitives that `list` gives for it.
+/// Two pictures of a size, drawn with one mesh. `list` gives the primitives of each tile.
 fn trace(size_px: [u32; 2], mesh: MeshGeometry, list: impl Fn(u32) -> Vec<u32>) -> Trace {
     let mut memory = Synthetic {
         size_px,
@@ -76,7 +76,7 @@ fn trace(size_px: [u32; 2], mesh: MeshGeometry, list: impl Fn(u32) -> Vec<u32>) 
     }
 }
 
-/// A strip of so many triangles as a list: triangle i has the vertices i, i + 1, i + 2.
+/// A triangle list of a strip: triangle i has the vertices i, i + 1, i + 2.
 fn strip(triangles: u32) -> MeshGeometry {
     MeshGeometry {
         vertices: triangles + 2,
@@ -86,14 +86,14 @@ fn strip(triangles: u32) -> MeshGeometry {
     }
 }
 
-/// Traffic by client, and what vertex processing did.
+/// Traffic by client, and counts of vertex processing.
 #[derive(Debug)]
 struct WholeFrame {
     clients: Vec<ClientTraffic>,
     geometry: GeometryCounts,
 }
 
-/// All frames; items go to the cores in turn. The accesses add up to the traffic.
+/// Runs all frames, with items assigned round robin. Checks that the accesses add up to the traffic.
 fn traffic(
     source: &dyn TileSource,
     config: &RunConfig,
@@ -199,7 +199,7 @@ fn a_strip_shades_each_vertex_once_and_reads_its_lines_once() {
         }
     }
     let whole = count(&drawn, &FrameConfig::default(), Order::SCANLINE);
-    // Two eyes; 1002 vertices of a line each, 3000 indices of two bytes.
+    // Two eyes with 1002 vertices of one line each and 3000 two-byte indices.
     assert_eq!(of(&whole, Client::Vertex), [2 * 1002 * 64, 0]);
     assert_eq!(of(&whole, Client::Index), [2 * 94 * 64, 0]);
     assert_eq!(
@@ -211,7 +211,7 @@ fn a_strip_shades_each_vertex_once_and_reads_its_lines_once() {
             list_entries: 2002,
         }
     );
-    // Lists of 4000 and 4 bytes, in whole lines; written once, read once.
+    // Lists of 4000 and 4 bytes in whole lines, written once and read once.
     assert_eq!(of(&whole, Client::PrimitiveList), [2 * (4032 + 64); 2]);
     let [read, written] = of(&whole, Client::ShadedVertex);
     let (positions, varyings) = (1002 * 16_u64, 1002 * 32_u64);
@@ -219,7 +219,7 @@ fn a_strip_shades_each_vertex_once_and_reads_its_lines_once() {
         written,
         2 * (positions.next_multiple_of(64) + varyings.next_multiple_of(64))
     );
-    // Tile 0 reads all lines once; tile 1 is the other core's, and reads the last triangle's 3 vertices.
+    // Tile 0 reads all lines once. Tile 1 belongs to the other core and reads the 3 vertices of the last triangle.
     assert_eq!(read, written + 2 * (2 + 2) * 64);
     // Hidden primitives need no varyings.
     for tile in drawn.memory.tiles.iter_mut().flatten() {
@@ -245,7 +245,7 @@ fn a_strip_shades_each_vertex_once_and_reads_its_lines_once() {
 
 #[test]
 fn vertices_beyond_the_post_transform_cache_are_shaded_again() {
-    // 100 fans around vertex 0 that come back to the same rim of 40 vertices.
+    // 100 fans around vertex 0 over the same rim of 40 vertices.
     let rim = |i: u32| 1 + i % 40;
     let mesh = MeshGeometry {
         vertices: 41,
@@ -261,7 +261,7 @@ fn vertices_beyond_the_post_transform_cache_are_shaded_again() {
         };
         count(&drawn, &machine, Order::MORTON)
     };
-    // All 41 fit: once each. Else each rim vertex again on each turn.
+    // If all 41 fit, each is shaded once. Otherwise each rim vertex is shaded again in every fan.
     assert_eq!(shaded(41).geometry.vertices_shaded, 2 * 41);
     let first_in_first_out = {
         let (mut queue, mut shaded) = (std::collections::VecDeque::new(), 0);
@@ -278,11 +278,11 @@ fn vertices_beyond_the_post_transform_cache_are_shaded_again() {
     };
     assert_eq!(shaded(32).geometry.vertices_shaded, 2 * first_in_first_out);
     assert!(first_in_first_out > 4000);
-    // The fetch cache of 8 KiB holds the mesh, so that memory is read once.
+    // The fetch cache of 8 KiB holds the mesh, so memory is read once.
     assert_eq!(of(&shaded(32), Client::Vertex), [2 * 41 * 64, 0]);
 }
 
-/// A grid of quads of 8 x 8 pixels, two triangles each: each tile of 16 x 16 has the 8 triangles in it.
+/// A grid of quads of 8 x 8 pixels with two triangles each: every tile of 16 x 16 contains 8 triangles.
 #[test]
 fn a_grid_of_triangles_has_lists_of_its_triangles_by_tile() {
     let cells = 16;
@@ -328,7 +328,7 @@ fn a_grid_of_triangles_has_lists_of_its_triangles_by_tile() {
             order.name()
         );
         assert_eq!(whole.geometry.list_entries, 2 * 64 * 8);
-        // Neighbours share the vertices of their border: each written position is read at least once. Nothing is seen.
+        // Neighbouring triangles share vertices: each written position is read at least once. Nothing is visible.
         let [read, written] = of(&whole, Client::ShadedVertex);
         assert!(
             read >= written / 3 && read < 2 * written,
@@ -340,7 +340,8 @@ fn a_grid_of_triangles_has_lists_of_its_triangles_by_tile() {
 
 #[test]
 fn an_immediate_machine_writes_what_it_draws_and_reads_what_it_blends_over() {
-    // One line holds 4 x 4 pixels of 4 bytes: 16 in a tile. Draw every quad of the left picture's only tile, `times` over.
+    // A line holds 4 x 4 pixels of 4 bytes, so a tile has 16. Draws every quad of the left picture's only
+    // tile `times` times.
     let drawn = |times: u32, is_blended: bool| {
         let mut drawn = trace([16, 16], strip(times), |_| (0..times).collect());
         let quads = (0..64_u8).map(|m| {
@@ -376,15 +377,15 @@ fn an_immediate_machine_writes_what_it_draws_and_reads_what_it_blends_over() {
         ..FrameConfig::default()
     };
     let picture = 16 * 16 * 4;
-    // The cache holds the tile: written at the end; the other picture is cleared. Its depth stays cleared.
+    // The cache holds the tile, which is written at the end. The other picture is cleared. Its depth stays cleared.
     let whole = count(&drawn(3, false), &machine(16 << 10), Order::MORTON);
     assert_eq!(of(&whole, Client::Colour), [0, 2 * picture]);
     assert_eq!(of(&whole, Client::Depth), [0, picture]);
-    // Four lines: each primitive writes the whole tile to memory, and reads the depth that the one before left.
+    // With four lines, each primitive writes the whole tile to memory and reads the depth of the primitive before.
     let whole = count(&drawn(3, false), &machine(4 * 64), Order::MORTON);
     assert_eq!(of(&whole, Client::Colour), [0, 3 * picture + picture]);
     assert_eq!(of(&whole, Client::Depth), [2 * picture, 3 * picture]);
-    // Blended draws read colour, and leave depth alone.
+    // Blended draws read colour and do not write depth.
     let whole = count(&drawn(3, true), &machine(4 * 64), Order::MORTON);
     assert_eq!(
         of(&whole, Client::Colour),

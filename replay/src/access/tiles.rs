@@ -1,5 +1,5 @@
-//! The tiles of a tile-based machine: they read their primitive list, the positions of its primitives, and the varyings
-//! of those that have fragments left.
+//! Tiles of a tile-based machine: reads of their primitive lists, of the positions of their primitives, and
+//! of the varyings of visible primitives.
 
 use super::Traffic;
 use super::vertices::{POSITION_BYTES, ShadedView};
@@ -29,7 +29,7 @@ impl Tiles {
         }
     }
 
-    /// Renders the shadow maps row by row; their tiles go to the cores in turn.
+    /// Renders the shadow maps row by row, with tiles assigned round robin.
     pub fn shadow_maps(&mut self, views: &[ShadedView], traffic: &mut Traffic) {
         let shadow_maps = (0..)
             .zip(views)
@@ -43,7 +43,7 @@ impl Tiles {
         }
     }
 
-    /// A core renders an item of one tile or two. `shaded` has the quads that hidden-surface removal leaves.
+    /// Renders an item of one or two tiles on a core. `shaded` has the quads that remain after hidden-surface removal.
     pub fn item(
         &mut self,
         core: usize,
@@ -65,7 +65,7 @@ impl Tiles {
         Ok(())
     }
 
-    /// A core's work item of one tile or two.
+    /// A core's work item of one or two tiles.
     fn render(
         &mut self,
         core: usize,
@@ -128,17 +128,17 @@ impl Tiles {
     }
 }
 
-/// The primitives of a tile, and which of them have fragments.
+/// The primitives of a tile, and whether each has fragments.
 #[derive(Default)]
 struct List {
     view: usize,
     primitives: Vec<(u32, bool)>,
-    /// Its first byte.
+    /// First byte of the list.
     address: u64,
 }
 
 impl List {
-    /// Of a shadow map, which needs no varyings.
+    /// The list of a shadow map's tile, which needs no varyings.
     fn of_positions(view: usize, of: &ShadedView, tile: usize) -> Self {
         let list = of.lists.tile(tile).iter();
         Self {

@@ -1,4 +1,4 @@
-//! Vertex processing of a view: index and vertex fetch, reuse of shaded vertices, and what is written for the tiles.
+//! Vertex processing of a view: index and vertex fetch, reuse of shaded vertices, and the data written for tiles.
 
 use super::Traffic;
 use super::buffers::Buffers;
@@ -17,11 +17,11 @@ pub(super) const POSITION_BYTES: u64 = 16;
 pub(super) struct ShadedView {
     pub view: GeometryView,
     pub lists: TileLists,
-    /// Primitives that enter any tile, ascending.
+    /// Primitives in at least one tile, ascending.
     pub kept: Vec<u32>,
-    /// Shaded vertices of each of them.
+    /// Shaded vertices of each primitive.
     pub vertices: Vec<[u32; 3]>,
-    /// View whose varyings are this one's (multiview), by its place in the frame.
+    /// Index in the frame of the view whose varyings this view shares (multiview).
     pub varyings_of: Option<usize>,
     /// First bytes of the shaded positions and varyings.
     pub positions: u64,
@@ -30,14 +30,14 @@ pub(super) struct ShadedView {
     list_addresses: Vec<u64>,
 }
 
-/// What a view takes over from another.
+/// What a view reuses from another view.
 pub(super) enum Reuse<'a> {
     None,
-    /// Reads and varyings of the view at a place in the frame: both are shaded at once.
+    /// The reads and varyings of this view, which has this index in the frame.
     Of(&'a ShadedView, usize),
 }
 
-/// Vertex processing, and the sums that it adds to.
+/// Vertex processing, and the sums it updates.
 pub(super) struct Stage<'a> {
     pub geometry: &'a Geometry,
     pub tables: &'a Tables,
@@ -129,14 +129,14 @@ impl Stage<'_> {
         let bytes = vertices * POSITION_BYTES;
         of.positions = buffers.place(bytes);
         traffic.write(Client::ShadedVertex, of.positions, bytes);
-        // A shadow map has depth alone.
+        // A shadow map only needs depth.
         let is_picture = matches!(of.view.target, ViewTarget::Pass(_));
         if is_picture && of.varyings_of.is_none() {
             let bytes = vertices * u64::from(self.machine.varying_bytes);
             of.varyings = buffers.place(bytes);
             traffic.write(Client::ShadedVertex, of.varyings, bytes);
         }
-        // Each tile's list begins a line.
+        // Each tile's list starts a line.
         let entry_bytes = u64::from(self.machine.list_entry_bytes);
         let line_bytes = u64::from(self.machine.line_bytes);
         let sizes: Vec<u64> = (0..of.tile_count())
@@ -153,7 +153,7 @@ impl Stage<'_> {
 }
 
 impl ShadedView {
-    /// Tiles of the view.
+    /// Number of tiles of the view.
     pub fn tile_count(&self) -> usize {
         self.list_addresses.len()
     }
@@ -163,7 +163,7 @@ impl ShadedView {
         self.list_addresses.get(tile).copied().unwrap_or(0)
     }
 
-    /// The pass that the view renders; a shadow map has none.
+    /// The pass that the view renders; none for a shadow map.
     pub fn pass<'t>(&self, tables: &'t Tables) -> Option<&'t Pass> {
         match self.view.target {
             ViewTarget::Pass(pass) => tables.passes.get(pass as usize),
@@ -178,9 +178,9 @@ impl ShadedView {
     }
 }
 
-/// Shaded vertices that are still there, first in, first out (Hoppe 1999).
+/// The post-transform cache: the most recently shaded vertices, first in, first out (Hoppe 1999).
 struct Shader {
-    /// Vertex, and its place once it has been written.
+    /// Each vertex, and the number under which it was written, if it was.
     recent: VecDeque<(u32, Option<u32>)>,
     entries: usize,
 }
@@ -193,12 +193,12 @@ impl Shader {
         }
     }
 
-    /// Another draw has other vertices.
+    /// Empties the cache, because another draw has other vertices.
     fn start_draw(&mut self) {
         self.recent.clear();
     }
 
-    /// Its place in the queue, and whether the vertex had to be shaded.
+    /// Returns the vertex's index in the queue, and whether it had to be shaded.
     fn shade(&mut self, vertex: u32) -> (usize, bool) {
         if let Some(entry) = self.recent.iter().position(|(recent, _)| *recent == vertex) {
             return (entry, false);
@@ -210,7 +210,7 @@ impl Shader {
         (self.recent.len() - 1, true)
     }
 
-    /// Number under which the vertex of an entry is written; a new one if it has none yet.
+    /// The number under which an entry's vertex is written, allocating one if necessary.
     fn written(&mut self, entry: usize, next: &mut u32) -> u32 {
         *self.recent[entry].1.get_or_insert_with(|| {
             *next += 1;

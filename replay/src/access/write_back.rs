@@ -1,15 +1,15 @@
-//! A write-back cache that allocates on writes without fetching, as colour and depth caches with byte masks do.
+//! A write-back cache that allocates on writes without fetching, like colour and depth caches with byte masks.
 
-/// What an access causes.
+/// The effect of an access.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Effect {
-    /// The line was not there.
+    /// The line was absent.
     pub missed: bool,
-    /// A changed line that was written back to make room.
+    /// A modified line that was evicted and written back.
     pub evicted: Option<u64>,
 }
 
-/// Four ways, LRU: tags with a flag for lines that were changed, most recent first.
+/// A four-way LRU cache: tags with a modified flag, most recently used first.
 #[derive(Debug)]
 pub(super) struct WriteBack {
     ways: Vec<(u64, bool)>,
@@ -46,7 +46,7 @@ impl WriteBack {
         }
     }
 
-    /// Writes all changed lines back and empties the cache.
+    /// Writes back all modified lines and empties the cache.
     pub fn flush(&mut self) -> impl Iterator<Item = u64> {
         let ways = self.ways.iter_mut();
         ways.filter_map(|way| {
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
     use std::collections::HashMap;
 
-    /// Against time stamps.
+    /// Compares with a cache that uses time stamps.
     #[test]
     fn accesses_do_what_a_plain_list_of_lines_does() {
         let mut cache = WriteBack::new(16);

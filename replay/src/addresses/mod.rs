@@ -1,7 +1,9 @@
-//! Plain addresses, of any program, through the caches of one core and the memory below them: no tiles, no texture unit.
+//! Replays plain addresses of any program through the caches of one core and the memory below them, without
+//! tiles and texture unit.
 //!
-//! Addresses become cache lines in blocks ([`for_lines`]); repeats of the line before are dropped, since they find it in
-//! every cache and change nothing; what is left goes through all configurations, those that are LRU in one pass.
+//! Addresses are converted to cache lines in blocks ([`for_lines`]). Repeated accesses to the previous line
+//! are dropped, because they hit in every cache and change nothing. The rest goes through all
+//! configurations; LRU configurations share one pass.
 
 mod lines;
 mod names;
@@ -22,16 +24,16 @@ use repeats::Repeats;
 use thiserror::Error;
 use touched::Touched;
 
-/// Why addresses cannot be replayed.
+/// Reasons why addresses cannot be replayed.
 #[derive(Debug, Error)]
 pub enum AddressError {
-    /// A configuration is impossible.
+    /// An impossible configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The input cannot be read or is not of its form.
+    /// Unreadable or malformed input.
     #[error(transparent)]
     Input(#[from] FormatError),
-    /// The lines do not fit numbers of 32 bits.
+    /// The lines cannot be numbered with 32 bits.
     #[error(
         "{file}: expected accesses to at most {most} ranges of {range_bytes} bytes, found more: larger lines \
          or smaller caches need fewer"
@@ -39,12 +41,12 @@ pub enum AddressError {
     TooManyRanges {
         /// The input.
         file: String,
-        /// Ranges that can be told apart.
+        /// Maximum number of ranges.
         most: u64,
-        /// Size of a range.
+        /// Size of a range in bytes.
         range_bytes: u64,
     },
-    /// Nothing is left to replay.
+    /// No access of the selected kinds.
     #[error("{file}: expected at least one access of the kinds that --kinds names, found none")]
     NoneOfKinds {
         /// The input.
@@ -52,11 +54,11 @@ pub enum AddressError {
     },
 }
 
-/// Replays the accesses of `kinds` under every configuration, of which there is at least one and all
-/// have the same line size. Of a configuration, line size, levels, prefetcher, DRAM and seed count.
+/// Replays the accesses of `kinds` with every configuration. There is at least one configuration, and all
+/// have the same line size. Only line size, levels, prefetcher, DRAM and seed are used.
 ///
 /// # Errors
-/// An impossible configuration; input that cannot be read, is damaged or has nothing to replay.
+/// An impossible configuration; input that is unreadable, damaged or has nothing to replay.
 pub fn replay(
     file: AddressFile<'_>,
     configs: &[RunConfig],
@@ -78,10 +80,10 @@ pub fn replay(
     })
 }
 
-/// Neighbouring lines that must stay neighbours when lines get numbers of 32 bits.
+/// Number of consecutive lines that stay consecutive when lines are renumbered with 32 bits.
 fn names_keep(configs: &[RunConfig]) -> Result<u32, ConfigError> {
-    /// Where the order of misses matters to what is below the L2, prefetchers and DRAM rows see neighbours as they are
-    /// within so many lines, as an operating system with pages of that size would place them.
+    /// If the order of misses matters below the L2, prefetchers and DRAM rows see true neighbours within
+    /// this many lines, as if an operating system placed pages of this size.
     const PAGE_LINES: u32 = 1 << 20;
     let mut most = 1;
     for config in configs {

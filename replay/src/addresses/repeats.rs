@@ -1,23 +1,22 @@
-//! Drops look-ups of the line that was looked up before: they find it in every cache of every policy
-//! and change nothing.
+//! Drops repeated look-ups of the previous line, which hit in every cache of every policy and change nothing.
 
 use super::lines::{BLOCK, LineBlock};
 use crate::stream::Tag;
 use formats::interop::plain::AccessKind;
 
-/// Drops repeats, also those of the last line of the block before.
+/// Drops repeats, also across blocks.
 pub struct Repeats {
-    /// `u32::MAX` is no line.
+    /// The previous line, or `u32::MAX` for none.
     last: u32,
     drops: bool,
     lines: Box<[u32; BLOCK]>,
     tags: Vec<Tag>,
-    /// The tags of reads alone.
+    /// The tag of a read, repeated.
     reads: Box<[Tag; BLOCK]>,
 }
 
 impl Repeats {
-    /// Without `drops` all look-ups are kept.
+    /// Without `drops`, all look-ups are kept.
     pub fn new(drops: bool) -> Self {
         Self {
             last: u32::MAX,
@@ -28,7 +27,7 @@ impl Repeats {
         }
     }
 
-    /// The lines that are left of a block, and a tag for each with its kind of access.
+    /// The remaining lines of a block, each with a tag for its kind of access.
     #[inline(always)]
     pub fn drop_from<'a>(&'a mut self, block: &LineBlock<'a>) -> (&'a [u32], &'a [Tag]) {
         self.tags.clear();
@@ -45,7 +44,7 @@ impl Repeats {
         }
         let (mut last, mut count) = (self.last, 0);
         for &line in block.lines {
-            // No branch: whether a line repeats is unpredictable.
+            // Branch-free: whether a line repeats is unpredictable.
             self.lines[count % BLOCK] = line;
             count += usize::from(line != last);
             last = line;
@@ -54,7 +53,7 @@ impl Repeats {
         (&self.lines[..count], self.tags_of(count))
     }
 
-    /// Without tags of its own, a block has reads alone.
+    /// The tags of a block, which are all reads if it has no kinds.
     fn tags_of(&self, count: usize) -> &[Tag] {
         match self.tags.is_empty() {
             true => &self.reads[..count],
@@ -63,7 +62,7 @@ impl Repeats {
     }
 }
 
-/// Kinds are the cells of [`crate::stream::Bins::of_kinds`].
+/// Kinds correspond to the cells of [`crate::stream::Bins::of_kinds`].
 fn tag(kind: AccessKind) -> Tag {
     Tag::of_line(kind as u32)
 }

@@ -1,4 +1,4 @@
-//! What a replay of plain addresses yields.
+//! The result of replaying plain addresses.
 
 use super::Totals;
 use crate::config::RunConfig;
@@ -8,26 +8,26 @@ use crate::result::MemoryResult;
 /// Counters of one level, by kind: reads, writes, fetches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LevelCounts {
-    /// Lines asked for.
+    /// Line look-ups.
     pub lookups: [u64; 3],
-    /// Lines that had to be fetched from below.
+    /// Lines fetched from below.
     pub misses: [u64; 3],
 }
 
 impl LevelCounts {
-    /// Lines asked for, all kinds together.
+    /// Line look-ups of all kinds.
     #[must_use]
     pub fn line_lookups(&self) -> u64 {
         self.lookups.iter().sum()
     }
 
-    /// Lines that had to be fetched, all kinds together.
+    /// Line misses of all kinds.
     #[must_use]
     pub fn line_misses(&self) -> u64 {
         self.misses.iter().sum()
     }
 
-    /// Missing line look-ups over line look-ups; none over none is none.
+    /// Line misses over line look-ups; 0 without look-ups.
     #[must_use]
     pub fn miss_rate(&self) -> f64 {
         match self.line_lookups() {
@@ -37,21 +37,21 @@ impl LevelCounts {
     }
 }
 
-/// One configuration.
+/// The result for one configuration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Its caches and line size are what counts here.
+    /// The configuration, of which only caches and line size matter here.
     pub config: RunConfig,
     /// First level.
     pub l1: LevelCounts,
-    /// Second level: what misses the first comes here.
+    /// Second level, which receives the misses of the first.
     pub l2: LevelCounts,
-    /// What was counted beside and below the L2.
+    /// Counts beside and below the L2.
     pub memory: MemoryResult,
 }
 
 impl Point {
-    /// A point with the misses of all levels.
+    /// Combines totals with the misses of all levels.
     pub(super) fn new(config: &RunConfig, totals: &Totals, outcome: LineOutcome) -> Self {
         let [l1, l2] = [0, 1].map(|level: usize| {
             let mut misses = [0; 3];
@@ -83,13 +83,13 @@ impl Point {
     }
 }
 
-/// All configurations of one replay.
+/// The results for all configurations.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What was accessed.
+    /// Totals of the input.
     pub totals: Totals,
     /// Distinct lines: the misses of an infinite cache.
     pub unique_lines: u64,
-    /// In the order in which they were asked for.
+    /// In the order of the configurations.
     pub points: Vec<Point>,
 }

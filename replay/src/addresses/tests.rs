@@ -50,7 +50,7 @@ fn config(line_bytes: u32, l1: (u64, u32), l2: (u64, u32), policy: Replacement) 
     }
 }
 
-/// Sets as lists: the newest first, for LRU and, if hits do not count as use, FIFO.
+/// Sets as lists, newest first: LRU, or FIFO if hits do not count as use.
 struct Plain {
     sets: Vec<VecDeque<u64>>,
     ways: usize,
@@ -86,7 +86,7 @@ impl Plain {
     }
 }
 
-/// Look-ups and misses by kind, and distinct lines, the plainest way.
+/// Look-ups and misses by kind, and distinct lines, computed in the plainest way.
 fn plainly(accesses: &[PlainAccess], config: &RunConfig) -> (Point, u64) {
     let mut l1 = Plain::new(&config.level.l1, config.line_bytes);
     let mut l2 = Plain::new(&config.level.l2, config.line_bytes);
@@ -145,7 +145,7 @@ fn many_configurations_in_one_pass_count_as_each_alone() {
             configs.push(config(32, l1, l2, Replacement::LRU));
         }
     }
-    // The same geometry with other policies is no part of the pass.
+    // The same geometry with other policies is not part of the shared pass.
     for policy in [
         Replacement::FIFO,
         Replacement::TREE_PLRU,
@@ -168,7 +168,7 @@ fn many_configurations_in_one_pass_count_as_each_alone() {
 }
 
 #[test]
-fn kinds_that_are_not_wanted_are_left_out_and_counted() {
+fn kinds_that_are_not_selected_are_skipped_and_counted() {
     let all = accesses(5000);
     let config = config(32, (1024, 4), (4096, 4), Replacement::LRU);
     let wanted = KindSet::of(&[AccessKind::Read, AccessKind::Write]);
@@ -185,7 +185,7 @@ fn kinds_that_are_not_wanted_are_left_out_and_counted() {
 }
 
 #[test]
-fn lines_are_handed_over_with_all_repeats() {
+fn lines_are_passed_on_with_all_repeats() {
     let all = accesses(10_000);
     let (mut lines, mut blocks) = (Vec::new(), 0);
     let totals = for_lines(file(&all), 64, 1 << 12, |block| {

@@ -1,4 +1,4 @@
-//! What a `[dram]` table can say.
+//! Checks of a `[dram]` table.
 
 use super::{ConfigError, accept, in_range};
 use crate::memory::dram::DramConfig;
@@ -7,7 +7,7 @@ impl DramConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// The first one out of range.
+    /// The first value that is out of range.
     pub fn check(&self) -> Result<(), ConfigError> {
         accept(
             self.channels.is_power_of_two() && self.channels <= 64,

@@ -1,4 +1,4 @@
-//! What is wrong with a configuration.
+//! Errors in a configuration.
 
 use super::{MOST_LINES, MOST_SETS};
 use std::borrow::Cow;
@@ -6,66 +6,66 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use thiserror::Error;
 
-/// A configuration that no machine can have.
+/// An invalid configuration.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ConfigError {
-    /// Sets are not a power of two.
+    /// The number of sets is not a power of two.
     #[error(
         "{level} cache of {size}, {ways} ways, {line_bytes}-byte lines: expected a power-of-two number of sets up to {MOST_SETS}, found {found}"
     )]
     Sets {
         /// `L1`, `L2`, ...
         level: &'static str,
-        /// Size as text.
+        /// Size, formatted.
         size: String,
         /// Ways.
         ways: u32,
-        /// Line size.
+        /// Line size in bytes.
         line_bytes: u32,
-        /// Size over ways and line size.
+        /// The number of sets found.
         found: String,
     },
-    /// More lines than this machine can keep.
+    /// More lines than the limit.
     #[error(
         "{level} cache of {size}, {line_bytes}-byte lines: expected at most {MOST_LINES} lines in all caches of the level, found {caches} x {found}"
     )]
     Lines {
         /// `L1`, `L2`, ...
         level: &'static str,
-        /// Size as text.
+        /// Size, formatted.
         size: String,
-        /// Line size.
+        /// Line size in bytes.
         line_bytes: u32,
         /// Caches of this size.
         caches: u32,
-        /// Lines of each.
+        /// Lines per cache.
         found: u64,
     },
-    /// Ways that the policy cannot have.
+    /// A number of ways that the policy does not support.
     #[error("{level} cache with {policy}: expected {expected} ways, found {found}")]
     Ways {
         /// `L1`, `L2`, ...
         level: &'static str,
         /// Replacement policy.
         policy: &'static str,
-        /// What the policy can have.
+        /// The supported numbers.
         expected: &'static str,
-        /// Ways.
+        /// The number found.
         found: u32,
     },
-    /// A value that its key does not take.
+    /// A value that is not valid for its key.
     #[error("{key}: expected {expected}, found {found}")]
     Value {
-        /// Key as in the configuration file.
+        /// Key in the configuration file.
         key: &'static str,
-        /// What is accepted.
+        /// The valid values.
         expected: Cow<'static, str>,
-        /// What was given.
+        /// The value found.
         found: String,
     },
 }
 
-/// Refuses a value unless `is_accepted`.
+/// Fails unless `is_accepted`.
 pub(crate) fn accept(
     is_accepted: bool,
     key: &'static str,
@@ -82,7 +82,7 @@ pub(crate) fn accept(
     }
 }
 
-/// Refuses a value outside a range.
+/// Fails if the value is outside the range.
 pub(crate) fn in_range<T: PartialOrd + Display>(
     key: &'static str,
     value: T,

@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum FrameMachine {
-    /// Tile by tile on chip; a G-buffer, if there is one, stays in pixel-local storage.
+    /// Tile by tile on chip. A G-buffer, if the scene needs one, stays in pixel-local storage.
     #[default]
     TileBased,
-    /// Tile by tile, with a G-buffer that is written to memory and read again.
+    /// Tile by tile. The G-buffer is written to memory and read back.
     TileBasedGBuffer,
-    /// Colour and depth through caches of their own; shaded vertices stay on chip.
+    /// Colour and depth go through their own caches; shaded vertices stay on chip.
     Immediate,
 }
 
@@ -22,37 +22,38 @@ pub enum FrameMachine {
 pub struct FrameConfig {
     /// How the frame is rendered.
     pub machine: FrameMachine,
-    /// Both eyes' vertices are read and shaded once; positions are still written for each eye.
+    /// Read and shade the vertices of both eyes once. Positions are still written per eye.
     pub multiview: bool,
-    /// Layers are composed and the lens warp reads each picture and writes the display's.
+    /// Compose layers, then read each picture in the lens warp and write the display's.
     pub composition: bool,
-    /// Bytes of a pixel of a colour attachment.
+    /// Bytes per pixel of a colour attachment.
     pub color_bytes: u32,
-    /// Colour pictures in memory after lossless compression, in thousandths of their size; `--picture` measures it. Not for an
-    /// immediate machine.
+    /// Size of colour pictures in memory after lossless compression, in thousandths of the
+    /// uncompressed size; `--picture` measures it. Not for an immediate machine.
     #[serde(skip_serializing_if = "is_uncompressed")]
     pub color_compressed_permille: u32,
-    /// Bytes of a pixel of a depth attachment.
+    /// Bytes per pixel of a depth attachment.
     pub depth_bytes: u32,
-    /// Bytes of a pixel of the G-buffer.
+    /// Bytes per pixel of the G-buffer.
     pub g_buffer_bytes: u32,
-    /// Samples of a pixel. A tile-based machine resolves them on chip.
+    /// Samples per pixel. A tile-based machine resolves them on chip.
     pub samples: u32,
-    /// Depth of pictures and layers is written to memory; that of shadow maps always is.
+    /// Write the depth of pictures and layers to memory. Depth of shadow maps is always written.
     pub store_depth: bool,
-    /// Line size of all but the texture caches.
+    /// Line size in bytes of all caches except the texture caches.
     pub line_bytes: u32,
-    /// Shaded vertices that are kept for reuse within a draw (first in, first out).
+    /// Shaded vertices kept for reuse within a draw (first in, first out).
     pub post_transform_entries: u32,
-    /// Vertex fetch cache, 4-way LRU.
+    /// Size of the vertex fetch cache in bytes (4-way LRU).
     pub vertex_cache_bytes: u64,
-    /// Bytes of a shaded vertex besides its position of 16 bytes.
+    /// Bytes per shaded vertex in addition to its 16-byte position.
     pub varying_bytes: u32,
-    /// Cache of each core for shaded vertices, 4-way LRU.
+    /// Size of each core's cache for shaded vertices in bytes (4-way LRU).
     pub shaded_vertex_cache_bytes: u64,
-    /// Bytes of an entry of a primitive list.
+    /// Bytes per entry of a primitive list.
     pub list_entry_bytes: u32,
-    /// Colour cache and depth cache of each core of an immediate machine, 4-way LRU, write-back.
+    /// Size in bytes of the colour cache and of the depth cache of each core of an immediate
+    /// machine (4-way LRU, write-back).
     pub pixel_cache_bytes: u64,
 }
 
@@ -87,7 +88,7 @@ impl FrameConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// The first one out of range.
+    /// The first value that is out of range.
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         let line = self.line_bytes;
         accept(

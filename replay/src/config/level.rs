@@ -14,23 +14,23 @@ pub struct LevelConfig {
     pub ways: u32,
     /// Replacement policy.
     pub replacement: Replacement,
-    /// Lines that share a tag (a sectored cache); a miss fetches one of them.
+    /// Lines per tag (a sectored cache); a miss fetches one line.
     #[serde(skip_serializing_if = "is_one")]
     pub sectors: u32,
-    /// Lines of a fully associative victim cache beside it.
+    /// Lines of the fully associative victim cache next to it; 0: none.
     #[serde(skip_serializing_if = "is_zero")]
     pub victim_lines: u32,
-    /// Which lines of the levels above it holds.
+    /// Which lines of the levels above this level holds.
     #[serde(skip_serializing_if = "Inclusion::is_none")]
     pub inclusion: Inclusion,
-    /// Line size in bytes, below the L2 only; none: that of the level above.
+    /// Line size in bytes, only below the L2; default: that of the level above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_bytes: Option<u32>,
-    /// One cache for all cores; if not, one for each core.
+    /// One cache for all cores; otherwise one cache per core.
     pub shared: bool,
-    /// Cycles that a line takes from this level to the level above; 0 for the L1.
+    /// Cycles in which a line travels from this level to the level above; 0 for the L1.
     pub hit_cycles: u32,
-    /// Whose lines it holds; without effect unless there is a `[frame]`.
+    /// Whose lines it holds. Only used with a `[frame]` table.
     #[serde(skip_serializing_if = "LevelClients::is_textures")]
     pub clients: LevelClients,
 }
@@ -40,7 +40,7 @@ pub(super) fn is_one(value: &u32) -> bool {
 }
 
 impl LevelConfig {
-    /// A four-way LRU level of this size, shared, whose lines arrive at once.
+    /// A shared four-way LRU level of this size with a latency of zero.
     #[must_use]
     pub const fn lru(size_bytes: u64) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl LevelConfig {
         }
     }
 
-    /// True for LRU and one line per tag, alone: what stack distances describe.
+    /// True for plain LRU with one line per tag, the only cache that stack distances describe.
     #[must_use]
     pub fn is_plain_lru(&self) -> bool {
         self.replacement == Replacement::LRU
@@ -65,7 +65,7 @@ impl LevelConfig {
             && self.inclusion.is_none()
     }
 
-    /// Caches of the level in a machine of so many cores.
+    /// Caches of this level in a machine with `cores` cores.
     #[must_use]
     pub const fn caches(&self, cores: u32) -> u32 {
         if self.shared { 1 } else { cores }
@@ -74,7 +74,7 @@ impl LevelConfig {
     /// Number of sets for this line size.
     ///
     /// # Errors
-    /// The sets must be a power of two, the ways such as the policy can have.
+    /// The number of sets is not a power of two, or the policy does not support the number of ways.
     pub fn sets(&self, level: &'static str, line_bytes: u32) -> Result<u32, ConfigError> {
         let (expected, accepts) = self.replacement.ways_rule();
         if !accepts(self.ways) {
@@ -106,7 +106,7 @@ impl LevelConfig {
         Ok(sets as u32)
     }
 
-    /// Checks that `caches` such caches have lines that this machine's memory can stand for.
+    /// Checks that the tags of `caches` such caches fit into this machine's memory.
     pub(super) fn check_lines(
         &self,
         level: &'static str,
@@ -126,11 +126,11 @@ impl LevelConfig {
         Ok(())
     }
 
-    /// Checks sectors, victim cache and time.
+    /// Checks sectors, victim cache and latency.
     fn check_parts(&self, level: &'static str) -> Result<(), ConfigError> {
-        /// Sectors of a tag at most: a bit each.
+        /// Sectors per tag at most, one bit each.
         const MOST_SECTORS: u32 = 64;
-        /// A victim cache is searched line by line.
+        /// Limit for victim caches, which are searched linearly.
         const MOST_VICTIMS: u32 = 1024;
         accept(
             self.sectors.is_power_of_two() && self.sectors <= MOST_SECTORS,
@@ -159,15 +159,15 @@ impl LevelConfig {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelClients {
-    /// Those of the texture units.
+    /// The texture units.
     #[default]
     Textures,
-    /// Those of all clients of memory, whose own caches lie above it. Writes pass through and allocate nothing.
+    /// All clients of memory. Their own caches lie above this level. Writes pass through without allocation.
     All,
 }
 
 impl LevelClients {
-    /// True for a level of the texture units alone.
+    /// True if only texture units use the level.
     #[must_use]
     pub fn is_textures(&self) -> bool {
         *self == Self::Textures
@@ -183,14 +183,14 @@ pub enum Inclusion {
     /// Levels evict independently.
     #[default]
     None,
-    /// All of them: a line that the level evicts is invalidated in the levels above.
+    /// All lines. A line that this level evicts is invalidated in the levels above.
     Inclusive,
-    /// None of them: the level holds what the level above evicted, and a hit moves the line up. Not for the L2.
+    /// No lines. The level holds what the level above evicted, and a hit moves the line up. Not for the L2.
     Exclusive,
 }
 
 impl Inclusion {
-    /// True where levels evict independently.
+    /// True if levels evict independently.
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::None

@@ -1,4 +1,4 @@
-//! The cache levels of a machine: the `[[level]]` tables of a configuration, the L1 first.
+//! The cache levels of a machine: the `[[level]]` tables of a configuration, L1 first.
 
 use super::{ConfigError, Inclusion, LevelClients, LevelConfig, accept};
 use crate::memory::Replacement;
@@ -6,18 +6,18 @@ use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt::Display;
 
-/// The levels between the texture units and memory. Each has what misses the one above it.
+/// The levels between the texture units and memory. Each level receives the misses of the level above.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Levels {
     /// First level.
     pub l1: LevelConfig,
-    /// Second level, with lines of the same size.
+    /// Second level, with the same line size as the first.
     pub l2: LevelConfig,
-    /// Further levels, the L3 first.
+    /// Further levels, L3 first.
     lower: [Option<LevelConfig>; Levels::MOST - 2],
 }
 
-/// A table as it stands in a file. What is left out depends on the level.
+/// A `[[level]]` table of a file. The defaults of missing keys depend on the level.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LevelTable {
@@ -57,14 +57,14 @@ impl LevelTable {
 }
 
 impl Levels {
-    /// Levels at most.
+    /// Maximum number of levels.
     pub const MOST: usize = 6;
 
-    /// Their names.
+    /// Names of the levels.
     pub const NAMES: [&'static str; Self::MOST] = ["L1", "L2", "L3", "L4", "L5", "L6"];
 
-    /// A level of this size with everything else as it is unless a file says otherwise: the Z2 paper's L1 and L2
-    /// (section 4.1), and 16 ways and 60 cycles below them.
+    /// The default level of this size: the Z2 paper's L1 and L2 (section 4.1), and 16 ways and 60
+    /// cycles below them.
     #[must_use]
     pub const fn usual(index: usize, size_bytes: u64) -> LevelConfig {
         let lru = LevelConfig::lru(size_bytes);
@@ -85,7 +85,7 @@ impl Levels {
         }
     }
 
-    /// An L1 and an L2, of usual times and sharing.
+    /// An L1 and an L2 with default latencies and sharing.
     #[must_use]
     pub const fn two(l1: LevelConfig, l2: LevelConfig) -> Self {
         Self {
@@ -102,7 +102,7 @@ impl Levels {
         }
     }
 
-    /// With these levels below the L2; none if they are too many.
+    /// Returns these levels with `lower` below the L2, or none if there are too many.
     #[must_use]
     pub fn over(mut self, lower: &[LevelConfig]) -> Option<Self> {
         self.lower = [None; Self::MOST - 2];
@@ -123,7 +123,7 @@ impl Levels {
         self.lower[0].is_some()
     }
 
-    /// The size of the L3, which is added if there is none.
+    /// Sets the size of the L3, adding the level if there is none.
     pub fn set_l3(&mut self, size_bytes: u64) {
         match &mut self.lower[0] {
             Some(level) => level.size_bytes = size_bytes,
@@ -131,12 +131,12 @@ impl Levels {
         }
     }
 
-    /// All levels, the L1 first.
+    /// All levels, L1 first.
     pub fn iter(&self) -> impl Iterator<Item = &LevelConfig> {
         [&self.l1, &self.l2].into_iter().chain(self.lower())
     }
 
-    /// Each level with its name and its line size in bytes, where the L1 has such lines.
+    /// Each level with its name and its line size in bytes, given the L1's line size.
     pub fn named(
         &self,
         l1_line_bytes: u32,
@@ -148,7 +148,7 @@ impl Levels {
         })
     }
 
-    /// True where a level holds, or does not hold, a line because another one does.
+    /// True if the content of a level depends on what other levels evict.
     #[must_use]
     pub fn depend_on_evictions(&self) -> bool {
         self.iter().any(|level| !level.inclusion.is_none())
@@ -157,7 +157,7 @@ impl Levels {
     /// Checks every value.
     ///
     /// # Errors
-    /// The first one that is out of range.
+    /// The first value that is out of range.
     pub fn check(&self, l1_line_bytes: u32, cores: u32) -> Result<(), ConfigError> {
         let mut above = LevelConfig {
             line_bytes: Some(l1_line_bytes),
@@ -231,7 +231,8 @@ impl Levels {
         Ok(())
     }
 
-    /// The levels below the L2 in words, for a column: `4 MiB, 16 ways, lru, 64-byte lines, 60 cycles; ...`. None without any.
+    /// Describes the levels below the L2 for a column: `4 MiB, 16 ways, lru, 64-byte lines, 60
+    /// cycles; ...`. None without such levels.
     #[must_use]
     pub fn lower_text(&self, l1_line_bytes: u32) -> Option<String> {
         let level = |(_, level, line_bytes): (_, &LevelConfig, u32)| {

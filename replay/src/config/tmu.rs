@@ -3,16 +3,16 @@
 use super::{ConfigError, in_range, is_zero};
 use serde::{Deserialize, Serialize};
 
-/// When a line that misses gets its way in the cache, and its victim is lost.
+/// When a missing line is allocated a way and its victim is evicted.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Allocation {
-    /// When it arrives, as in the Z2 paper: lines in flight take no way.
+    /// When the line is filled, as in the Z2 paper: lines in flight occupy no way.
     #[default]
     OnFill,
-    /// When it is asked for: lines in flight take a way.
+    /// When the line is requested: lines in flight occupy a way.
     OnMiss,
 }
 
@@ -22,17 +22,19 @@ pub enum Allocation {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum TmuModel {
-    /// It requests all its lines and loops through the pipeline until they have arrived ("looping for the next chance").
+    /// It requests all its lines and loops through the pipeline until they are filled ("looping for
+    /// the next chance").
     #[default]
     Looping,
-    /// It stops at its first miss, and rates count first look-ups: the Z2 paper's machine, as its table suggests it.
+    /// It stops at its first miss, and rates count first look-ups: the Z2 paper's machine as its table suggests it.
     FirstMiss,
-    /// Footprints wait in a FIFO until their lines have arrived; tags are checked before, in order (Igehy et al., 1998).
+    /// Footprints wait in a FIFO until their lines are filled; tags are checked earlier, in order
+    /// (Igehy et al., 1998).
     PrefetchFifo,
 }
 
 impl TmuModel {
-    /// Its name in configuration files.
+    /// Name in configuration files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -47,28 +49,28 @@ impl TmuModel {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TmuConfig {
-    /// What a thread does whose lines are not in the L1; without effect in functional mode.
+    /// What a thread does whose lines are not in the L1. Not used in functional mode.
     pub model: TmuModel,
-    /// Pipeline length: a thread that missed is back at the first stage after this many cycles.
+    /// Pipeline length: a thread that misses re-enters the first stage after this many cycles.
     pub loop_cycles: u32,
-    /// Threads (quads) that a core holds at once.
+    /// Threads (quads) resident per core.
     pub threads: u32,
-    /// Footprints that one issue slot tries when their lines are not there: tags are checked a
-    /// quad at a time, while filtering takes one footprint a cycle.
+    /// Footprints that one issue slot tries while their lines are missing. Tags are checked one
+    /// quad at a time, but filtering takes one cycle per footprint.
     pub retry_footprints: u32,
-    /// Lines that a thread asks the L2 for in one trip; further ones wait for the next trip.
+    /// Lines that a thread requests from the L2 per trip; further lines wait for the next trip.
     pub fetches_per_trip: u32,
-    /// When a line that misses gets its way in a cache; without effect where time does not pass (functional mode).
+    /// When a missing line is allocated a way in a cache. Not used in functional mode.
     pub allocation: Allocation,
-    /// Misses of the L2 in flight at most (MSHRs), further ones wait; 0: any number. Without effect in functional mode.
+    /// MSHRs of the L2: misses in flight at most, further misses wait; 0: unlimited. Not used in functional mode.
     #[serde(skip_serializing_if = "is_zero")]
     pub l2_mshrs: u32,
-    /// Footprints that the FIFO of the model prefetch-fifo holds.
+    /// Capacity in footprints of the FIFO of the model `prefetch-fifo`.
     #[serde(skip_serializing_if = "is_usual_fifo")]
     pub fifo_footprints: u32,
 }
 
-/// Footprints of the FIFO unless a configuration says otherwise.
+/// Default capacity of the FIFO.
 const USUAL_FIFO: u32 = 64;
 
 fn is_usual_fifo(footprints: &u32) -> bool {
@@ -79,7 +81,7 @@ impl TmuConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// The first one out of range.
+    /// The first value that is out of range.
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         for (key, value, least, most) in [
             ("tmu.threads", self.threads, 1, 4096),

@@ -1,4 +1,4 @@
-//! Caches without latencies, of any policy: a miss fills at once.
+//! Caches of any policy without latencies: a miss fills immediately.
 
 use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
@@ -12,7 +12,7 @@ use crate::stream::{Consumer, Cores, QuadLines, StreamError, Tag, interleave};
 /// L1 caches over a shared L2.
 pub struct Functional<C> {
     caches: Hierarchy<C>,
-    /// A footprint of more lines may evict some of its own, so that its repeats are simulated.
+    /// Larger footprints may evict their own lines, so their repeats must be simulated.
     most_safe_lines: u32,
     counts: CacheCounts,
 }
@@ -27,7 +27,7 @@ impl<C: Cache> Functional<C> {
         }
     }
 
-    /// A footprint's lines that missed the L1 go to the L2.
+    /// Sends the L1 misses of a footprint to the L2.
     #[inline(never)]
     fn missed(&mut self, core: usize, cell: usize, tile: usize, lines: &[u32]) {
         let mut misses = FootprintMisses {
@@ -46,7 +46,7 @@ impl<C: Cache> Consumer for Functional<C> {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
         let safe_lines = self.most_safe_lines as usize;
         for footprint in quad.footprints() {
-            // Repeats that would find everything there need no simulation.
+            // Repeats that only hit need no simulation.
             let repeats_are_idle = footprint.lines.len() <= safe_lines;
             let repeats = if repeats_are_idle {
                 0
@@ -69,7 +69,7 @@ impl<C: Cache> Consumer for Functional<C> {
     }
 }
 
-/// Caches and the other clients of memory, which follow the cores' items.
+/// The caches, and the other clients of memory, which follow the cores' items.
 struct WithClients<'m, 'f, C> {
     caches: &'m mut Functional<C>,
     clients: &'m mut FrameClients<'f>,
@@ -128,14 +128,14 @@ impl<C: Cache> Machine for Functional<C> {
 
 impl<C: Cache> AtOnce for Functional<C> {
     fn lines(&mut self, lines: &[u32], tags: &[Tag], missed: &mut Vec<u32>) {
-        /// Lines that pass the L1 before the L2 sees those that missed: none where it can take lines from the L1.
+        /// L1 look-ups before the L2 sees their misses. One, if the L2 can invalidate L1 lines.
         const CHUNK: usize = 256;
         let chunk = if self.caches.invalidates() { 1 } else { CHUNK };
         let mut places = [0_u8; CHUNK];
         for (lines, tags) in lines.chunks(chunk).zip(tags.chunks(chunk)) {
             let mut count = 0;
             for (place, &line) in lines.iter().enumerate() {
-                // No branch: whether a line is there is unpredictable.
+                // Branch-free: whether a line hits is unpredictable.
                 places[count % CHUNK] = place as u8;
                 count += usize::from(!self.caches.access_l1(0, line));
             }

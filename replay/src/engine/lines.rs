@@ -1,4 +1,4 @@
-//! Lines without tiles and without time: plain addresses through the caches of many configurations.
+//! Replays plain addresses, without tiles and time, through the caches of many configurations.
 
 use super::AtOnce;
 use super::batch::{Pass, passes};
@@ -7,26 +7,26 @@ use crate::config::{ConfigError, Mode, PrefetchConfig, RunConfig, accept};
 use crate::result::MemoryResult;
 use crate::stream::{Bins, Tag};
 
-/// The caches of one core under many configurations, which all have the same line size.
+/// The caches of one core for many configurations with the same line size.
 pub struct LineReplay {
     configs: Vec<RunConfig>,
-    /// Configurations by index, and the machine that answers for them.
+    /// Groups of configurations (by index), each with its machine.
     machines: Vec<(Vec<usize>, Box<dyn AtOnce>)>,
     skips_repeats: bool,
     missed: Vec<u32>,
 }
 
-/// What one configuration made of the lines.
+/// The counts of one configuration.
 #[derive(Clone, Debug, Default)]
 pub struct LineOutcome {
-    /// Misses of the L1 and the L2 by the kind of access.
+    /// L1 and L2 misses by kind of access.
     pub misses: Vec<[Misses; 2]>,
-    /// What was counted beside and below the L2.
+    /// Counts beside and below the L2.
     pub memory: MemoryResult,
 }
 
 impl LineReplay {
-    /// Empty caches. Only what concerns caches and memory counts of a configuration.
+    /// Empty caches. Uses only the cache and memory settings of the configurations.
     ///
     /// # Errors
     /// An impossible configuration.
@@ -70,14 +70,14 @@ impl LineReplay {
         })
     }
 
-    /// True if an access to the line of the one before finds it in every L1 and changes nothing.
+    /// True if a repeated access to a line hits in every L1 and changes nothing.
     #[must_use]
     pub fn skips_repeats(&self) -> bool {
         self.skips_repeats
     }
 
-    /// Accesses lines one after another; the tag of each has the kind of access. Returns some of them, all that were
-    /// never accessed before among them.
+    /// Accesses lines in sequence. Each tag gives the kind of access. Returns some of the lines, including
+    /// all that were never accessed before.
     pub fn access(&mut self, lines: &[u32], tags: &[Tag]) -> &[u32] {
         for (_, machine) in &mut self.machines {
             self.missed.clear();
@@ -86,7 +86,7 @@ impl LineReplay {
         &self.missed
     }
 
-    /// What each configuration made of all lines.
+    /// The counts of each configuration.
     pub fn outcomes(mut self) -> Vec<LineOutcome> {
         let mut outcomes = vec![LineOutcome::default(); self.configs.len()];
         for (points, machine) in &mut self.machines {

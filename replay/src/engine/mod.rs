@@ -1,4 +1,4 @@
-//! Wires order, stream, caches and texture unit: replays a trace under configurations.
+//! Replays a trace: connects order, stream, caches and texture units.
 
 mod batch;
 mod counts;
@@ -24,21 +24,21 @@ use crate::stream::{Cores, LineMemory, StreamError, Tag, TileSource};
 use std::sync::Mutex;
 use thiserror::Error;
 
-/// Why a replay cannot run.
+/// Reasons why a replay fails.
 #[derive(Debug, Error)]
 pub enum ReplayError {
-    /// The configuration is impossible.
+    /// An impossible configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// The trace cannot be read.
+    /// An unreadable trace.
     #[error(transparent)]
     Trace(#[from] StreamError),
 }
 
-/// Replays `trace` under `config`.
+/// Replays `trace` with `config`.
 ///
 /// # Errors
-/// An impossible configuration, or a trace that cannot be read.
+/// An impossible configuration, or an unreadable trace.
 pub fn replay(trace: &dyn TileSource, config: &RunConfig) -> Result<RunResult, ReplayError> {
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
     let answer = Mutex::new(RunResult::default());
@@ -51,10 +51,9 @@ pub fn replay(trace: &dyn TileSource, config: &RunConfig) -> Result<RunResult, R
     Ok(answer.into_inner().unwrap_or_default())
 }
 
-/// What runs the work of the cores: caches, with or without clocks, for one or more
-/// configurations.
+/// A machine that processes the cores' work: caches, with or without clocks, for one or more configurations.
 trait Machine: Send {
-    /// Runs a frame's phases, one after another. The other clients of memory, if they are simulated, follow the cores' items.
+    /// Runs the phases of a frame. Other clients of memory, if simulated, follow the cores' items.
     fn run(
         &mut self,
         cores: &mut Cores<'_>,
@@ -63,21 +62,22 @@ trait Machine: Send {
         clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError>;
 
-    /// The other clients access memory before the first item of a frame, or after the last one.
+    /// Performs the accesses of other clients before the first item of a frame or after the last one.
     fn client_accesses(&mut self, _clients: &mut FrameClients<'_>) {}
 
-    /// Empties the caches, between frames.
+    /// Empties the caches between frames.
     fn flush(&mut self);
 
-    /// What was counted for one of its configurations.
+    /// The counts for one of its configurations.
     fn outcome(&self, config: &RunConfig) -> batch::Outcome;
 }
 
-/// A machine without clocks, which can be fed with lines from anywhere.
+/// A machine without clocks, which accepts lines from any source.
 trait AtOnce: Machine {
-    /// The first core accesses lines, each a footprint of its own. `missed` gets those that some L1 does not hold.
+    /// Accesses lines on the first core, each as a footprint of its own. `missed` receives the lines that
+    /// missed in some L1.
     fn lines(&mut self, lines: &[u32], tags: &[Tag], missed: &mut Vec<u32>);
 
-    /// Counts what is still pending.
+    /// Counts all pending accesses.
     fn finish(&mut self) {}
 }

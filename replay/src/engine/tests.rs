@@ -36,7 +36,7 @@ fn functional(order: Order) -> RunConfig {
     }
 }
 
-/// How time passes: the mode, and the model of the texture unit.
+/// Mode, and model of the texture unit.
 type Time = (Mode, TmuModel);
 
 const AT_ONCE: Time = (Mode::Functional, TmuModel::Looping);
@@ -48,7 +48,7 @@ fn in_time((mode, model): Time, mut config: RunConfig) -> RunConfig {
     config
 }
 
-/// LRU sets as plain lists, most recent last.
+/// LRU sets as plain lists, most recently used last.
 struct TwinCache(Vec<Vec<u64>>);
 
 impl TwinCache {
@@ -69,7 +69,7 @@ impl TwinCache {
     }
 }
 
-/// A straightforward single-core replay: no tables, no shortcuts.
+/// A straightforward single-core replay without tables and shortcuts.
 fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounters, usize) {
     let (mut c1, mut c2) = (LevelCounters::default(), LevelCounters::default());
     let (mut l1, mut l2) = (
@@ -291,7 +291,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
     let result = replay(&trace, &config).unwrap();
     let left = &result.tile_maps[0];
     assert_eq!(left.tiles, [3, 3]);
-    // One layer of patches covers the left eye's image, and the cut tiles beyond it.
+    // One layer of patches covers the left eye's image and the parts of cut tiles beyond it.
     assert!(
         left.overdraw[..2].iter().all(|&o| o == 1.0),
         "{:?}",
@@ -301,7 +301,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
 
 #[test]
 fn misses_in_flight_are_merged_and_counted_apart() {
-    // Two quads at the same place: the second wants the lines that the first has in flight.
+    // Two quads at the same place: the second needs the lines that the first has in flight.
     let trace = MemoryTrace {
         tables: testing::tables(&[[64, 64]]),
         tiles: vec![
@@ -317,7 +317,7 @@ fn misses_in_flight_are_merged_and_counted_apart() {
 
 #[test]
 fn static_lrta_gives_each_core_its_own_view() {
-    // With one view a core, each L1 behaves as if it were alone.
+    // With one view per core, each L1 behaves as if it were the only one.
     let trace = small();
     let config = RunConfig {
         assign: Assign::Static,
@@ -363,7 +363,7 @@ fn a_trace_without_textures_has_no_footprints() {
     }
 }
 
-/// Results of all configurations in one batch that may keep so many bytes of lines.
+/// Results of all configurations in one batch, with a limit for the bytes of lines kept.
 fn all(trace: &MemoryTrace, configs: &[RunConfig], bytes: u64) -> Vec<RunResult> {
     let results = Mutex::new(vec![None; configs.len()]);
     let keep = |index: usize, result| results.lock().unwrap()[index] = Some(result);
@@ -373,7 +373,7 @@ fn all(trace: &MemoryTrace, configs: &[RunConfig], bytes: u64) -> Vec<RunResult>
     results.into_iter().map(Option::unwrap).collect()
 }
 
-/// One configuration on a machine of its own.
+/// Replays one configuration on the given machine.
 fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> RunResult {
     let expander = Expander::new(trace, config).unwrap();
     let expander = expander.with_distinct_lines(config.mode == Mode::Timed);
@@ -401,7 +401,7 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     }
 }
 
-/// One functional configuration in caches of its own, behind pointers as any policy's are.
+/// Replays one functional configuration in caches of its own, boxed like those of any policy.
 fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
     let bins = Bins::new(&trace.tables, CountBy::Texture).unwrap();
     let counts = CacheCounts::new(&bins, config.tile_maps);
@@ -409,7 +409,7 @@ fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
     alone(trace, config, &mut Functional::new(caches, counts))
 }
 
-/// Random machines that a twin is held against: `MACHINES=1000` for many.
+/// Number of random machines to compare with a twin; `MACHINES=1000` runs many.
 fn machines(usual: u32) -> u32 {
     let many = std::env::var("MACHINES").ok();
     many.map_or(usual, |many| many.parse().expect("MACHINES: a number"))
@@ -431,7 +431,7 @@ impl Random {
         values[self.below(values.len() as u64) as usize]
     }
 
-    /// An LRU cache of up to `most_sets` sets and any small number of ways.
+    /// A random LRU cache of up to `most_sets` sets and any small number of ways.
     fn cache(&mut self, most_sets: u64) -> LevelConfig {
         let ways = self.of(&[1, 2, 3, 4, 4, 4, 5, 8, 12, 16]);
         let sets = 1 << self.below(u64::from(most_sets.ilog2()) + 1);
@@ -442,10 +442,10 @@ impl Random {
     }
 }
 
-/// A footprint as it was sent: core, cell and lines, repeats written out.
+/// A footprint in the stream: core, cell and lines, with repeats written out.
 type Sent = (usize, usize, Vec<u32>);
 
-/// Keeps the stream as it comes.
+/// Records the stream.
 #[derive(Default)]
 struct Recorder {
     sent: Vec<Sent>,
@@ -560,7 +560,7 @@ mod plain_timed;
 mod prefetch_fifo;
 mod timeline;
 
-/// The same frame several times over.
+/// The same frame `frames` times.
 fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
     let mut long = trace.clone();
     for frame in 1..frames {
@@ -581,7 +581,7 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
                 mode,
                 ..functional(Order::Z2_STA)
             };
-            // A slot that is not full is carried over, a full one is not.
+            // A partly filled slot is carried over between frames. One footprint per slot leaves none partly filled.
             config.tmu.retry_footprints = 1;
             (config.level.l1.replacement, config.level.l2.replacement) = (policy, policy);
             let flush = RunConfig {
@@ -591,10 +591,11 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             let single = replay(&one, &config).unwrap();
             let [kept, flushed] = [config, flush].map(|c| replay(&three, &c).unwrap());
             assert_eq!(flushed.footprints, 3 * single.footprints);
-            // Whom random replacement hits differs from frame to frame.
+            // Random victims differ from frame to frame.
             if policy != Replacement::RANDOM {
                 assert_ne!(kept.l2.misses, flushed.l2.misses, "{policy:?} {mode:?}");
-                // Predictions of the frame before may mislead; lines of the frame before are hit.
+                // Predictions trained by the previous frame can be wrong; without them, the previous
+                // frame's lines only add hits.
                 if [Replacement::LRU, Replacement::FIFO, Replacement::TREE_PLRU].contains(&policy) {
                     assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
                 }
@@ -614,7 +615,7 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
     }
 }
 
-/// Counts by draw add up to those by texture: each material of the trace has textures of its own.
+/// Each material of the trace has its own textures, so counts by draw are sums of counts by texture.
 #[test]
 fn counts_by_draw_are_those_of_its_textures() {
     let trace = small();
@@ -654,7 +655,7 @@ fn counts_by_draw_are_those_of_its_textures() {
                 expected[0].add(&part.l1);
                 expected[1].add(&part.l2);
             }
-            // A footprint counts once, and so does a look-up of a line that several of its textures have.
+            // A footprint counts once per draw, and so does a look-up of a line shared by several of its textures.
             assert_eq!(levels, expected, "{time:?}");
         }
     }

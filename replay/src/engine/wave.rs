@@ -1,4 +1,4 @@
-//! The passes of one stream, frame after frame.
+//! Runs the groups of a stream, frame by frame.
 
 use super::batch::{Job, Pass};
 use super::scheduler::Stage;
@@ -12,17 +12,16 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What passes that read the same lines need.
+/// Groups that read the same lines, and what they need.
 pub(super) struct Wave<'a> {
     pub(super) job: Job<'a>,
     pub(super) memory: &'a LineMemory,
-    /// Called when a frame's lines are loaded and again when the last replay has started.
+    /// Reports the stages of a frame: lines loaded, last replay started.
     pub(super) report_stage: &'a (dyn Fn(Stage) + Sync),
 }
 
 impl<'a> Wave<'a> {
-    /// Runs the passes, of which there is one at least. While a frame is replayed, the next one is expanded, if
-    /// there is memory for it.
+    /// Runs at least one group. While a frame is replayed, the next one is expanded if there is memory for it.
     pub(super) fn run(&self, mut passes: Vec<Pass<'a>>) -> Result<(), ReplayError> {
         let rendered = rendered(self.job.trace, passes[0].config())?;
         let trace_passes = &rendered.tables().passes;
@@ -72,12 +71,12 @@ impl<'a> Wave<'a> {
                 }
                 Ok::<_, ReplayError>(machine)
             };
-            // The last pass frees the frame's memory, also while this thread is busy.
+            // The last group to finish frees the frame's memory, even while this thread is busy.
             let frame = Arc::new(frame);
             let share = |pass| (pass, Arc::clone(&frame));
             let all: Vec<_> = passes.iter_mut().map(share).collect();
             drop(frame);
-            // One after the other, as threads come free: of passes together the first ones take longest.
+            // Started in order as threads become free, because the first groups take longest.
             let all = all.into_iter().par_bridge();
             let Some(&next) = frames.get(index + 1) else {
                 return all.try_for_each(|(pass, frame)| {
@@ -100,7 +99,7 @@ impl<'a> Wave<'a> {
             kept?;
             ahead = expanded.transpose()?;
         }
-        // No frames at all.
+        // The trace has no frames.
         for pass in &passes {
             self.finish(
                 pass,
@@ -146,7 +145,7 @@ impl<'a> Wave<'a> {
     }
 }
 
-/// Lists what the passes read.
+/// Configures the expander to list what the groups read.
 fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a> {
     let at_once = |pass: &Pass<'_>| pass.config().misses_change_caches_at_once();
     match passes[0].config().tmu_model() {
@@ -155,13 +154,13 @@ fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a>
             _ => expander,
         },
         Some(TmuModel::FirstMiss | TmuModel::PrefetchFifo) => expander,
-        // Where a miss changes a cache at once, the timed machine looks footprints up one by one.
+        // If a miss fills the cache immediately, the timed machine looks footprints up one by one.
         Some(TmuModel::Looping) if passes.iter().any(at_once) => expander.with_distinct_lines(true),
         Some(TmuModel::Looping) => expander.only_distinct_lines(),
     }
 }
 
-/// The orders of some passes, each once.
+/// The distinct orders of some groups.
 struct Orders(Vec<(Order, u64)>);
 
 impl Orders {
@@ -176,7 +175,7 @@ impl Orders {
         Self(orders)
     }
 
-    /// What each does with a frame.
+    /// The plan of each order for a frame.
     fn plans(&self, trace_passes: &[formats::textrace::Pass], frame: u32) -> Vec<Vec<Phase>> {
         let plan = |&(order, seed): &(Order, u64)| {
             order::plan_frame(&*order.build(seed), trace_passes, frame)

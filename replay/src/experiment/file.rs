@@ -1,4 +1,4 @@
-//! An experiment file: traces, a base configuration and what is varied around it.
+//! An experiment file: traces, a base configuration, and the values to vary.
 //!
 //! ```toml
 //! traces = ["crytek.textrace"]      # beside the file; the command line's traces win
@@ -21,20 +21,20 @@ use toml::{Table, Value};
 /// A parsed experiment file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentFile {
-    /// Traces that it names.
+    /// Traces named in the file.
     pub traces: Vec<String>,
     /// The base configuration.
     pub base: RunConfig,
-    /// Axes that are crossed, in the order of the file; the last one runs fastest.
+    /// Axes to be crossed, in file order; the last one varies fastest.
     pub axes: Vec<Axis>,
-    /// Values that are tried alone.
+    /// Values tried one at a time.
     pub one_at_a_time: Vec<Axis>,
 }
 
-/// A leaf of the document: its key with dots, where the key stands, and its value.
+/// A leaf of the document: dotted key, position of the key, and value.
 type Leaf<'a, 'i> = (String, usize, &'a DeValue<'i>);
 
-/// What is wrong with a key, and where the key stands in the text.
+/// An error at a key, and the key's position in the text.
 struct Fault {
     offset: usize,
     key: String,
@@ -45,7 +45,7 @@ impl ExperimentFile {
     /// Parses an experiment file.
     ///
     /// # Errors
-    /// Syntax, an unknown key, a value that its key does not take; each with its line.
+    /// A syntax error, an unknown key or an invalid value, each with its line.
     pub fn parse(text: &str) -> Result<Self, PlanError> {
         read(text, Self::read)
     }
@@ -58,7 +58,7 @@ impl ExperimentFile {
             one_at_a_time: Vec::new(),
         };
         let mut base = to_table(&file.base);
-        // Axes are checked against the base, wherever the file has it.
+        // Axes are checked against the base, wherever it stands in the file.
         let mut sections: Vec<_> = document.iter().collect();
         sections.sort_by_key(|(key, _)| (key.get_ref() != "base", key.span().start));
         for (key, value) in sections {
@@ -99,16 +99,16 @@ impl ExperimentFile {
         Ok(file)
     }
 
-    /// Every point of the file.
+    /// All points of the file.
     ///
     /// # Errors
-    /// Too many points, or one whose configuration is impossible.
+    /// Too many points, or an impossible configuration.
     pub fn plan(&self) -> Result<Plan, PlanError> {
         Plan::cross(self.base, &self.axes, &self.one_at_a_time)
     }
 }
 
-/// Parses the file of a configuration: the keys that it gives, over the defaults.
+/// Parses a configuration file: its keys override the defaults.
 ///
 /// # Errors
 /// As [`ExperimentFile::parse`].
@@ -118,7 +118,7 @@ pub fn parse_config(text: &str) -> Result<RunConfig, PlanError> {
     })
 }
 
-/// Reads a document; faults get their lines.
+/// Reads a document, adding lines to errors.
 fn read<T>(text: &str, content: impl Fn(&DeTable) -> Result<T, Fault>) -> Result<T, PlanError> {
     let line_at = |offset: usize| 1 + text.bytes().take(offset).filter(|b| *b == b'\n').count();
     let document = DeTable::parse(text).map_err(|e| PlanError::Syntax {
@@ -132,7 +132,7 @@ fn read<T>(text: &str, content: impl Fn(&DeTable) -> Result<T, Fault>) -> Result
     })
 }
 
-/// Sets the keys of a table in a configuration, one after another.
+/// Sets the keys of a table in a configuration.
 fn with_keys(config: &mut Table, table: &DeTable) -> Result<RunConfig, Fault> {
     let mut last = parsed(config).unwrap_or_default();
     for (key, offset, value) in leaves(table)? {
@@ -149,7 +149,7 @@ fn with_keys(config: &mut Table, table: &DeTable) -> Result<RunConfig, Fault> {
     Ok(last)
 }
 
-/// The beginning of a text that may repeat a whole file.
+/// The beginning of a text, which may quote a whole file.
 fn brief(text: &str) -> String {
     const LONGEST_CHARS: usize = 500;
     match text.char_indices().nth(LONGEST_CHARS) {
@@ -158,7 +158,7 @@ fn brief(text: &str) -> String {
     }
 }
 
-/// The axes of a section, in the order of the file, every value checked against the base.
+/// The axes of a section, in file order, with every value checked against the base.
 fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
     let axis = |key: &str, value: &DeValue| {
         let values = match to_value(value)? {
@@ -193,8 +193,8 @@ fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
         .collect()
 }
 
-/// The leaves of nested tables with dotted keys, in the order of the file. One key may be written in several
-/// ways (`"l1.ways"`, `l1.ways`), but only once.
+/// The leaves of nested tables with dotted keys, in file order. A key can be written in several ways
+/// (`"l1.ways"`, `l1.ways`), but only once.
 fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Result<Vec<Leaf<'a, 'i>>, Fault> {
     fn walk<'a, 'i>(table: &'a DeTable<'i>, prefix: &str, out: &mut Vec<Leaf<'a, 'i>>) {
         for (key, value) in table.iter() {
@@ -250,8 +250,8 @@ fn to_value(value: &DeValue) -> Result<Value, String> {
     }
 }
 
-/// Sets a dotted key, and makes the tables that it goes through. The levels go by their names, `l1.size_bytes`; the one
-/// after the last level is added.
+/// Sets a dotted key, creating the tables on its path. Levels are addressed by name (`l1.size_bytes`); the
+/// level after the last one is added.
 pub(super) fn set(table: &mut Table, key: &str, value: Value) {
     let Some((first, rest)) = key.split_once('.') else {
         table.insert(key.to_owned(), value);

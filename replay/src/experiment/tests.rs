@@ -5,7 +5,7 @@ use crate::result::TraceId;
 use crate::stream::MemoryTrace;
 use crate::stream::testing::tables;
 
-/// A trace without passes: its replay is empty, which is enough to count replays.
+/// A trace without passes. Its replay is empty, which suffices to count replays.
 fn empty(scene: &str) -> MemoryTrace {
     let mut tables = tables(&[]);
     tables.meta.scene = scene.to_owned();
@@ -92,7 +92,7 @@ fn levels_below_the_l2_are_axes_too() {
 }
 
 #[test]
-fn what_a_file_may_not_say_is_refused_with_its_line() {
+fn invalid_files_are_refused_with_the_line() {
     for (file, text) in [
         (
             "[axes]\norder = [\"morton\"]\nl7.size_bytes = [\"1MiB\"]\n",

@@ -1,4 +1,4 @@
-//! The analysis against plain twins that know the whole stream: lists, sets and full look-ahead.
+//! Compares the analysis with plain twins that use lists, sets and full look-ahead.
 
 mod plain;
 
@@ -11,7 +11,7 @@ use formats::textrace::Pass;
 use formats::view::Eye;
 use proptest::prelude::*;
 
-/// A line asked for, with all that is known of it.
+/// A look-up, with everything known about it.
 #[derive(Clone, Copy, Debug)]
 struct Access {
     frame: u32,
@@ -19,7 +19,7 @@ struct Access {
     line: u32,
 }
 
-/// Items one after another, some of them pairs whose tiles alternate, in some frames.
+/// Streams of items in several frames, some of them pairs whose tiles alternate.
 fn streams() -> impl Strategy<Value = Vec<Access>> {
     let line = prop_oneof![4 => 0..12_u32, 2 => 0..60_u32, 1 => 0..4000_u32];
     let eye = prop_oneof![Just(None), Just(Some(Eye::Left)), Just(Some(Eye::Right))];
@@ -85,7 +85,7 @@ fn of(cache: &LevelConfig) -> StreamCache {
     }
 }
 
-/// The analysis of a stream, on an axis so short that it is numbered anew all the time.
+/// Analyses a stream on an axis so short that it is renumbered frequently.
 fn analysed(stream: &[Access], cache: &LevelConfig) -> Figures {
     let mut profile = Profile::with_axis(of(cache), 64).unwrap();
     let mut frame = None;
@@ -159,7 +159,7 @@ proptest! {
         let lines = figures.configured_lines;
         let full = figures.distances.hits(lines);
         prop_assert_eq!(figures.misses(&full), split.fully_associative_misses());
-        // The forest and the histogram: a cache of one set is fully associative.
+        // The forest agrees with the histogram: a cache of one set is fully associative.
         for point in figures.lru.iter().filter(|p| p.ways.map(u64::from) == Some(p.lines)) {
             prop_assert_eq!(point.hits, figures.distances.hits(point.lines));
         }
@@ -173,7 +173,7 @@ proptest! {
     }
 }
 
-/// Both levels of every order miss as in a replay, whatever the policy and the number of cores.
+/// Both levels have the misses of a replay in every order, for every policy and number of cores.
 #[test]
 fn misses_are_those_of_a_replay() {
     let trace = Synthetic {
@@ -228,7 +228,7 @@ fn misses_are_those_of_a_replay() {
     }
 }
 
-/// The first frame again, so many times.
+/// The first frame, repeated `frames` times.
 fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
     let mut out = trace.clone();
     for frame in 1..frames {

@@ -1,8 +1,8 @@
-//! Who reads and writes memory, and what.
+//! Memory accesses by client.
 
 use serde::{Deserialize, Serialize};
 
-/// Who reads or writes memory.
+/// A client of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Client {
@@ -10,15 +10,15 @@ pub enum Client {
     Texture,
     /// Index fetch of vertex processing.
     Index,
-    /// Vertex fetch of vertex processing.
+    /// Vertex fetch.
     Vertex,
-    /// Positions and varyings of shaded vertices, written by vertex processing and read by each tile.
+    /// Positions and varyings of shaded vertices, written by vertex processing and read per tile.
     ShadedVertex,
-    /// The primitive lists of the tiles.
+    /// Primitive lists of the tiles.
     PrimitiveList,
     /// Colour attachments.
     Colour,
-    /// Depth attachments, shadow maps included.
+    /// Depth attachments, including shadow maps.
     Depth,
     /// The G-buffer of deferred shading.
     GBuffer,
@@ -27,7 +27,7 @@ pub enum Client {
 }
 
 impl Client {
-    /// Every client, in the order of tables.
+    /// Every client, in table order.
     pub const ALL: [Self; 9] = [
         Self::Texture,
         Self::Index,
@@ -57,14 +57,14 @@ impl Client {
     }
 }
 
-/// Bytes that a client reads or writes, in whole lines of its own.
+/// A read or write by a client, in whole lines of that client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Access {
-    /// Who.
+    /// The client.
     pub client: Client,
     /// True for a write.
     pub write: bool,
-    /// The first byte.
+    /// First byte.
     pub address: u64,
     /// Number of bytes.
     pub bytes: u64,

@@ -1,7 +1,8 @@
-//! What every cache can do, and caches of any policy and organisation.
+//! The interface of all caches, and caches of any policy and organisation.
 //!
-//! Lines are line numbers (address over line size). A cache is asked in two steps, because a missing line arrives only
-//! after the miss penalty: [`Cache::lookup`] when it is wanted, [`Cache::fill`] when it is there.
+//! Lines are identified by number (address over line size). An access takes two steps, because a
+//! missing line is filled only after the miss penalty: [`Cache::lookup`] when it is requested,
+//! [`Cache::fill`] when it arrives.
 
 use super::policy::{FourWayLru, Geometry, lru};
 use super::sectored::Sectored;
@@ -9,33 +10,33 @@ use super::victim::WithVictimCache;
 use super::watched::Watched;
 use crate::config::{ConfigError, LevelConfig};
 
-/// A cache that holds whole lines. What look-ups leave behind depends only on the order of the last
-/// one of each line that is there: earlier ones need no simulation.
+/// A cache of whole lines. Its state after a series of look-ups depends only on the order of the
+/// last look-up of each resident line, so earlier look-ups need no simulation.
 pub trait Cache: Send {
-    /// True if the line is there; marks it used.
+    /// Returns true for a hit and marks the line as used.
     fn lookup(&mut self, line: u32) -> bool;
 
-    /// True if the line is there. Changes nothing.
+    /// Returns true if the line is resident. Changes nothing.
     fn contains(&self, line: u32) -> bool;
 
-    /// Looks up lines one after another until one is not there: its index.
+    /// Looks up lines until one misses, and returns the index of that line.
     fn lookup_all(&mut self, lines: &[u32]) -> Option<usize> {
         lines.iter().position(|&line| !self.lookup(line))
     }
 
-    /// Puts in a line that is not there: the line that it evicts, or [`EMPTY`].
+    /// Inserts a line that is not resident. Returns the evicted line, or [`EMPTY`].
     fn fill(&mut self, line: u32) -> u32;
 
-    /// Takes a line out. True if it was there.
+    /// Removes a line. Returns true if it was resident.
     fn remove(&mut self, line: u32) -> bool;
 
-    /// Appends the lines that were evicted since the last call, where a cache keeps a list of them.
+    /// Appends the lines evicted since the last call, if the cache records them.
     fn take_evicted(&mut self, _lines: &mut Vec<u32>) {}
 
-    /// Takes all lines out.
+    /// Removes all lines.
     fn clear(&mut self);
 
-    /// Looks up, and on a miss fills at once. True for a hit.
+    /// Looks up a line and fills it immediately on a miss. Returns true for a hit.
     fn access(&mut self, line: u32) -> bool {
         let hit = self.lookup(line);
         if !hit {
@@ -44,8 +45,8 @@ pub trait Cache: Send {
         hit
     }
 
-    /// Up to this many distinct lines accessed one after another are all still there right after,
-    /// and accessing the same sequence again changes nothing: such repeats need no simulation.
+    /// Up to this many distinct lines accessed in sequence are all resident afterwards, and
+    /// repeating the sequence changes nothing. Such repeats need no simulation.
     fn repeat_safe_lines(&self) -> u32 {
         1
     }
@@ -89,12 +90,11 @@ impl Cache for Box<dyn Cache> {
     }
 }
 
-/// A cache of any policy. The most common kind keeps its type, so that a replay can be compiled
-/// for it.
+/// A cache of any policy. The most common kind keeps its concrete type, so that replays can be compiled for it.
 pub enum AnyCache {
-    /// Least recently used, four ways.
+    /// Four-way LRU.
     FourWayLru(FourWayLru),
-    /// Any other.
+    /// Any other cache.
     Other(Box<dyn Cache>),
 }
 
@@ -112,7 +112,7 @@ impl AnyCache {
     /// Builds a cache.
     ///
     /// # Errors
-    /// A geometry that cannot be built; `level` names it.
+    /// An impossible geometry, reported with `level`.
     pub fn build(
         config: &LevelConfig,
         level: &'static str,
@@ -134,13 +134,13 @@ impl AnyCache {
         Ok(cache)
     }
 
-    /// The cache with a list of the lines that it evicts.
+    /// Wraps the cache so that it records the lines it evicts.
     #[must_use]
     pub(super) fn watched(self) -> Self {
         boxed(Watched::new(self.into_box()))
     }
 
-    /// The cache behind a pointer, whatever its kind.
+    /// Boxes the cache, whatever its kind.
     #[must_use]
     pub fn into_box(self) -> Box<dyn Cache> {
         match self {

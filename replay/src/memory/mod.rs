@@ -1,13 +1,13 @@
 //! The memory system below the texture units: caches, their hierarchy, and DRAM.
 //!
-//! | folder | holds |
+//! | folder | contents |
 //! | --- | --- |
-//! | `policy/` | tags and replacement, a policy a file |
-//! | `in_flight/` | lines that arrive later: MSHRs, allocation on a fill or on a miss |
-//! | `prefetch/` | prefetchers of the L2, one a file |
-//! | `hierarchy/` | the levels of a configuration, wired up |
+//! | `policy/` | tags and replacement, one policy per file |
+//! | `in_flight/` | delayed fills: MSHRs, allocation on fill or on miss |
+//! | `prefetch/` | prefetchers of the L2, one per file |
+//! | `hierarchy/` | the levels of a configuration, connected |
 //! | `dram/` | channels, banks and rows |
-//! | `fast/` | LRU caches in one pass, sets filled one by one: equal to the plain ones, as tests hold |
+//! | `fast/` | accelerated LRU caches, which tests hold equal to the plain ones |
 
 mod access;
 mod cache;

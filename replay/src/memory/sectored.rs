@@ -1,14 +1,14 @@
-//! A sectored cache: a tag stands for an aligned group of lines (its sectors), and a miss fetches one of them. Fewer tags for the
-//! same capacity; a sector that is not used wastes its room.
+//! A sectored cache: a tag covers an aligned group of lines (sectors), and a miss fetches one of
+//! them. It needs fewer tags for the same capacity, but unused sectors waste space.
 
 use super::{Cache, EMPTY};
 use std::collections::HashMap;
 
-/// A cache whose tags stand for several lines.
+/// A cache whose tags each cover several lines.
 pub struct Sectored {
-    /// Holds groups: line numbers over the number of sectors.
+    /// Holds group numbers: line numbers over the number of sectors.
     tags: Box<dyn Cache>,
-    /// Which sectors of each group in `tags` are there, a bit each.
+    /// Valid sectors of each group in `tags`, one bit each.
     valid: HashMap<u32, u64>,
     sectors: u32,
 }
@@ -24,14 +24,14 @@ impl Sectored {
         }
     }
 
-    /// The group of a line, and its bit there.
+    /// The group of a line, and its sector bit.
     fn place(&self, line: u32) -> (u32, u64) {
         (line / self.sectors, 1 << (line % self.sectors))
     }
 }
 
 impl Cache for Sectored {
-    /// A group is used when a sector is looked up that is there.
+    /// A group is marked as used when a valid sector is looked up.
     fn lookup(&mut self, line: u32) -> bool {
         self.contains(line) && self.tags.lookup(self.place(line).0)
     }
@@ -41,7 +41,7 @@ impl Cache for Sectored {
         self.valid.get(&group).is_some_and(|valid| valid & bit != 0)
     }
 
-    /// A group that is evicted goes with all its sectors. None is reported: no level may depend on them.
+    /// An evicted group drops all its sectors. They are not reported, because no other level may depend on them.
     fn fill(&mut self, line: u32) -> u32 {
         let (group, bit) = self.place(line);
         if let Some(valid) = self.valid.get_mut(&group) {

@@ -3,7 +3,7 @@ use crate::config::{Inclusion, LevelConfig, Levels, RunConfig};
 use proptest::prelude::*;
 use std::collections::HashSet;
 
-/// Brute-force twin: sets as lists of lines, first the next victim.
+/// Brute-force twin: sets as lists of lines, next victim first.
 struct Twin {
     sets: Vec<Vec<u32>>,
     ways: usize,
@@ -87,12 +87,12 @@ fn misses(cache: &mut dyn Cache, trace: &[u32]) -> usize {
     trace.iter().filter(|&&line| !cache.access(line)).count()
 }
 
-/// A trace with the locality of textures: mostly near the last line, sometimes far.
+/// A trace with texture-like locality: mostly near the last line, sometimes far.
 fn trace() -> impl Strategy<Value = Vec<u32>> {
     prop::collection::vec(prop_oneof![4 => 0_u32..40, 1 => 0_u32..400], 1..600)
 }
 
-/// Brute-force twin of re-reference interval prediction: one set, a line with its prediction by way.
+/// Brute-force twin of re-reference interval prediction: one set, with each line and its prediction by way.
 #[derive(Default)]
 struct RripTwin {
     ways: Vec<(u32, u32)>,
@@ -189,7 +189,8 @@ proptest! {
         }
     }
 
-    /// What `fill` returns is what leaves, and what `remove` takes out is out; the next fill of that set evicts nothing.
+    /// `fill` reports the line that leaves, `remove` makes a line absent, and the next fill of that
+    /// set evicts nothing.
     #[test]
     fn a_cache_holds_what_was_filled_less_what_was_evicted_and_removed(
         trace in trace(),
@@ -223,7 +224,7 @@ proptest! {
         }
     }
 
-    /// Sets as lists of groups, each with the sectors that are there.
+    /// Sets as lists of groups, each with its valid sectors.
     #[test]
     fn a_sectored_cache_equals_lists_of_groups(trace in trace()) {
         for sectors in [2_u32, 4, 16] {
@@ -248,7 +249,8 @@ proptest! {
         }
     }
 
-    /// An exclusive level of a fully associative L2 adds its lines; an inclusive one never holds less than the L2.
+    /// An exclusive level adds its lines to a fully associative L2; an inclusive level always holds
+    /// all lines of the L2.
     #[test]
     fn inclusion_holds_after_every_request(trace in trace(), l2_inclusive in any::<bool>()) {
         for inclusion in [Inclusion::Inclusive, Inclusion::Exclusive] {
@@ -284,7 +286,7 @@ proptest! {
             if inclusion == Inclusion::Exclusive {
                 prop_assert_eq!(l3.line_misses as usize, stack_misses(&missed, 8 + 16));
             } else {
-                // Whatever the L2 holds, the L3 answers without a miss.
+                // The L3 holds all lines of the L2, so it cannot miss.
                 let below = l3.line_misses;
                 let held: Vec<u32> = (0..400).filter(|&line| l2.cache(0).contains(line)).collect();
                 for line in held {
@@ -385,8 +387,8 @@ proptest! {
     }
 }
 
-/// Lines that all map to one set, in turn: a victim cache that holds those for which the set has no way avoids all misses but
-/// the first ones, and one that is a line smaller, like none at all, avoids none.
+/// Lines that map to one set, accessed cyclically. A victim cache for the lines beyond the set's
+/// ways avoids all but the first misses; one line less, or no victim cache, avoids none.
 #[test]
 fn a_victim_cache_holds_the_conflicts_of_a_set() {
     for (ways, victim_lines) in [(1, 1), (4, 3), (8, 16)] {
@@ -406,7 +408,7 @@ fn a_victim_cache_holds_the_conflicts_of_a_set() {
     }
 }
 
-/// Misses of the optimal policy: the victim is the line wanted again last.
+/// Misses of the optimal policy: the victim is the line used furthest in the future.
 fn belady_misses(trace: &[u32], lines: usize) -> usize {
     let mut held: HashSet<u32> = HashSet::new();
     let mut misses = 0;
@@ -453,7 +455,7 @@ fn a_cycle_one_line_longer_than_an_lru_cache_always_misses() {
 }
 
 #[test]
-fn tree_plru_spares_the_line_used_last() {
+fn tree_plru_never_evicts_the_line_used_last() {
     let mut cache = cache(4, 4, Replacement::TREE_PLRU);
     for line in [0, 1, 2, 3] {
         cache.access(line);
@@ -490,13 +492,13 @@ fn random_replacement_follows_its_seed() {
 #[test]
 fn dueling_follows_the_better_insertion() {
     let run = |policy, trace: &[u32]| misses(&mut *cache(4096, 4, policy), trace);
-    // A loop over a little more than the cache: bimodal insertion keeps a part of it.
+    // A loop slightly larger than the cache: bimodal insertion keeps a part of it.
     let thrashing: Vec<u32> = (0..60).flat_map(|_| 0..6144).collect();
     let of = |policy| run(policy, &thrashing);
     let (fixed, bimodal) = (of(Replacement::SRRIP), of(Replacement::BRRIP));
     assert!(bimodal < fixed * 6 / 10, "{bimodal} {fixed}");
     assert!(of(Replacement::DRRIP) < fixed * 7 / 10);
-    // A working set that moves on: lines are used again soon, so bimodal insertion loses them.
+    // A moving working set: lines are used again soon, so bimodal insertion loses them.
     let moving: Vec<u32> = (0..4000)
         .flat_map(|start| (0..64).map(move |i| start * 16 + i * 97 % 2048))
         .collect();
@@ -508,7 +510,7 @@ fn dueling_follows_the_better_insertion() {
 
 #[test]
 fn hit_prediction_keeps_a_working_set_from_a_scan() {
-    // A region that is used twice in turn with a stream that is not used again.
+    // Each region of the working set is used twice, alternating with a stream without reuse.
     let scan_lines = 512;
     let scan = |round: u32| (1 << 20) + round * scan_lines..(1 << 20) + (round + 1) * scan_lines;
     let trace: Vec<u32> = (0..400_u32)
@@ -518,6 +520,6 @@ fn hit_prediction_keeps_a_working_set_from_a_scan() {
     let (ship, lru) = (of(Replacement::SHIP), of(Replacement::LRU));
     let scanned = 400 * scan_lines as usize;
     assert_eq!(lru, scanned + 400 * 128);
-    // Half of the working set stays: the first lines of a region that is not known yet still evict the rest.
+    // Half of the working set stays: the first lines of an untrained region still evict the rest.
     assert!(ship < scanned + 220 * 128, "{}", ship - scanned);
 }

@@ -1,8 +1,8 @@
-//! A victim cache (Jouppi, ISCA 1990, section 3.2): a small fully associative LRU cache that holds what a cache evicted. A hit in
-//! it swaps the line with the victim of its set.
+//! A victim cache (Jouppi, ISCA 1990, section 3.2): a small fully associative LRU cache of evicted
+//! lines. A hit in it swaps the line with the victim of its set.
 //!
-//! The swap takes place at the next fill. Until then a line that was hit stays where it is, so that of several look-ups of a line
-//! only the last one matters, as for every cache here.
+//! The swap is delayed until the next fill. Until then the line stays where it is, so that only the
+//! last of several look-ups of a line matters, as for every cache here.
 
 use super::{Cache, EMPTY};
 
@@ -12,7 +12,7 @@ pub struct WithVictimCache {
     /// Least recently evicted first.
     victims: Vec<u32>,
     most_lines: usize,
-    /// Victims that were hit since the last fill, in order of their last use.
+    /// Victims hit since the last fill, in order of last use.
     hits: Vec<u32>,
 }
 
@@ -26,7 +26,7 @@ impl WithVictimCache {
         }
     }
 
-    /// Moves lines that were hit into the cache; each makes room for the line that it evicts.
+    /// Moves hit victims into the cache; each takes the place of the line it evicts.
     fn swap_hits(&mut self) {
         for line in std::mem::take(&mut self.hits) {
             self.victims.retain(|&victim| victim != line);

@@ -1,8 +1,8 @@
-//! A cache that keeps a list of the lines that it evicts, for levels that depend on them.
+//! A cache that records the lines it evicts, for levels that depend on them.
 
 use super::{Cache, EMPTY};
 
-/// A cache and the lines that it evicted.
+/// A cache and its recorded evictions.
 pub struct Watched {
     cache: Box<dyn Cache>,
     evicted: Vec<u32>,

@@ -1,3 +1,3 @@
-//! Accelerators of replays. Each equals the plain machine, as property tests hold.
+//! Accelerated replays. Property tests hold each equal to the plain machine.
 
 pub(super) mod one_pass;

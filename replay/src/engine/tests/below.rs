@@ -1,4 +1,4 @@
-//! Levels below the L2, through the engine.
+//! Replays with levels below the L2.
 
 use super::*;
 use crate::config::{Inclusion, LevelConfig, Levels, PrefetchConfig, Prefetching};
@@ -12,7 +12,7 @@ fn with(levels: &[LevelConfig], time: Time) -> RunConfig {
     config
 }
 
-/// The same with an L2 of its own.
+/// Replaces the L2.
 fn over_l2(l2: LevelConfig, mut config: RunConfig) -> RunConfig {
     config.level.l2 = LevelConfig {
         hit_cycles: config.level.l2.hit_cycles,
@@ -28,7 +28,7 @@ fn lower(size_bytes: u64) -> LevelConfig {
 
 const TIMES: [Time; 3] = [AT_ONCE, LOOPING, FIRST_MISS];
 
-/// A result without what lies below the L2.
+/// The result without the levels below the L2.
 fn above(result: &RunResult) -> RunResult {
     RunResult {
         external_bytes: 0,
@@ -42,7 +42,7 @@ fn above(result: &RunResult) -> RunResult {
 }
 
 #[test]
-fn an_l3_as_slow_as_memory_changes_external_traffic_alone() {
+fn an_l3_as_slow_as_memory_changes_only_dram_traffic() {
     let trace = small();
     for time in TIMES {
         let without = replay(&trace, &with(&[], time)).unwrap();
@@ -54,7 +54,7 @@ fn an_l3_as_slow_as_memory_changes_external_traffic_alone() {
         assert_eq!(above(&result), above(&without), "{time:?}");
         let l3 = &result.memory.lower_levels[0];
         assert_eq!(l3.line_lookups, without.l2.misses, "{time:?}");
-        // Nothing is evicted from it.
+        // The L3 evicts nothing.
         assert_eq!(l3.line_misses, result.unique_lines, "{time:?}");
         assert_eq!(result.external_bytes, 16 * result.unique_lines, "{time:?}");
     }
@@ -80,7 +80,7 @@ fn a_prefetcher_that_fetches_nothing_changes_nothing() {
 fn a_prefetcher_trades_bytes_for_misses() {
     let trace = small();
     for time in TIMES {
-        // Large enough that prefetched lines evict nothing that is used again.
+        // Large enough that prefetches evict no line that is used again.
         let plain = over_l2(LevelConfig::lru(128 << 10), with(&[], time));
         let without = replay(&trace, &plain).unwrap();
         let prefetch = Some(PrefetchConfig::default());
@@ -163,7 +163,7 @@ fn inclusion_matters_where_a_level_evicts_what_others_hold() {
             let config = over_l2(LevelConfig::lru(4 << 10), with(&[level], time));
             replay(&trace, &config).unwrap()
         };
-        // Nothing is evicted from a large level.
+        // A large level evicts nothing.
         let [independent, mut inclusive] =
             [Inclusion::None, Inclusion::Inclusive].map(|inclusion| of(4 << 20, inclusion));
         assert_eq!(
@@ -172,7 +172,7 @@ fn inclusion_matters_where_a_level_evicts_what_others_hold() {
             "{time:?}"
         );
         assert_eq!(inclusive, independent, "{time:?}");
-        // A level as large as the L2 takes lines from it; an exclusive one adds its own size.
+        // A level of the L2's size takes lines from it if inclusive and adds its own size if exclusive.
         let [independent, inclusive, exclusive] =
             [Inclusion::None, Inclusion::Inclusive, Inclusion::Exclusive]
                 .map(|inclusion| of(4 << 10, inclusion));
@@ -206,7 +206,7 @@ fn more_mshrs_than_are_used_change_nothing_and_few_of_them_cost_cycles() {
             counted.stall_cycles > 0 && few.cycles > unlimited.cycles,
             "{time:?}"
         );
-        // Just enough of them.
+        // Exactly as many as needed.
         let mut enough = of(many_enough(&of(65_536)));
         assert_eq!(enough.memory.l2_mshrs.take().unwrap().stalled_misses, 0);
         assert_eq!(enough, unlimited, "{time:?}");
@@ -245,8 +245,8 @@ fn sectors_and_victim_caches_are_replayed_in_every_mode() {
     }
 }
 
-/// Repeats that find their lines in the L1 are left out of a stream only where no other level can invalidate them: one
-/// configuration at a time gives what a machine gives that sees every access.
+/// A stream omits repeats that hit in the L1 only if no other level can invalidate them. A batch must give
+/// the results of a machine that sees every access.
 #[test]
 fn back_invalidation_is_exact_in_functional_mode() {
     let trace = small();
@@ -277,8 +277,8 @@ fn back_invalidation_is_exact_in_functional_mode() {
     }
 }
 
-/// With an L2 that holds everything, each line is prefetched or missed once; nearly all are prefetched but the first item's, and the
-/// cycles of their misses are saved.
+/// With an L2 that holds everything, each line is prefetched or missed once. Nearly all lines after the
+/// first item's are prefetched, which saves the cycles of their misses.
 #[test]
 fn the_next_items_lines_are_fetched_while_an_item_is_shaded() {
     let trace = small();
@@ -307,7 +307,7 @@ fn the_next_items_lines_are_fetched_while_an_item_is_shaded() {
             ahead.l2.misses,
             without.l2.misses
         );
-        // Threads that stop at their first miss wait for whole loops, so that fewer misses need not shorten a small frame.
+        // Threads that stop at their first miss wait for whole loops, so fewer misses need not shorten a small frame.
         assert!(
             time == FIRST_MISS || ahead.cycles < without.cycles,
             "{time:?}"

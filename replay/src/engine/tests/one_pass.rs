@@ -1,9 +1,9 @@
-//! Many LRU configurations in one pass against each of them alone, and against plain lists.
+//! Compares the single pass over many LRU configurations with separate replays and with plain lists.
 
 use super::*;
 use crate::config::Replacement;
 
-/// LRU sets as plain lists, most recent last.
+/// LRU sets as plain lists, most recently used last.
 struct Twin {
     sets: Vec<Vec<u32>>,
     ways: usize,
@@ -30,7 +30,7 @@ impl Twin {
     }
 }
 
-/// Counters of both levels on the recorded stream, nothing left out.
+/// Counters of both levels for the complete recorded stream.
 fn twin(sent: &[Sent], config: &RunConfig) -> (LevelCounters, LevelCounters) {
     let mut l1: Vec<Twin> = (0..config.cores)
         .map(|_| Twin::new(&config.level.l1))
@@ -102,7 +102,7 @@ fn a_thousand_sets_of_configurations_count_as_each_alone() {
 }
 
 #[test]
-fn what_cannot_share_a_pass_has_its_own() {
+fn configurations_that_cannot_share_a_pass_are_separate() {
     let trace = small();
     let base = functional(Order::MORTON);
     let larger = |config: RunConfig| RunConfig {

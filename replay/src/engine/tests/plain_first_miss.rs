@@ -1,5 +1,5 @@
-//! The first-miss machine in plain terms: cycle by cycle, from the records and the reference
-//! footprints, over sets that are lists. The fast machine has to agree with it to the last count.
+//! A plain version of the first-miss machine: cycle by cycle, from the records and the reference
+//! footprints, with sets as lists. The fast machine must produce exactly the same counts.
 
 use super::*;
 use crate::config::{Allocation, Assign, TmuConfig};
@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 struct PlainLevel {
     sets: Vec<Vec<u64>>,
     ways: usize,
-    /// Cycle and line, in the order of requests.
+    /// Cycle and line, in order of request.
     in_flight: Vec<(u64, u64)>,
     allocation: Allocation,
 }
@@ -32,7 +32,7 @@ impl PlainLevel {
         &mut self.sets[index]
     }
 
-    /// True if the line's data are there; the line is then the most recent.
+    /// Returns true if the line is resident, and makes it the most recently used one.
     fn use_line(&mut self, line: u64) -> bool {
         let set = self.set(line);
         let found = set.iter().position(|&l| l == line);
@@ -79,7 +79,7 @@ impl PlainLevel {
     }
 }
 
-/// A quad: the lines of its footprints, the first one next.
+/// A quad: the remaining lines of its footprints.
 #[derive(Clone, Default)]
 struct PlainThread {
     began: u64,
@@ -208,8 +208,8 @@ impl<'a> PlainFirstMiss<'a> {
             }
             self.now += 1;
         }
-        // The cycle after the last look-up; what arrives until then is there. Cycles that passed
-        // while the cores found out that they are done bring nothing.
+        // The cycle after the last look-up, with all arrivals until then. The cycles in which cores notice
+        // that they are done do not count.
         let end = self.cores.iter().map(|core| core.last).max().unwrap();
         self.now = end;
     }
@@ -401,7 +401,7 @@ fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
     );
 }
 
-/// One quad that asks for a line nobody has: the slots that it takes follow from the rules.
+/// One quad that requests an absent line: the slots that it occupies follow from the rules.
 #[test]
 fn a_thread_that_waits_for_memory_is_back_every_loop_until_the_line_is_there() {
     let mut tables = testing::tables(&[[4, 4]]);
@@ -420,7 +420,7 @@ fn a_thread_that_waits_for_memory_is_back_every_loop_until_the_line_is_there() {
     };
     let result = replay(&trace, &config).unwrap();
     let first = result.first_lookups.unwrap();
-    // Looked up at 0, 24 ... 216, all in vain, and at 240; four lanes of one line.
+    // Four lanes of one line are looked up at 0, 24 ... 216 without success, and at 240.
     let tmu = result.tmu.unwrap();
     assert_eq!((tmu.wasted_issues, tmu.loops), (10, 10));
     assert_eq!(result.cycles, Some(240 + 4));
@@ -458,7 +458,7 @@ fn a_flush_between_frames_empties_the_first_miss_caches() {
     );
 }
 
-/// The tile that a plain machine would blame is the tile that the maps show.
+/// The maps attribute misses to the same tiles as the plain machine.
 #[test]
 fn tile_maps_add_up_to_the_primary_misses() {
     let trace = small();

@@ -1,6 +1,5 @@
-//! The timed machine in plain terms: a heap and a map of what is in flight, a list of waiting
-//! footprints a thread, one footprint looked up after another. The fast machine has to agree with it
-//! cycle by cycle.
+//! A plain version of the timed machine: a heap and a map of lines in flight, a list of waiting footprints
+//! per thread, and one look-up per footprint. The fast machine must agree cycle by cycle.
 
 use super::*;
 use crate::config::{Allocation, Replacement, TmuConfig};
@@ -49,7 +48,7 @@ impl PlainLevel {
         }
     }
 
-    /// True if the line's data are there; marks its way used.
+    /// Returns true if the line is resident, and marks its way as used.
     fn has(&mut self, line: u32) -> bool {
         self.cache.lookup(line) && !self.in_flight.lines.contains_key(&line)
     }
@@ -75,7 +74,7 @@ struct PlainUnit {
     clock: u64,
     busy: bool,
     drained: bool,
-    /// When each is back at the first stage, and when its footprints are ready.
+    /// Cycle at which each thread re-enters the first stage, and its footprints' ready cycles.
     looping: VecDeque<(u64, Vec<u64>)>,
     open_slot: u32,
     useful: u64,
@@ -105,7 +104,7 @@ impl PlainUnit {
 
 struct PlainTimed {
     l1: Vec<PlainLevel>,
-    /// One, or one for each core.
+    /// One, or one per core.
     l2: Vec<PlainLevel>,
     l2_cycles: u64,
     memory_cycles: u64,
@@ -113,7 +112,7 @@ struct PlainTimed {
     counts: CacheCounts,
     units: Vec<PlainUnit>,
     cycles: u64,
-    /// When each MSHR of each L2 is free.
+    /// Cycle at which each MSHR of each L2 becomes free.
     mshrs: Vec<Vec<u64>>,
     mshr_counts: MshrResult,
 }
@@ -203,7 +202,7 @@ impl PlainTimed {
                 self.mshr_counts.stall_cycles += start - now;
                 mshrs[first] = start + self.memory_cycles;
                 let in_use = mshrs.iter().filter(|&&free| free > start).count();
-                // A miss that takes no time uses one as well; one that waited takes the place of another.
+                // A miss without latency occupies an MSHR as well; one that waited replaces another.
                 let in_use = match start > now {
                     true => mshrs.len(),
                     false => in_use + usize::from(self.memory_cycles == 0),
@@ -219,7 +218,7 @@ impl PlainTimed {
         in_l1
     }
 
-    /// What the core's first stage does next.
+    /// Advances the core's first stage.
     fn turn(
         &mut self,
         core: usize,
@@ -267,7 +266,7 @@ impl Machine for PlainTimed {
                 (unit.busy, unit.drained) = (true, false);
                 unit.clock = unit.clock.max(self.cycles);
             }
-            // Static: the core's items are every so many; first idle: the next of all.
+            // Static: every n-th item belongs to the core. First idle: the next item of all.
             let mut next: Vec<usize> = match assign {
                 Assign::FirstIdle => vec![0],
                 Assign::Static => (0..cores).collect(),

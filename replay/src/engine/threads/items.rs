@@ -1,4 +1,4 @@
-//! Who takes the next work item, where the cores come for it one by one.
+//! Assignment of work items to cores that take them one by one.
 
 use crate::access::FrameClients;
 use crate::config::Assign;
@@ -6,11 +6,11 @@ use crate::memory::{DelayedFill, SecondLevel};
 use crate::order::WorkItem;
 use crate::stream::{Cores, StreamError};
 
-/// The items of a phase that are left.
+/// The remaining items of a phase.
 pub(super) struct Items<'a, 'f> {
     items: &'a [WorkItem],
     assign: Assign,
-    /// First idle: the next item of all. Static: the next item by core.
+    /// First idle: index of the next item. Static: index of each core's next item.
     next: Vec<usize>,
     cores: usize,
     /// The other clients of memory, which follow the items.
@@ -37,7 +37,7 @@ impl<'a, 'f> Items<'a, 'f> {
         }
     }
 
-    /// The item that comes next, for whichever core takes it (first idle) or for this one (static).
+    /// The next item for any core (first idle) or for this core (static).
     pub(super) fn upcoming(&self, core: usize) -> Option<&'a WorkItem> {
         let next = match self.assign {
             Assign::FirstIdle => self.next[0],
@@ -46,7 +46,7 @@ impl<'a, 'f> Items<'a, 'f> {
         self.items.get(next)
     }
 
-    /// The core's next item.
+    /// Takes the core's next item.
     pub(super) fn next(&mut self, core: usize) -> Option<&'a WorkItem> {
         let (next, step) = match self.assign {
             Assign::FirstIdle => (&mut self.next[0], 1),
@@ -58,8 +58,8 @@ impl<'a, 'f> Items<'a, 'f> {
     }
 }
 
-/// A core starts an item `now`: the other clients do their part of it, and lines of the item that comes next are prefetched, if
-/// the L2's prefetcher wants them.
+/// Starts an item on a core: performs the other clients' accesses for it and, if the prefetcher works
+/// ahead, prefetches lines of the upcoming item.
 #[inline(always)]
 pub(super) fn start_item<D: DelayedFill>(
     l2: &mut SecondLevel<D>,

@@ -1,8 +1,8 @@
-//! Texture units on clocks: what threads do whose lines are not in the L1, a model a file (`tmu.model`).
+//! Clocked texture units. The models of what threads do on a miss have one file each (`tmu.model`).
 //!
-//! Each core's texture unit runs on its own clock. What the cores share, the L2 and the list of items, sees them in the
-//! order of time: it is the turn of the core whose clock is furthest behind. All else a core does on its own, so it runs
-//! on until it wants something shared and another core is behind.
+//! Each core's texture unit has its own clock. Shared resources, the L2 and the list of items, are accessed
+//! in order of time, by the core with the earliest clock. A core runs ahead on its own until it needs a
+//! shared resource while another core is behind.
 
 mod first_miss;
 mod items;
@@ -24,15 +24,16 @@ use looping::Looping;
 use prefetch_fifo::PrefetchFifo;
 use std::sync::Arc;
 
-/// The texture units of all cores, and the caches that they share.
+/// The texture units of all cores and their shared caches.
 trait ThreadModel: Send {
-    /// A phase begins at a cycle.
+    /// Starts a phase at a cycle.
     fn start_phase(&mut self, cycle: u64);
 
     /// The clock of each core.
     fn clocks(&self) -> Vec<u64>;
 
-    /// Runs a core until it wants something shared after `until`: its cycle; the end of time if it is done.
+    /// Runs a core until it needs a shared resource later than `until`. Returns its cycle, or the maximum
+    /// if it is done.
     fn run_core(
         &mut self,
         core: usize,
@@ -41,28 +42,29 @@ trait ThreadModel: Send {
         items: &mut Items<'_, '_>,
     ) -> Result<u64, StreamError>;
 
-    /// The cycle in which the last core was done.
+    /// Ends the phase and returns the cycle in which the last core finished.
     fn end_phase(&mut self) -> u64;
 
-    /// The other clients access memory while no core works, as fast as memory can; the cores go on at a cycle.
+    /// Performs the accesses of other clients while no core works, at the maximum rate of memory. The cores
+    /// continue at `cycle`.
     fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64);
 
     /// Empties all caches and drops the lines in flight.
     fn flush(&mut self);
 
-    /// What was counted until a cycle.
+    /// The counts until a cycle.
     fn outcome(&self, cycles: u64) -> Outcome;
 }
 
-/// A machine whose texture units have clocks.
+/// A machine of clocked texture units.
 struct Clocked<M> {
     model: M,
-    /// Cycles until the last core was done.
+    /// Cycles until the last core finished.
     cycles: u64,
 }
 
 impl<M: ThreadModel> Machine for Clocked<M> {
-    /// A phase starts when the last core is done with the one before.
+    /// A phase starts when the last core has finished the previous one.
     fn run(
         &mut self,
         work: &mut Cores<'_>,
@@ -72,7 +74,7 @@ impl<M: ThreadModel> Machine for Clocked<M> {
     ) -> Result<(), StreamError> {
         for phase in phases {
             self.model.start_phase(self.cycles);
-            // A core that is done is at the end of time.
+            // A finished core has the maximum as its clock.
             let mut clocks = self.model.clocks();
             let mut items = Items::new(phase, assign, clocks.len(), clients.as_deref_mut());
             while let Some((core, until)) = furthest_behind(&clocks) {
@@ -96,17 +98,17 @@ impl<M: ThreadModel> Machine for Clocked<M> {
     }
 }
 
-/// L1 caches that fill later, over an L2 that does.
+/// L1 caches with delayed fills above such an L2.
 struct Shared<D> {
     l1: Vec<D>,
     l2: SecondLevel<D>,
-    /// Cycles that a line takes from the L2 to an L1.
+    /// Cycles in which a line travels from the L2 to an L1.
     l2_cycles: u64,
     counts: CacheCounts,
 }
 
 impl<D: DelayedFill> Shared<D> {
-    /// Lines arrive in an L1 within `l1_usual_cycles` after a miss of both levels, mostly.
+    /// Most lines arrive within `l1_usual_cycles` after a miss of both levels.
     fn new<C: Delay<Delayed = D>>(
         caches: Caches<C>,
         config: &RunConfig,
@@ -123,7 +125,7 @@ impl<D: DelayedFill> Shared<D> {
         }
     }
 
-    /// Takes lines out of the L1 caches that lower levels have evicted.
+    /// Invalidates L1 lines that lower levels have evicted.
     #[inline(always)]
     fn follow_evictions(&mut self, now: u64) {
         let l1 = &mut self.l1;
@@ -144,10 +146,10 @@ impl<D: DelayedFill> Shared<D> {
     }
 }
 
-/// The machine of a configuration whose texture units have clocks.
+/// The clocked machine of a configuration.
 ///
 /// # Errors
-/// A geometry that cannot be built.
+/// An impossible cache geometry.
 pub(super) fn machine(
     config: &RunConfig,
     counts: CacheCounts,
@@ -164,10 +166,10 @@ pub(super) fn machine(
     }
 }
 
-/// The machine of a configuration with these caches.
+/// The clocked machine of a configuration with these caches.
 ///
 /// # Errors
-/// A level below the L2 that cannot be built.
+/// An impossible level below the L2.
 pub(super) fn machine_of<C: Delay>(
     config: &RunConfig,
     caches: Caches<C>,

@@ -1,7 +1,8 @@
-//! A texture unit with a prefetching FIFO (Igehy, Eldridge and Proudfoot, Graphics Hardware 1998, section 3): tags are checked in
-//! order, a footprint per cycle; what misses is requested at once, and the footprint waits in a FIFO. It leaves, in order, when its
-//! lines are there. A miss takes its way when it is requested. A line that is evicted in flight still arrives, and look-ups until then
-//! are merged with its fetch.
+//! A texture unit with a prefetching FIFO (Igehy, Eldridge and Proudfoot, Graphics Hardware 1998, section
+//! 3). Tags are checked in order, one footprint per cycle. Missing lines are requested immediately, and the
+//! footprint waits in a FIFO, which it leaves in order when its lines have arrived. A missing line is
+//! allocated a way when it is requested. A line evicted in flight still arrives, and look-ups until then
+//! merge with its fetch.
 
 use super::first_miss::Thread;
 use super::{Items, Shared, ThreadModel, start_item};
@@ -14,31 +15,31 @@ use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;
 use std::collections::VecDeque;
 
-/// Texture units, and the caches that they share.
+/// Texture units and their shared caches.
 pub struct PrefetchFifo<D> {
     shared: Shared<D>,
     units: Vec<Unit>,
     tmu: TmuConfig,
-    /// When the phase started, and the footprints that had left each FIFO by then.
+    /// Start of the phase, and footprints that had left each FIFO before it.
     phase: (u64, Vec<u64>),
 }
 
 /// A core's texture unit.
 #[derive(Default)]
 struct Unit {
-    /// When the next footprint's tags are checked.
+    /// Cycle of the next footprint's tag check.
     clock: u64,
-    /// The quad whose footprints are next.
+    /// The quad whose footprints come next.
     quad: Thread,
-    /// When each footprint in the FIFO leaves it; ascending.
+    /// Cycle at which each footprint leaves the FIFO, ascending.
     exits: VecDeque<u64>,
-    /// When the last footprint so far leaves the FIFO.
+    /// Cycle at which the most recent footprint leaves the FIFO.
     last_exit: u64,
     stats: PipelineStats,
 }
 
 impl<D: DelayedFill> PrefetchFifo<D> {
-    /// Empty caches, a texture unit for each L1.
+    /// Empty caches, and one texture unit per L1.
     pub fn new<C: Delay<Delayed = D>>(
         caches: Caches<C>,
         config: &RunConfig,
@@ -56,7 +57,7 @@ impl<D: DelayedFill> PrefetchFifo<D> {
         }
     }
 
-    /// The core's next footprint enters the FIFO, or time passes until there is room for it.
+    /// Puts the core's next footprint into the FIFO, or advances time until there is room.
     fn check_tags(&mut self, core: usize) {
         let unit = &mut self.units[core];
         let now = unit.clock;

@@ -1,20 +1,20 @@
-//! One channel: its queue, its banks, and when each command may be issued.
+//! A DRAM channel: its queues, its banks and the earliest clock of each command.
 
 use super::PagePolicy;
 use super::mapping::Place;
 use super::presets::Device;
 use std::collections::VecDeque;
 
-/// What a channel counts.
+/// Counts of a channel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counts {
     /// Reads.
     pub reads: u64,
-    /// Reads whose row was open when the scheduler first saw the request, or was opened for an earlier one.
+    /// Reads whose row was open when first scheduled, or was opened for an earlier request.
     pub row_hits: u64,
-    /// Reads that had to open a row in a bank without one.
+    /// Reads that opened a row in a bank without an open row.
     pub row_empty: u64,
-    /// Reads that had to close another row first.
+    /// Reads that first had to close another row.
     pub row_conflicts: u64,
     /// Rows opened.
     pub activates: u64,
@@ -24,22 +24,22 @@ pub struct Counts {
     pub write_row_hits: u64,
     /// Refreshes of all banks.
     pub refreshes: u64,
-    /// Clock at which the last data was there.
+    /// Clock of the last data.
     pub end: u64,
-    /// Reads by their latency in clocks, arrival to last data.
+    /// Histogram of read latencies in clocks, from arrival to last data.
     pub latencies: Vec<u64>,
 }
 
-/// A request in the queue.
+/// A queued request.
 #[derive(Clone, Copy, Debug)]
 struct Request {
     place: Place,
     arrival: u64,
-    /// The first command that it needed.
+    /// The first command it needed.
     needed: Option<Needed>,
 }
 
-/// What a request found.
+/// The next command of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Needed {
     /// A read or a write.
@@ -48,7 +48,7 @@ enum Needed {
     Precharge,
 }
 
-/// A bank: its open row, and the clocks from which on commands may be issued.
+/// A bank: its open row and the earliest clock of each command.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bank {
     row: Option<u64>,
@@ -57,34 +57,34 @@ struct Bank {
     precharge_from: u64,
 }
 
-/// A channel.
+/// A DRAM channel.
 #[derive(Clone, Debug)]
 pub struct Channel {
     device: Device,
     capacity: usize,
     policy: PagePolicy,
     banks: Vec<Bank>,
-    /// By group.
+    /// Per bank group.
     read_from: Vec<u64>,
     write_from: Vec<u64>,
     activate_from: Vec<u64>,
-    /// Clocks of the last four activates.
+    /// Clocks of the last four activates (tFAW window).
     window: VecDeque<u64>,
     reads: Vec<Request>,
     writes: Vec<Request>,
     /// True while writes are served.
     is_writing: bool,
-    /// Those that found their queue full (true for writes), and no time where none was given.
+    /// Requests that found their queue full: place, true for writes, and arrival clock if given.
     backlog: VecDeque<(Place, bool, Option<u64>)>,
-    /// The next clock that has no command.
+    /// The next free clock of the command bus.
     now: u64,
     refresh_due: u64,
-    /// What was counted.
+    /// Counts so far.
     pub counts: Counts,
 }
 
 impl Channel {
-    /// All banks closed.
+    /// A channel with all banks closed.
     pub fn new(device: Device, capacity: usize, policy: PagePolicy) -> Self {
         let groups = device.groups as usize;
         Self {
@@ -106,18 +106,18 @@ impl Channel {
         }
     }
 
-    /// The next clock that has no command.
+    /// The next free clock of the command bus.
     pub fn now(&self) -> u64 {
         self.now
     }
 
-    /// A request arrives at a clock, or as soon as there is room.
+    /// Adds a request that arrives at `clock`, or without one as soon as the queue has room.
     pub fn arrive(&mut self, place: Place, write: bool, clock: Option<u64>) {
         if let Some(clock) = clock {
-            // What the channel does before is not changed by what comes later.
+            // Later requests cannot change earlier commands.
             while self.is_busy() && self.step(Some(clock)) {}
             if !self.is_busy() {
-                // Idle until now, but for refreshes.
+                // The channel was idle; only refreshes happened.
                 while self.refresh_due <= clock {
                     self.now = self.now.max(self.refresh_due);
                     self.refresh();
@@ -144,7 +144,7 @@ impl Channel {
         }
     }
 
-    /// The queue that is served.
+    /// The queue being served.
     fn served(&self) -> &[Request] {
         match self.is_writing {
             true => &self.writes,
@@ -152,7 +152,7 @@ impl Channel {
         }
     }
 
-    /// Turns to the other queue where its time has come.
+    /// Switches between reads and writes when the queue levels require it.
     fn turn(&mut self) {
         let writes = self.writes.len();
         self.is_writing = match self.is_writing {
@@ -161,14 +161,14 @@ impl Channel {
         };
     }
 
-    /// Answers everything that is queued.
+    /// Serves all queued requests.
     pub fn drain(&mut self) {
         while self.is_busy() {
             self.step(None);
         }
     }
 
-    /// Requests enter the queue while there is room.
+    /// Moves requests from the backlog into the queues while there is room.
     fn admit(&mut self) {
         while let Some(&(place, write, clock)) = self.backlog.front()
             && self.queue(write).len() < self.capacity
@@ -183,7 +183,7 @@ impl Channel {
         }
     }
 
-    /// Issues the next command, if it comes before `until`; says whether it did.
+    /// Issues the next command if it comes before `until`. Returns whether it did.
     fn step(&mut self, until: Option<u64>) -> bool {
         let before = |clock: u64| until.is_none_or(|until| clock < until);
         if self.now >= self.refresh_due {
@@ -198,7 +198,7 @@ impl Channel {
             };
             let from = from.max(self.now).max(request.arrival);
             let other = needed != Needed::Data;
-            // The queue is in the order of arrival.
+            // The queue is in order of arrival, so the older request wins a tie.
             if best.is_none_or(|(clock, is_other, ..)| (from, other) < (clock, is_other)) {
                 best = Some((from, other, index, needed));
             }
@@ -226,8 +226,8 @@ impl Channel {
         true
     }
 
-    /// The next command of a request and the clock from which on it may be issued; none while a row that others read
-    /// is open in its bank.
+    /// The next command of a request and its earliest clock. None while queued requests still need
+    /// the bank's open row.
     fn next_command(&self, request: &Request) -> Option<(u64, Needed)> {
         let Place {
             bank, group, row, ..
@@ -302,7 +302,7 @@ impl Channel {
             let same_way = clock + u64::from(ccd.max(device.burst));
             let other_way = match write {
                 true => data + u64::from(wtr),
-                // The bus is free for two clocks between data that is read and data that is written.
+                // The data bus needs two idle clocks when it changes direction.
                 false => (data + 2).saturating_sub(u64::from(device.cwl)),
             };
             let [reads, writes] = match write {
@@ -323,7 +323,7 @@ impl Channel {
         let wants =
             |other: &Request| other.place.bank == place.bank && other.place.row == place.row;
         if self.policy == PagePolicy::Closed && !self.reads.iter().chain(&self.writes).any(wants) {
-            // With the transfer, as auto-precharge: it takes no command of its own.
+            // Auto-precharge belongs to the transfer and takes no slot on the command bus.
             let from = self.banks[place.bank as usize].precharge_from;
             self.precharge(place.bank as usize, from);
         }
@@ -345,7 +345,7 @@ impl Channel {
             _ => counts.row_hits += 1,
         }
         let latency = (data - request.arrival) as usize;
-        // One bucket for what waited longer than any figure of interest.
+        // Very long latencies share one bucket.
         let latency = latency.min(LONGEST);
         if counts.latencies.len() <= latency {
             counts.latencies.resize(latency + 1, 0);
@@ -372,5 +372,5 @@ impl Channel {
     }
 }
 
-/// Latencies beyond this many clocks count as this many.
+/// Latencies above this many clocks count as this many.
 const LONGEST: usize = 1 << 20;

@@ -1,13 +1,14 @@
-//! DRAM: what the lines that leave the last cache cost in row activations, time and energy.
+//! DRAM model: row activations, time and energy of the lines that miss the last cache level.
 //!
-//! The model is open loop: requests arrive when the caches ask for them, and the caches' own latency
-//! (`memory_cycles`) stays what it is. Requests are reads and writes of whole bursts.
+//! The model is open-loop: requests arrive when the caches issue them, and the caches' own memory
+//! latency (`memory_cycles`) does not change. Requests read or write whole bursts.
 //!
-//! Writes wait in a queue of their own. A channel turns to them when that queue is four fifths full or no read waits, and back
-//! to reads when it is down to a fifth, as Ramulator does.
+//! Writes have their own queue. A channel switches to writes when that queue is four fifths full or
+//! no read waits, and back to reads when it is down to one fifth, as in Ramulator.
 //!
-//! A channel schedules as FR-FCFS (Rixner et al., ISCA 2000): of the commands that may be issued first, reads of open
-//! rows go before others, and older requests before younger ones. A row is closed only when no queued request reads it.
+//! The scheduler is FR-FCFS (Rixner et al., ISCA 2000): of the commands that can be issued first,
+//! accesses to open rows take precedence, then older requests. A row is closed only when no queued
+//! request needs it.
 
 mod channel;
 mod mapping;
@@ -24,16 +25,16 @@ use channel::Channel;
 use mapping::Mapper;
 use serde::{Deserialize, Serialize};
 
-/// What becomes of a row after its last queued read.
+/// What happens to a row after its last queued access.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum PagePolicy {
-    /// It stays open until another row of its bank is wanted.
+    /// It stays open until a request needs another row of its bank.
     #[default]
     Open,
-    /// It is closed at once.
+    /// It is closed immediately.
     Closed,
 }
 
@@ -41,17 +42,17 @@ pub enum PagePolicy {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DramConfig {
-    /// Device, with the timings of its standard.
+    /// Device and timings.
     pub preset: DramPreset,
-    /// Channels, a power of two.
+    /// Number of channels, a power of two.
     pub channels: u32,
-    /// Which bits of an address are channel, bank, row and column.
+    /// Which address bits select channel, bank, row and column.
     pub mapping: Mapping,
-    /// What becomes of a row that no queued request reads.
+    /// What happens to a row that no queued request needs.
     pub page_policy: PagePolicy,
-    /// Requests that a channel's scheduler sees at a time; others wait in the order of arrival.
+    /// Requests visible to a channel's scheduler; further requests wait in order of arrival.
     pub queue: u32,
-    /// Clock of the GPU, whose cycles the requests' times are, MHz.
+    /// GPU clock in MHz. Request times are in GPU cycles.
     pub core_mhz: u32,
 }
 
@@ -68,7 +69,7 @@ impl Default for DramConfig {
     }
 }
 
-/// The channels of a memory.
+/// A memory of several channels.
 #[derive(Clone, Debug)]
 pub struct Dram {
     config: DramConfig,
@@ -77,14 +78,14 @@ pub struct Dram {
     channels: Vec<Channel>,
     line_bytes: u32,
     requests: u64,
-    /// Clock of the last request that had a time.
+    /// Clock of the last request with a time.
     last: u64,
-    /// Clocks that requests without a time took which the GPU's cycles do not count.
+    /// Clocks spent on requests without a time, which the GPU's cycles do not include.
     late_by: u64,
 }
 
 impl Dram {
-    /// All rows closed. Lines have so many bytes.
+    /// A memory with all rows closed, accessed in lines of `line_bytes`.
     #[must_use]
     pub fn new(config: &DramConfig, line_bytes: u32) -> Self {
         let device = config.preset.device();
@@ -101,14 +102,14 @@ impl Dram {
         }
     }
 
-    /// A line is read at a cycle of the GPU; one before the last request's counts as that. Without a time it arrives as
-    /// soon as the channel's queue has a place.
+    /// Reads a line at a GPU cycle, but not before the last request. Without a cycle, the read
+    /// arrives as soon as the channel's queue has room.
     pub fn read(&mut self, line: u32, cycle: Option<u64>) {
         let bytes = self.line_bytes.into();
         self.request(u64::from(line) * bytes, bytes, false, cycle);
     }
 
-    /// Bytes are read or written, line by line.
+    /// Reads or writes bytes, line by line.
     pub fn request(&mut self, address: u64, bytes: u64, write: bool, cycle: Option<u64>) {
         self.requests += bytes.div_ceil(self.line_bytes.into());
         let burst = u64::from(self.device.burst_bytes);
@@ -124,7 +125,7 @@ impl Dram {
         }
     }
 
-    /// Requests without a time took as long as they took: what comes at `cycle` or later comes so much later.
+    /// Delays all requests from `cycle` on by the time that requests without a time have taken.
     pub fn catch_up(&mut self, cycle: u64) {
         let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
         let clock = (ps / u128::from(self.device.clock_ps)) as u64;
@@ -132,7 +133,7 @@ impl Dram {
         self.late_by = self.late_by.max(now.saturating_sub(clock));
     }
 
-    /// What was counted, all requests answered.
+    /// Serves all requests and returns the counts.
     #[must_use]
     pub fn result(&self) -> DramResult {
         let mut channels = self.channels.clone();

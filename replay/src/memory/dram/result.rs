@@ -1,4 +1,4 @@
-//! What a memory counted, in the units of users.
+//! The result of the DRAM model, in physical units.
 
 use super::DramConfig;
 use super::channel::Channel;
@@ -11,16 +11,16 @@ use std::fmt;
 pub struct DramResult {
     /// Device.
     pub device: String,
-    /// Lines asked for.
+    /// Lines requested.
     pub requests: u64,
-    /// Bursts read; a line that is smaller than a burst takes a whole one.
+    /// Bursts read. A line smaller than a burst reads a whole burst.
     pub reads: u64,
-    /// Bytes that the data buses carried to the chip.
+    /// Bytes transferred to the chip.
     pub read_bytes: u64,
     /// Bursts written.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub writes: u64,
-    /// Bytes that the data buses carried from the chip.
+    /// Bytes transferred from the chip.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub write_bytes: u64,
     /// Writes whose row was open.
@@ -28,9 +28,9 @@ pub struct DramResult {
     pub write_row_hits: u64,
     /// Reads whose row was open.
     pub row_hits: u64,
-    /// Reads that opened a row in a bank without one.
+    /// Reads that opened a row in a bank without an open row.
     pub row_empty: u64,
-    /// Reads that had another row closed first.
+    /// Reads that first had to close another row.
     pub row_conflicts: u64,
     /// `row_hits` over `reads`.
     pub row_hit_rate: f64,
@@ -40,17 +40,17 @@ pub struct DramResult {
     pub refreshes: u64,
     /// From the first clock to the last data.
     pub time_us: f64,
-    /// Bytes over time.
+    /// Bytes transferred over time.
     pub bandwidth_gb_per_s: f64,
-    /// What the data buses carry at most.
+    /// Peak bandwidth of the data buses.
     pub peak_gb_per_s: f64,
-    /// From arrival to the last data; where requests carry no time, from the place in the queue on.
+    /// Mean latency from arrival to last data. Requests without a time arrive when they enter the queue.
     pub latency_mean_ns: f64,
-    /// Half of the requests take no longer.
+    /// Median latency.
     pub latency_p50_ns: f64,
-    /// 99 of 100 requests take no longer.
+    /// 99th percentile of the latency.
     pub latency_p99_ns: f64,
-    /// Activates, reads, writes, refreshes and standing by.
+    /// Energy of activates, reads, writes, refreshes and standby.
     pub energy_mj: f64,
 }
 
@@ -59,7 +59,7 @@ fn is_zero(value: &u64) -> bool {
 }
 
 impl DramResult {
-    /// Over all channels, each done with its queue.
+    /// Sums over all channels, whose queues are empty.
     pub(super) fn of(
         config: &DramConfig,
         device: &Device,

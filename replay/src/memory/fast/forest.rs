@@ -1,33 +1,32 @@
-//! Many LRU caches in one pass: a stack of lines for every set of every number of sets.
+//! Simulates many LRU caches in one pass: one stack of lines per set, for every number of sets.
 //!
-//! An LRU cache of `w` ways holds the `w` lines of a set that were used last, so one stack, as deep
-//! as the largest associativity asked for, answers all associativities: a line found at depth `d`
-//! is a hit where there are more than `d` ways (Mattson et al. 1970). The lines of a set are those
-//! of some sets of a cache with fewer sets, so a line that was used last in its set was so with
-//! more sets, too, and the search ends there, with nothing to move (Hill & Smith 1989).
+//! An LRU cache of `w` ways holds the `w` most recently used lines of a set. One stack as deep as
+//! the largest associativity therefore answers all associativities: a line found at depth `d` hits
+//! with more than `d` ways (Mattson et al. 1970). More sets split the lines of a set, so a line
+//! that was the most recent in its set also was with more sets. The search ends there, with nothing
+//! to move (Hill & Smith 1989).
 
 use crate::memory::policy::{EMPTY, to_front};
 use std::hint::select_unpredictable;
 
-/// The stacks of one number of sets.
+/// The stacks for one number of sets.
 #[derive(Clone, Debug)]
 struct Stacks {
-    /// Lines by set, the one used last first.
+    /// Lines by set, most recently used first.
     lines: Vec<u32>,
     set_mask: u32,
     depth: usize,
 }
 
 impl Stacks {
-    /// Moves the line to the front of its stack: how deep it was; the stack's depth if it was not
-    /// there.
+    /// Moves the line to the front of its stack. Returns its previous depth, or the stack's depth if it was absent.
     #[inline(always)]
     fn access(&mut self, line: u32) -> u8 {
         let first = (line & self.set_mask) as usize * self.depth;
         to_front(&mut self.lines[first..first + self.depth], line) as u8
     }
 
-    /// Accesses lines; their stacks' depth is `N`, known to the compiler.
+    /// Accesses lines in stacks of the compile-time depth `N`.
     fn access_each<const N: usize>(
         &mut self,
         lines: impl Iterator<Item = u32>,
@@ -39,7 +38,7 @@ impl Stacks {
     }
 }
 
-/// Moves a line to the front of its stack, without a branch: how deep it was; `N` if it was not there.
+/// Branch-free: moves the line to the front of its stack and returns its previous depth, or `N` if it was absent.
 #[inline(always)]
 fn to_front_of<const N: usize>(stack: &mut [u32; N], line: u32) -> u8 {
     let old = *stack;
@@ -54,7 +53,7 @@ fn to_front_of<const N: usize>(stack: &mut [u32; N], line: u32) -> u8 {
     depth as u8
 }
 
-/// LRU caches of several numbers of sets and ways that see the same lines.
+/// LRU caches with several numbers of sets and ways, accessed by the same lines.
 #[derive(Clone, Debug)]
 pub struct Forest {
     /// By number of sets, ascending.
@@ -62,8 +61,8 @@ pub struct Forest {
 }
 
 impl Forest {
-    /// Empty caches. `trees` has numbers of sets (powers of two), ascending, each with the largest
-    /// associativity that is asked for (at most 255); there is at least one.
+    /// Empty caches. `trees` lists at least one number of sets (powers of two, ascending), each
+    /// with its largest associativity (at most 255).
     #[must_use]
     pub fn new(trees: &[(u32, u32)]) -> Self {
         debug_assert!(!trees.is_empty() && trees.is_sorted_by(|a, b| a.0 < b.0));
@@ -84,8 +83,8 @@ impl Forest {
             .for_each(|tree| tree.lines.fill(EMPTY));
     }
 
-    /// Accesses lines from the first on until one lies `ways` deep or deeper for any number of sets:
-    /// its index and, in `depths`, what [`Self::access`] says of it; their number if there is none.
+    /// Accesses lines until one lies at depth `ways` or deeper for any number of sets. Returns its
+    /// index, or the number of lines. `depths` holds the result of [`Self::access`] for that line.
     #[inline(always)]
     pub fn access_all(&mut self, lines: &[u32], ways: u32, depths: &mut [u8]) -> usize {
         let ([coarsest, finer @ ..], [depth, depths @ ..]) = (&mut *self.trees, depths) else {
@@ -104,8 +103,8 @@ impl Forest {
         lines.len()
     }
 
-    /// Accesses lines for one number of sets only: `depths` gets what [`Self::access`] says of each.
-    /// Lines that lay on top need not be asked for with more sets.
+    /// Accesses lines for one number of sets. `depths` receives each line's depth as from
+    /// [`Self::access`]. Lines found on top need no access with more sets.
     pub fn access_tree(
         &mut self,
         tree: usize,
@@ -122,9 +121,9 @@ impl Forest {
         }
     }
 
-    /// Accesses a line. `depths` gets, for each number of sets, how deep the line lay in its
-    /// stack: a cache of more ways than that had it. The line lay on top for all numbers of sets from the
-    /// returned one on.
+    /// Accesses a line. `depths` receives its depth for each number of sets: a cache with more ways
+    /// than that hits. Returns the first number of sets (by index) from which on the line was on
+    /// top.
     #[inline(always)]
     pub fn access(&mut self, line: u32, depths: &mut [u8]) -> usize {
         let mut searched = self.trees.len();
@@ -140,7 +139,7 @@ impl Forest {
     }
 }
 
-/// Accesses a line in trees of ever more sets: the largest depth.
+/// Accesses a line in trees with increasing numbers of sets. Returns the largest depth.
 #[inline(always)]
 fn deepest(trees: &mut [Stacks], line: u32, depths: &mut [u8]) -> u8 {
     let mut deepest = 0;

@@ -1,4 +1,4 @@
-//! Accelerators of caches. Each equals the plain caches, as property tests hold.
+//! Accelerated caches. Property tests hold each equal to the plain caches.
 
 mod forest;
 mod set_order;

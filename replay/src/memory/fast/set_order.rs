@@ -1,7 +1,7 @@
-//! An LRU cache of four ways whose sets are filled one by one.
+//! A four-way LRU cache that fills set by set.
 //!
-//! What a fill does to a set depends on this set alone, so it need not be done when the line arrives,
-//! but when the set is next accessed. Each set keeps what is in flight into it: no calendar.
+//! A fill affects only its own set, so it can wait until the set is next accessed. Each set keeps
+//! its own lines in flight, and no calendar is needed.
 
 use crate::memory::in_flight::{DelayedFill, Mshrs, NOT_IN_FLIGHT};
 use crate::memory::policy::{EMPTY, look_up, take_out};
@@ -13,16 +13,16 @@ struct Arrival {
     line: u32,
 }
 
-/// A set. What is in flight into it first lies with it.
+/// A set, with the first of its lines in flight.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 struct Set {
-    /// In order of last use, most recent first.
+    /// Most recently used first.
     tags: [u32; 4],
-    /// When the first line arrives; the end of time if none is in flight.
+    /// Arrival of the first line in flight, or the maximum if there is none.
     due: u64,
     first: u32,
-    /// Lines in flight after it, in [`SetOrder::later`].
+    /// Number of further lines in flight, in [`SetOrder::later`].
     later: u32,
 }
 
@@ -33,27 +33,27 @@ const EMPTY_SET: Set = Set {
     later: 0,
 };
 
-/// An LRU cache of four ways and what is in flight into its sets.
+/// A four-way LRU cache with lines in flight.
 #[derive(Clone, Debug)]
 pub struct SetOrder {
-    /// A power of two.
+    /// Power-of-two number of sets.
     sets: Vec<Set>,
     /// By set.
     later: Vec<Later>,
-    /// All of them.
+    /// Lines in flight into all sets.
     mshrs: Mshrs,
 }
 
-/// What arrives in a set after its first line.
+/// Lines in flight into a set after the first one.
 #[derive(Clone, Debug, Default)]
 struct Later {
-    /// The first `gone` have arrived; the others by cycle, of one cycle in the order of their requests.
+    /// The first `gone` have been filled. The others are sorted by cycle, equal cycles in order of request.
     arrivals: Vec<Arrival>,
     gone: usize,
 }
 
 impl Later {
-    /// Most arrive after all that are in flight.
+    /// Inserts a line; most arrive after all others.
     #[inline(always)]
     fn enter(&mut self, new: Arrival) {
         let all = self.arrivals.len();
@@ -69,7 +69,7 @@ impl Later {
         self.arrivals[at] = new;
     }
 
-    /// Puts a line before all others.
+    /// Inserts a line before all others.
     fn enter_first(&mut self, first: Arrival) {
         match self.gone.checked_sub(1) {
             Some(at) => {
@@ -80,7 +80,7 @@ impl Later {
         }
     }
 
-    /// The first one, which arrives.
+    /// Removes the first line in flight.
     #[inline(always)]
     fn take(&mut self) -> Option<Arrival> {
         let first = *self.arrivals.get(self.gone)?;
@@ -109,7 +109,7 @@ impl SetOrder {
         }
     }
 
-    /// The set that holds a line, with all that has arrived.
+    /// The set of a line, after filling the lines that have arrived.
     #[inline(always)]
     fn settled(&mut self, line: u32, now: u64) -> (&mut Set, &mut Later) {
         let index = line as usize & (self.sets.len() - 1);
@@ -122,7 +122,7 @@ impl SetOrder {
 }
 
 impl Set {
-    /// Fills what has arrived.
+    /// Fills the lines that have arrived.
     #[inline(never)]
     fn settle(&mut self, later: &mut Later, now: u64) {
         while self.due <= now {
@@ -145,7 +145,7 @@ impl Set {
         self.tags = [line, first, second, third];
     }
 
-    /// When a line arrives that the set does not hold.
+    /// The arrival of a line that the set does not hold.
     #[inline(always)]
     fn arrival(&self, mshrs: &Mshrs, line: u32, now: u64) -> u64 {
         if self.first == line {
@@ -247,7 +247,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(256))]
 
-        /// Sets with many lines in flight; lines that arrive at once, in one cycle, out of order.
+        /// Compares sets with many lines in flight: equal arrivals, zero latencies, arrivals out of order.
         #[test]
         fn sets_filled_one_by_one_equal_a_cache_filled_in_the_order_of_time(
             steps in prop::collection::vec(
@@ -274,7 +274,7 @@ mod tests {
                 prop_assert!(found.iter().all(|(index, line, _)| lines[*index] == *line));
                 let absent = found.iter().filter(|(.., arrival)| *arrival == NOT_IN_FLIGHT);
                 for &(_, line, _) in absent {
-                    // Somebody before it in the list may have asked for it just now.
+                    // An earlier look-up of the list may have requested this line.
                     prop_assert_eq!(sets.look_up(line, now), general.look_up(line, now));
                     if sets.arrival(line, now) == NOT_IN_FLIGHT && sets.look_up(line, now) != 0 {
                         sets.enter(line, now, now + latency);

@@ -1,4 +1,4 @@
-//! All levels where time does not pass: a miss fills at once.
+//! All levels without time (functional mode): a miss fills immediately.
 
 use super::caches::Caches;
 use super::second_level::{MissPath, SecondLevel};
@@ -6,22 +6,22 @@ use crate::config::{ConfigError, RunConfig};
 use crate::memory::{Access, Cache};
 use crate::result::MemoryResult;
 
-/// Where an access found its line.
+/// Where an access hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// In the core's L1.
+    /// The core's L1.
     L1,
-    /// In the L2.
+    /// The L2.
     L2,
-    /// In a lower level or in memory.
+    /// A lower level or memory.
     Below,
 }
 
-/// The caches of a machine, of any number of levels.
+/// The caches of a machine with any number of levels.
 pub struct Hierarchy<C> {
     l1: Vec<C>,
     l2: SecondLevel<C>,
-    /// True where lines leave L1 caches because other levels evict them.
+    /// True if evictions of other levels invalidate L1 lines.
     invalidates: bool,
 }
 
@@ -29,7 +29,7 @@ impl Hierarchy<Box<dyn Cache>> {
     /// Empty caches of any policy.
     ///
     /// # Errors
-    /// A geometry that cannot be built.
+    /// An impossible geometry.
     pub fn build(config: &RunConfig) -> Result<Self, ConfigError> {
         Ok(Self::new(
             Caches::build(config)?.boxed(),
@@ -49,7 +49,7 @@ impl<C: Cache> Hierarchy<C> {
         }
     }
 
-    /// Up to so many distinct lines accessed one after another are all in the L1 right after.
+    /// Up to this many distinct lines accessed in sequence are all in the L1 afterwards.
     #[must_use]
     pub fn repeat_safe_lines(&self) -> u32 {
         match self.invalidates {
@@ -58,13 +58,13 @@ impl<C: Cache> Hierarchy<C> {
         }
     }
 
-    /// True where lines leave L1 caches because other levels evict them.
+    /// True if evictions of other levels invalidate L1 lines.
     #[must_use]
     pub fn invalidates(&self) -> bool {
         self.invalidates
     }
 
-    /// A core accesses a line.
+    /// Accesses a line for a core.
     #[inline(always)]
     pub fn access(&mut self, core: usize, line: u32) -> Found {
         if self.access_l1(core, line) {
@@ -75,24 +75,24 @@ impl<C: Cache> Hierarchy<C> {
         if hit { Found::L2 } else { Found::Below }
     }
 
-    /// A core accesses a line in its L1 alone, which takes it. True for a hit.
+    /// Accesses a line in a core's L1 only, filling it on a miss. Returns true for a hit.
     #[inline(always)]
     pub fn access_l1(&mut self, core: usize, line: u32) -> bool {
         self.l1[core].access(line)
     }
 
-    /// A core's L1 missed a line, which the levels below it are asked for. True if the L2 has it.
+    /// Accesses a line that missed in a core's L1. Returns true for an L2 hit.
     #[inline(always)]
     pub fn access_l2(&mut self, core: usize, line: u32) -> bool {
         self.l2.access(core, line)
     }
 
-    /// Another client than the texture units reads or writes: the bytes that caches serve.
+    /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
     pub fn client_access(&mut self, core: usize, access: &Access) -> u64 {
         self.l2.client_access_at_once(core, access)
     }
 
-    /// Takes lines out of the L1 caches that lower levels have evicted.
+    /// Invalidates L1 lines that lower levels have evicted.
     #[inline(always)]
     pub fn follow_evictions(&mut self) {
         let l1 = &mut self.l1;
@@ -105,7 +105,7 @@ impl<C: Cache> Hierarchy<C> {
         self.l2.empty();
     }
 
-    /// What was counted beside and below the L2.
+    /// Counts beside and below the L2.
     #[must_use]
     pub fn result(&self) -> MemoryResult {
         self.l2.result()

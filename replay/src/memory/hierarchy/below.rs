@@ -1,4 +1,4 @@
-//! What answers the misses of the L2: further levels, if the configuration has any, then memory.
+//! The path of L2 misses: further levels, if configured, then memory.
 
 use super::caches::of_core;
 use crate::config::{ConfigError, Inclusion, RunConfig};
@@ -14,17 +14,17 @@ pub struct Below {
     levels: Vec<Level>,
     dram: Option<Dram>,
     memory_cycles: u64,
-    /// Lines of the L2 that inclusive levels have evicted.
+    /// L2 lines that inclusive levels have evicted.
     invalidated: Vec<RangeInclusive<u32>>,
 }
 
-/// One level. A line that misses takes its way at once (allocation on a miss).
+/// A level. A missing line is allocated immediately (allocation on miss).
 struct Level {
     name: &'static str,
-    /// One, or one for each core.
+    /// One cache, or one per core.
     caches: Vec<Filling>,
     line_bytes: u32,
-    /// Its lines are so much longer than the L2's: the number of bits that a line number loses.
+    /// log2 of its line size over the L2's line size.
     shift: u32,
     inclusion: Inclusion,
     is_for_all_clients: bool,
@@ -34,17 +34,17 @@ struct Level {
     secondary_misses: u64,
 }
 
-/// A cache and the lines in flight into it.
+/// A cache and its lines in flight.
 struct Filling {
     cache: Box<dyn Cache>,
     in_flight: Mshrs,
 }
 
 impl Below {
-    /// Empty levels and closed rows; none where the L2's misses are only counted. Each level has a seed of its own.
+    /// Empty levels and closed rows, or none if L2 misses are only counted. Each level has its own seed.
     ///
     /// # Errors
-    /// A geometry that cannot be built.
+    /// An impossible geometry.
     pub fn build(config: &RunConfig) -> Result<Option<Self>, ConfigError> {
         if !config.simulates_below_l2() {
             return Ok(None);
@@ -84,7 +84,7 @@ impl Below {
         }))
     }
 
-    /// A core's L2 reads a line that it has not, where time does not pass.
+    /// Reads a line for a core's L2, without time.
     pub fn read(&mut self, core: usize, line: u32) {
         let missed = self.look_up(core, line);
         if missed == self.levels.len() {
@@ -96,9 +96,9 @@ impl Below {
         self.fill(core, missed, line);
     }
 
-    /// A core's L2 reads a line that it has not: the cycle in which it arrives there. `now` never goes back.
+    /// Reads a line for a core's L2 and returns its arrival cycle. `now` never decreases.
     ///
-    /// A level that holds the line sends it after its `hit_cycles`, or when the line arrives there, whichever is later.
+    /// A level that holds the line sends it after `hit_cycles`, or when the line arrives there, whichever is later.
     pub fn read_at(&mut self, core: usize, line: u32, now: u64) -> u64 {
         let missed = self.look_up(core, line);
         let arrival = if let Some(level) = self.levels.get_mut(missed) {
@@ -117,7 +117,8 @@ impl Below {
         arrival
     }
 
-    /// Another client than the texture units reads or writes: the bytes that levels for all clients serve. Writes pass through.
+    /// Accesses memory for a client other than the texture units. Returns the bytes served by
+    /// levels for all clients. Writes pass through.
     pub fn client_access(&mut self, core: usize, access: &Access, now: Option<u64>) -> u64 {
         let Some(first) = self
             .levels
@@ -169,14 +170,14 @@ impl Below {
         }
     }
 
-    /// The first level that holds a line; their number if none does. A line that an exclusive level holds leaves it.
+    /// The first level that holds a line, or the number of levels. An exclusive level gives up the line.
     fn look_up(&mut self, core: usize, line: u32) -> usize {
         let mut levels = self.levels.iter_mut();
         let hit = levels.position(|level| level.look_up(core, line));
         hit.unwrap_or(self.levels.len())
     }
 
-    /// Fills a line into the first levels, which missed it; exclusive ones hold only what the level above evicts.
+    /// Fills a line into the first `missed` levels. Exclusive levels only receive evictions of the level above.
     fn fill(&mut self, core: usize, missed: usize, line: u32) {
         for index in 0..missed {
             if self.levels[index].inclusion != Inclusion::Exclusive {
@@ -207,7 +208,7 @@ impl Below {
         self.take_evicted(index + 1, first);
     }
 
-    /// A level, if it is exclusive, takes a line that the level above it has evicted.
+    /// Passes a line evicted by the level above to an exclusive level.
     fn take_evicted(&mut self, index: usize, line: u32) {
         if let Some(level) = self.levels.get(index)
             && level.inclusion == Inclusion::Exclusive
@@ -217,12 +218,12 @@ impl Below {
         }
     }
 
-    /// The L3, if it is exclusive, takes a line that the L2 has evicted.
+    /// Passes a line evicted by the L2 to an exclusive L3.
     pub fn take_evicted_by_l2(&mut self, line: u32) {
         self.take_evicted(0, line);
     }
 
-    /// Lines of the L2 that an inclusive level has evicted since the last call.
+    /// L2 lines evicted by an inclusive level since the last call.
     pub fn take_invalidated(&mut self) -> Vec<RangeInclusive<u32>> {
         std::mem::take(&mut self.invalidated)
     }
@@ -231,7 +232,7 @@ impl Below {
         line >> self.levels.last().map_or(0, |level| level.shift)
     }
 
-    /// Empties the levels. Rows of the DRAM stay open.
+    /// Empties the levels. DRAM rows stay open.
     pub fn clear(&mut self) {
         for level in &mut self.levels {
             for of in &mut level.caches {
@@ -241,7 +242,7 @@ impl Below {
         }
     }
 
-    /// What the levels, the L3 first, and the DRAM counted, all requests answered.
+    /// Serves all requests and returns the counts of the levels (L3 first) and of the DRAM.
     #[must_use]
     pub fn result(&self) -> (Vec<LowerLevelResult>, Option<DramResult>) {
         let level = |level: &Level| LowerLevelResult {
@@ -263,13 +264,13 @@ impl Level {
         &mut of_core(&mut self.caches, core).cache
     }
 
-    /// Looks up the line that holds a line of the L2 for another client, which is not counted. True for a hit.
+    /// Looks up the line that contains an L2 line for another client, without counting. Returns true for a hit.
     fn holds(&mut self, core: usize, line: u32) -> bool {
         let line = line >> self.shift;
         self.cache(core).lookup(line)
     }
 
-    /// Looks up the line that holds a line of the L2. True for a hit.
+    /// Looks up the line that contains an L2 line. Returns true for a hit.
     fn look_up(&mut self, core: usize, line: u32) -> bool {
         let line = line >> self.shift;
         self.look_ups += 1;
@@ -281,7 +282,7 @@ impl Level {
         hit
     }
 
-    /// When a line that the level holds, or is waiting for, is in the L2.
+    /// When a line that the level holds, or has in flight, arrives at the L2.
     fn arrival(&mut self, core: usize, line: u32, now: u64) -> u64 {
         let sent = now + self.hit_cycles;
         let in_flight = &of_core(&mut self.caches, core).in_flight;
@@ -294,7 +295,8 @@ impl Level {
         }
     }
 
-    /// A line that missed arrives later. One that was evicted in flight and is asked for again arrives with its first fetch.
+    /// Records the arrival of a missing line. A line that was evicted in flight and is requested
+    /// again arrives with its first fetch.
     fn enter(&mut self, core: usize, line: u32, now: u64, arrival: u64) {
         let line = line >> self.shift;
         let in_flight = &mut of_core(&mut self.caches, core).in_flight;

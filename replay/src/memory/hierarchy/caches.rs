@@ -1,9 +1,9 @@
-//! The caches of the first two levels, and the choice of the type that a replay is compiled for.
+//! The caches of the first two levels, with the type that a replay is compiled for.
 
 use crate::config::{ConfigError, LevelConfig, RunConfig};
 use crate::memory::{AllocateOnMiss, AnyCache, Cache, Delay, FourWayLru};
 
-/// The caches of the first two levels: of each, one for all cores or one for each core.
+/// The caches of the first two levels: per level one cache, or one per core.
 pub struct Caches<C> {
     /// First level.
     pub l1: Vec<C>,
@@ -19,7 +19,7 @@ pub(super) fn of_core<C>(caches: &mut [C], core: usize) -> &mut C {
 }
 
 impl<C: Delay> Caches<C> {
-    /// The caches as ones that fill later; most lines arrive within so many cycles.
+    /// Turns the caches into caches with delayed fills; most lines arrive within these latencies.
     #[must_use]
     pub fn delayed(self, l1_cycles: u64, l2_cycles: u64) -> Caches<C::Delayed> {
         let delayed = |caches: Vec<C>, cycles| {
@@ -34,10 +34,10 @@ impl<C: Delay> Caches<C> {
 }
 
 impl Caches<AnyCache> {
-    /// Builds the caches of a configuration. Each has a seed of its own.
+    /// Builds the caches of a configuration. Each has its own seed.
     ///
     /// # Errors
-    /// A geometry that cannot be built.
+    /// An impossible geometry.
     pub fn build(config: &RunConfig) -> Result<Self, ConfigError> {
         let build = |level: &LevelConfig, name, number: u32| {
             let seed = config.seed.wrapping_add(number.into());
@@ -59,7 +59,7 @@ impl Caches<AnyCache> {
         })
     }
 
-    /// The caches as ones that allocate on a miss.
+    /// Turns the caches into caches that allocate on a miss.
     #[must_use]
     pub fn allocate_on_miss(self) -> Caches<AllocateOnMiss> {
         let allocate = |caches: Vec<AnyCache>| {
@@ -72,7 +72,7 @@ impl Caches<AnyCache> {
         }
     }
 
-    /// The caches behind pointers.
+    /// Boxes the caches.
     #[must_use]
     pub fn boxed(self) -> Caches<Box<dyn Cache>> {
         let boxed = |caches: Vec<AnyCache>| caches.into_iter().map(AnyCache::into_box).collect();
@@ -82,10 +82,10 @@ impl Caches<AnyCache> {
         }
     }
 
-    /// The caches as what they are, if all are [`FourWayLru`].
+    /// Returns the caches with their concrete type if all are [`FourWayLru`].
     ///
     /// # Errors
-    /// If not, the caches behind pointers.
+    /// Otherwise the boxed caches.
     pub fn all_four_way(self) -> Result<Caches<FourWayLru>, Caches<Box<dyn Cache>>> {
         let is_four_way = |cache: &AnyCache| matches!(cache, AnyCache::FourWayLru(_));
         if !self.l1.iter().chain(&self.l2).all(is_four_way) {

@@ -1,22 +1,22 @@
-//! What evictions of one level mean for others: an inclusive level invalidates the lines of those above, an exclusive one takes
-//! what the level above evicts.
+//! Inclusion between levels: an inclusive level invalidates lines of the levels above, an exclusive
+//! level receives the evictions of the level above.
 
 use super::below::Below;
 use crate::config::{Inclusion, RunConfig};
 
-/// Evictions that other levels have to follow.
+/// Evictions that affect other levels.
 pub struct Evictions {
     is_l2_inclusive: bool,
-    /// Lines that the L2 has evicted since the last call of [`Self::follow`].
+    /// L2 evictions since the last call of [`Self::follow`].
     pub evicted: Vec<u32>,
-    /// Lines that the L1 caches must give up.
+    /// Lines to be invalidated in the L1 caches.
     invalidated: Vec<u32>,
-    /// Lines that were invalidated in L1 caches and in the L2.
+    /// Lines invalidated in the L1 caches and the L2 so far.
     pub invalidated_lines: u64,
 }
 
 impl Evictions {
-    /// None where levels evict independently.
+    /// None if levels evict independently.
     pub fn build(config: &RunConfig) -> Option<Self> {
         config.level.depend_on_evictions().then(|| Self {
             is_l2_inclusive: config.level.l2.inclusion == Inclusion::Inclusive,
@@ -26,8 +26,8 @@ impl Evictions {
         })
     }
 
-    /// Follows the evictions of the L2 and of the levels below since the last call. `remove` takes a line out of all caches of
-    /// the L2 and returns how many held it.
+    /// Processes the evictions of the L2 and of lower levels since the last call. `remove` removes
+    /// a line from all L2 caches and returns how many held it.
     pub fn follow(&mut self, below: Option<&mut Below>, mut remove: impl FnMut(u32) -> u64) {
         if self.is_l2_inclusive {
             self.invalidated.extend_from_slice(&self.evicted);
@@ -44,13 +44,13 @@ impl Evictions {
         self.evicted.clear();
     }
 
-    /// True if L1 caches hold lines that they must give up.
+    /// True if lines still have to be invalidated in the L1 caches.
     #[inline(always)]
     pub fn are_pending(&self) -> bool {
         !self.invalidated.is_empty()
     }
 
-    /// Calls `remove` on each line that the L1 caches must give up; it returns how many held it.
+    /// Calls `remove` for each line to be invalidated in the L1 caches; it returns how many held the line.
     pub fn invalidate_l1(&mut self, mut remove: impl FnMut(u32) -> u64) {
         for line in self.invalidated.drain(..) {
             self.invalidated_lines += remove(line);

@@ -1,5 +1,4 @@
-//! The L2 as the cores' L1 caches see it: one cache for all cores or one for each, their prefetchers and the path of
-//! their misses.
+//! The L2 as seen by the L1 caches: one cache or one per core, with prefetchers and the path of their misses.
 
 use super::below::Below;
 use super::caches::of_core;
@@ -14,27 +13,27 @@ use formats::layout::Layout;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-/// What a configuration has beside and below the L2.
+/// The parts of a configuration beside and below the L2.
 pub struct MissPath {
     below: Option<Below>,
-    /// By cache of the L2; empty without one.
+    /// One per L2 cache; empty without prefetcher.
     prefetch: Vec<Prefetch>,
-    /// By cache of the L2, where their number is limited.
+    /// One per L2 cache, if the number of MSHRs is limited.
     mshrs: Vec<LimitedMshrs>,
-    /// Where levels depend on what others evict.
+    /// Present if levels depend on each other's evictions.
     evictions: Option<Evictions>,
-    /// True with a prefetcher or with evictions to follow: what comes after the answer to a request.
+    /// True if a request has effects after its answer: prefetches or evictions to process.
     has_consequences: bool,
     memory_cycles: u64,
     line_bytes: u64,
-    /// True where the L2 holds lines of all clients.
+    /// True if the L2 holds lines of all clients.
     is_for_all_clients: bool,
-    /// Fetches by interval of time, where they are recorded.
+    /// Fetches per interval of time, if recorded.
     fetched_lines: Option<Vec<u32>>,
 }
 
 impl MissPath {
-    /// Memory right below the L2, which is only counted.
+    /// Memory directly below the L2, which is only counted.
     #[must_use]
     pub fn memory_alone() -> Self {
         Self {
@@ -50,10 +49,10 @@ impl MissPath {
         }
     }
 
-    /// Empty levels below the L2; `layout` says where textures lie, if lines are textures.
+    /// Empty levels below the L2. `layout` gives the location of textures, if lines belong to textures.
     ///
     /// # Errors
-    /// A geometry that cannot be built.
+    /// An impossible geometry.
     pub fn build(config: &RunConfig, layout: Option<&Arc<Layout>>) -> Result<Self, ConfigError> {
         let caches = 0..config.level.l2.caches(config.cores);
         let mshrs = config.tmu.l2_mshrs;
@@ -74,19 +73,19 @@ impl MissPath {
         })
     }
 
-    /// True where lines leave L1 caches because other levels evict them.
+    /// True if evictions of other levels invalidate L1 lines.
     #[must_use]
     pub fn invalidates(&self) -> bool {
         self.evictions.is_some()
     }
 
-    /// A client reads or writes past the L2: the bytes that lower levels serve.
+    /// Accesses memory for a client below the L2. Returns the bytes that lower levels serve.
     fn client_access(&mut self, core: usize, access: &Access, now: Option<u64>) -> u64 {
         let below = self.below.as_mut();
         below.map_or(0, |below| below.client_access(core, access, now))
     }
 
-    /// When a line that the L2 requests `now` is there.
+    /// Arrival of a line that the L2 requests at `now`.
     #[inline(always)]
     fn fetch(&mut self, core: usize, line: u32, now: u64) -> u64 {
         if !self.mshrs.is_empty() {
@@ -108,7 +107,7 @@ impl MissPath {
         !self.mshrs.is_empty() && of_core(&mut self.mshrs, core).are_in_use(now)
     }
 
-    /// When a line is there that the path reads `now`.
+    /// Arrival of a line that is read from below at `now`.
     #[inline(always)]
     fn read(&mut self, core: usize, line: u32, now: u64) -> u64 {
         if let Some(fetched_lines) = &mut self.fetched_lines {
@@ -125,12 +124,12 @@ impl MissPath {
     }
 }
 
-/// A prefetcher and the state of what it fetched.
+/// A prefetcher and the state of its lines.
 struct Prefetch {
     prefetcher: Box<dyn Prefetcher>,
-    /// Prefetched lines without a demand request so far, whether they are still there or not.
+    /// Prefetched lines without a demand request so far, resident or not.
     unused: HashSet<u32>,
-    /// Lines that the last request asked to prefetch.
+    /// Lines to prefetch after the last request.
     wanted: Vec<u32>,
     counts: PrefetchResult,
 }
@@ -145,7 +144,7 @@ impl Prefetch {
         }
     }
 
-    /// Counts a demand request and collects what is to be prefetched.
+    /// Counts a demand request and collects the lines to prefetch.
     fn observe(&mut self, line: u32, answer: Answer) {
         let is_first = self.unused.remove(&line);
         let demand = match answer {
@@ -167,39 +166,39 @@ impl Prefetch {
     }
 }
 
-/// How the L2 answers a request of an L1.
+/// The L2's answer to a request of an L1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// The line is there.
+    /// The line is resident.
     Hit,
-    /// It is in flight and arrives then.
+    /// The line is in flight and arrives at this cycle.
     InFlight(u64),
-    /// It is fetched and arrives then.
+    /// The line is fetched and arrives at this cycle.
     Miss(u64),
 }
 
-/// The L2 and what lies beside and below it.
+/// The L2 and everything beside and below it.
 pub struct SecondLevel<C> {
-    /// One, or one for each core.
+    /// One cache, or one per core.
     caches: Vec<C>,
     path: MissPath,
 }
 
 impl<C> SecondLevel<C> {
-    /// Empty caches over a path for their misses.
+    /// Empty caches above the path of their misses.
     pub fn new(caches: Vec<C>, path: MissPath) -> Self {
         Self { caches, path }
     }
 
-    /// Requests without a time took as long as they took: what comes at `cycle` or later comes so much later to DRAM.
+    /// Delays DRAM requests from `cycle` on by the time that requests without a time have taken.
     pub fn catch_up(&mut self, cycle: u64) {
         if let Some(below) = &mut self.path.below {
             below.catch_up(cycle);
         }
     }
 
-    /// Another client than the texture units reads or writes past the L2, while no core works: the bytes that lower levels
-    /// serve.
+    /// Accesses memory below the L2 for a client other than the texture units, while no core works.
+    /// Returns the bytes that lower levels serve.
     pub fn idle_client_access(&mut self, access: &Access) -> u64 {
         self.path.client_access(0, access, None)
     }
@@ -210,7 +209,7 @@ impl<C> SecondLevel<C> {
         of_core(&mut self.caches, core)
     }
 
-    /// What was counted beside and below the L2, all requests answered.
+    /// Serves all requests and returns the counts beside and below the L2.
     #[must_use]
     pub fn result(&self) -> MemoryResult {
         let path = &self.path;
@@ -228,21 +227,21 @@ impl<C> SecondLevel<C> {
         }
     }
 
-    /// Fetches by interval of time; nothing where they are not recorded.
+    /// Fetches per interval of time; empty if not recorded.
     #[must_use]
     pub fn fetched_lines(&self) -> &[u32] {
         self.path.fetched_lines.as_deref().unwrap_or_default()
     }
 
-    /// Lines of the next work item that are prefetched when an item starts, at most.
+    /// Maximum number of lines of the next work item to prefetch when an item starts.
     #[must_use]
     pub fn lines_of_next_item(&self) -> usize {
         let prefetch = self.path.prefetch.first();
         prefetch.map_or(0, |prefetch| prefetch.prefetcher.lines_of_next_item())
     }
 
-    /// Takes lines that inclusive levels have evicted out of the L1 caches: `remove` takes one out of all of them and returns
-    /// how many held it.
+    /// Removes lines evicted by inclusive levels from the L1 caches. `remove` removes a line from
+    /// all of them and returns how many held it.
     #[inline(always)]
     pub fn invalidate_l1(&mut self, remove: impl FnMut(u32) -> u64) {
         if let Some(evictions) = &mut self.path.evictions
@@ -261,9 +260,9 @@ impl<C> SecondLevel<C> {
     }
 }
 
-/// Where time passes.
+/// Timed operation.
 impl<D: DelayedFill> SecondLevel<D> {
-    /// Answers a core's request; a line that misses is fetched.
+    /// Answers a core's request and fetches a missing line.
     #[inline(always)]
     pub fn request(&mut self, core: usize, line: u32, now: u64) -> Answer {
         let cache = of_core(&mut self.caches, core);
@@ -304,7 +303,7 @@ impl<D: DelayedFill> SecondLevel<D> {
         }
     }
 
-    /// Another client than the texture units reads or writes: the bytes that caches serve.
+    /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
     pub fn client_access(&mut self, core: usize, access: &Access, now: u64) -> u64 {
         if access.write || !self.path.is_for_all_clients {
             return self.path.client_access(core, access, Some(now));
@@ -316,7 +315,7 @@ impl<D: DelayedFill> SecondLevel<D> {
         (hits.count() as u64 * line_bytes).min(access.bytes)
     }
 
-    /// Fetches lines of the work item that comes next, as an item starts.
+    /// Prefetches lines of the next work item when an item starts.
     pub fn prefetch_item(&mut self, core: usize, lines: &[u32], now: u64) {
         if !self.path.prefetch.is_empty() {
             let wanted = &mut of_core(&mut self.path.prefetch, core).wanted;
@@ -350,9 +349,9 @@ impl<D: DelayedFill> SecondLevel<D> {
     }
 }
 
-/// Where time does not pass: what is fetched is there at once.
+/// Operation without time: fetches complete immediately.
 impl<C: Cache> SecondLevel<C> {
-    /// A core looks up a line, and fills it if it misses. True for a hit.
+    /// Looks up a line for a core and fills it on a miss. Returns true for a hit.
     #[inline(always)]
     pub fn access(&mut self, core: usize, line: u32) -> bool {
         let hit = of_core(&mut self.caches, core).access(line);
@@ -366,7 +365,7 @@ impl<C: Cache> SecondLevel<C> {
         hit
     }
 
-    /// Another client than the texture units reads or writes: the bytes that caches serve.
+    /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
     pub fn client_access_at_once(&mut self, core: usize, access: &Access) -> u64 {
         if access.write || !self.path.is_for_all_clients {
             return self.path.client_access(core, access, None);

@@ -1,12 +1,12 @@
-//! A cache that allocates on a miss: the line's way is taken, and its victim is lost, when the line is asked for and
-//! not when it arrives.
+//! A cache that allocates on a miss: the way is allocated and its victim evicted when the line is
+//! requested, not when it is filled.
 //!
-//! A line in flight may be replaced before it has arrived. Look-ups until its arrival are merged with its fetch all the
-//! same; later ones miss. (Hardware that never replaces a line in flight has to stall instead.)
+//! A line in flight can be evicted before it arrives. Look-ups until its arrival still merge with
+//! its fetch; later ones miss. (Hardware that never evicts a line in flight must stall instead.)
 
 use super::{Cache, Delay, DelayedFill, Mshrs, NOT_IN_FLIGHT};
 
-/// A cache that is to allocate on a miss.
+/// A cache to be converted to allocation on a miss.
 pub struct AllocateOnMiss(pub Box<dyn Cache>);
 
 impl Delay for AllocateOnMiss {
@@ -20,7 +20,7 @@ impl Delay for AllocateOnMiss {
     }
 }
 
-/// A cache whose lines may still be in flight.
+/// A cache whose resident lines may still be in flight.
 pub struct Reserved {
     cache: Box<dyn Cache>,
     in_flight: Mshrs,

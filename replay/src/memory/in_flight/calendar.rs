@@ -1,9 +1,9 @@
-//! Misses in flight (the entries of a miss status holding register file, without a limit): a line
-//! that was requested and has not arrived. Further requests for it wait for the same fetch.
+//! Misses in flight (MSHRs without a limit): lines that were requested and have not arrived.
+//! Further requests for such a line merge with its fetch.
 //!
-//! Arrivals lie in a calendar: a list of lines for each of the next cycles, and a bit for each list
-//! that is not empty, so that neither a request nor an arrival searches. What arrives after the
-//! calendar's end waits in a heap; usual latencies never get there.
+//! Arrivals are kept in a calendar queue: one list of lines for each of the next cycles and one bit
+//! per non-empty list, so that requests and arrivals need no search. Arrivals beyond the calendar's
+//! end wait in a heap; the default latencies never reach it.
 
 use super::Cache;
 use std::cmp::Reverse;
@@ -12,16 +12,16 @@ use std::collections::BinaryHeap;
 /// No entry.
 const NONE: u32 = u32::MAX;
 
-/// Lists by the low bits of the line, to find one that is in flight.
+/// Number of hash chains, by the low bits of the line.
 const CHAINS: usize = 256;
 
-/// A line in flight. Entries are reused when it has arrived.
+/// A line in flight. Entries are reused after its arrival.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     line: u32,
-    /// Next in its chain, or next free entry.
+    /// Next entry of its chain, or next free entry.
     chained: u32,
-    /// Next of the same cycle, in the order of requests.
+    /// Next entry of the same cycle, in order of request.
     later: u32,
     cycle: u64,
 }
@@ -38,22 +38,21 @@ struct Day {
 pub struct InFlight {
     entries: Vec<Entry>,
     free: u32,
-    /// First entry by the low bits of the line.
+    /// First entry of each chain.
     chains: Vec<u32>,
-    /// By the low bits of the cycle; a power of two.
+    /// By the low bits of the cycle; the length is a power of two.
     days: Vec<Day>,
-    /// A bit for each day that has entries.
+    /// One bit per day with entries.
     busy: Vec<u64>,
-    /// The earliest cycle at which something is to be done.
+    /// The earliest cycle with work to do.
     wake: u64,
-    /// Arrivals beyond the calendar, the earliest on top; the count keeps equal ones in the order of
-    /// their requests.
+    /// Arrivals beyond the calendar, earliest on top. The count keeps equal arrivals in order of request.
     late: BinaryHeap<Reverse<(u64, u64, u32)>>,
     requests: u64,
 }
 
 impl InFlight {
-    /// Nothing in flight; most lines should arrive within `usual_cycles`.
+    /// An empty calendar; most lines should arrive within `usual_cycles`.
     #[must_use]
     pub fn new(usual_cycles: u64) -> Self {
         let days = (usual_cycles + 1).next_power_of_two().clamp(64, 4096) as usize;
@@ -73,12 +72,12 @@ impl InFlight {
         }
     }
 
-    /// Forgets all that is in flight.
+    /// Drops all lines in flight.
     pub fn clear(&mut self) {
         *self = Self::new(self.days.len() as u64 - 1);
     }
 
-    /// When the line arrives, if it is in flight.
+    /// Arrival of the line, if it is in flight.
     #[inline(always)]
     #[must_use]
     pub fn arrival(&self, line: u32) -> Option<u64> {
@@ -93,8 +92,8 @@ impl InFlight {
         None
     }
 
-    /// The line, which is not in flight yet, will arrive at `cycle`, after `now`. All that arrives
-    /// up to `now` has been taken by [`Self::arrive`].
+    /// Adds a line, not yet in flight, that arrives at `cycle`, after `now`. All arrivals up to
+    /// `now` must have been processed by [`Self::arrive`].
     pub fn request(&mut self, line: u32, now: u64, cycle: u64) {
         let entry = Entry {
             line,
@@ -121,7 +120,7 @@ impl InFlight {
         }
     }
 
-    /// Puts an entry into the calendar, behind those of the same cycle.
+    /// Adds an entry to the calendar, after those of the same cycle.
     fn enter(&mut self, at: u32) {
         let cycle = self.entries[at as usize].cycle;
         let day = cycle as usize & (self.days.len() - 1);
@@ -137,7 +136,7 @@ impl InFlight {
         self.wake = self.wake.min(cycle);
     }
 
-    /// Fills what has arrived by `now` into the cache.
+    /// Fills the lines that have arrived by `now` into the cache.
     #[inline(always)]
     pub fn arrive(&mut self, now: u64, cache: &mut impl Cache) {
         if self.wake <= now {
@@ -147,7 +146,7 @@ impl InFlight {
 
     #[inline(never)]
     fn wake_up(&mut self, now: u64, cache: &mut impl Cache) {
-        // In the order of time: the calendar is full up to its end before its next day is taken.
+        // In order of time: late arrivals enter the calendar before its next day is processed.
         while self.wake <= now {
             let today = self.wake;
             self.take(today, cache);
@@ -159,8 +158,8 @@ impl InFlight {
         }
     }
 
-    /// Turns the calendar to a day on which nothing is left to do: moves late arrivals into it and
-    /// finds the next day with something to do.
+    /// Advances the calendar to a day with no work left: moves late arrivals into it and finds the
+    /// next day with work.
     fn turn_to(&mut self, today: u64) {
         let days = self.days.len() as u64;
         while let Some(&Reverse((cycle, _, at))) = self.late.peek() {
@@ -175,7 +174,7 @@ impl InFlight {
         self.wake = self.next_day(today).min(admission);
     }
 
-    /// Fills all that arrives at a cycle, in the order of requests.
+    /// Fills all lines that arrive at a cycle, in order of request.
     fn take(&mut self, cycle: u64, cache: &mut impl Cache) {
         let day = cycle as usize & (self.days.len() - 1);
         let mut at = self.days[day].first;
@@ -192,7 +191,7 @@ impl InFlight {
         }
     }
 
-    /// Unchains an entry and frees it.
+    /// Unlinks an entry from its chain and frees it.
     fn forget(&mut self, at: u32) {
         let Entry { line, chained, .. } = self.entries[at as usize];
         let chain = line as usize % CHAINS;
@@ -209,12 +208,12 @@ impl InFlight {
         self.free = at;
     }
 
-    /// The first cycle after `today` on which something arrives.
+    /// The first cycle after `today` with an arrival.
     fn next_day(&self, today: u64) -> u64 {
         let start = today + 1;
         let first = start as usize & (self.days.len() - 1);
         let words = self.busy.len();
-        // The first word twice: from the day on, and after a turn of the calendar up to it.
+        // The first word is visited twice: from the current day on and, after wrapping around, up to it.
         for step in 0..=words {
             let index = (first / 64 + step) % words;
             let mut word = self.busy[index];
@@ -263,7 +262,7 @@ mod tests {
         );
     }
 
-    /// Keeps the order of fills.
+    /// Records the order of fills.
     #[derive(Default)]
     struct Fills(Vec<u32>);
 
@@ -293,7 +292,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(256))]
 
-        /// Latencies within the calendar and far beyond it; lines that share chains.
+        /// Latencies within and far beyond the calendar, and lines that share chains.
         #[test]
         fn arrivals_are_those_of_a_sorted_list(
             steps in prop::collection::vec((0_u64..90, prop_oneof![1_u64..40, 1_u64..900]), 1..200),

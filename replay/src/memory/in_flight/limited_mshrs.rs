@@ -1,20 +1,20 @@
-//! A limited number of MSHRs: a miss that finds all of them in use waits for the first one that becomes free.
+//! A limited number of MSHRs: a miss that finds all in use waits for the first free one.
 
 use crate::result::MshrResult;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The MSHRs of a cache whose misses come in the order of time.
+/// The MSHRs of a cache whose misses come in order of time.
 pub struct LimitedMshrs {
     most: usize,
-    /// When each MSHR in use becomes free, the earliest on top.
+    /// Cycle at which each MSHR in use becomes free, earliest on top.
     free_at: BinaryHeap<Reverse<u64>>,
-    /// What was counted.
+    /// Counts so far.
     pub counts: MshrResult,
 }
 
 impl LimitedMshrs {
-    /// `most` MSHRs, at least one.
+    /// `most` MSHRs, at least one, all free.
     pub fn new(most: u32) -> Self {
         Self {
             most: most.max(1) as usize,
@@ -35,7 +35,8 @@ impl LimitedMshrs {
         self.free_at.len() >= self.most
     }
 
-    /// When a miss that occurs `now` gets an MSHR. The times of successive misses do not decrease, nor do the times returned.
+    /// The cycle at which a miss at `now` gets an MSHR. Times of successive misses must not
+    /// decrease; the returned times do not either.
     pub fn start(&mut self, now: u64) -> u64 {
         if !self.are_in_use(now) {
             return now;
@@ -46,13 +47,13 @@ impl LimitedMshrs {
         start
     }
 
-    /// The miss that got an MSHR last keeps it until its line arrives.
+    /// Occupies the MSHR of the last miss until its line arrives.
     pub fn enter(&mut self, arrival: u64) {
         self.free_at.push(Reverse(arrival));
         self.counts.peak = self.counts.peak.max(self.free_at.len() as u64);
     }
 
-    /// All are free.
+    /// Frees all MSHRs.
     pub fn clear(&mut self) {
         self.free_at.clear();
     }
@@ -80,7 +81,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against a queue with a slot per MSHR: each miss takes the slot that is free first.
+        /// Compares with a queue with one slot per MSHR: each miss takes the slot that is free first.
         #[test]
         fn misses_start_as_in_a_queue_with_so_many_servers(
             most in 1_u32..6,

@@ -1,9 +1,8 @@
-//! Caches whose misses arrive later. A line that was requested and has not arrived is *in flight*
-//! (an entry of a miss status holding register file, without a limit): further requests for it
-//! wait for the same fetch.
+//! Caches with delayed fills. A line that was requested and has not arrived is *in flight* (it
+//! occupies an MSHR, of unlimited number). Further requests for it merge with the same fetch.
 //!
-//! What arrives is filled in the order of arrivals, those of one cycle in the order of their requests.
-//! Cycles never go back from call to call.
+//! Lines are filled in order of arrival, equal arrivals in order of request. Cycles never decrease
+//! from call to call.
 
 mod allocate_on_miss;
 mod calendar;
@@ -21,46 +20,46 @@ use calendar::InFlight;
 /// The arrival of a line that is not in flight.
 pub const NOT_IN_FLIGHT: u64 = u64::MAX;
 
-/// A cache and what is in flight into it.
+/// A cache and its lines in flight.
 pub trait DelayedFill: Send {
-    /// Looks up lines, which marks those that are there as used. For the others it reports the index, in
-    /// order, the line and its arrival: [`NOT_IN_FLIGHT`] if it was not requested.
+    /// Looks up lines and marks resident ones as used. Calls `missing` for each other line, in
+    /// order, with its index, number and arrival ([`NOT_IN_FLIGHT`] if it was not requested).
     fn look_up_all(&mut self, lines: &[u32], now: u64, missing: impl FnMut(usize, u32, u64));
 
-    /// Looks up a line, which marks it used. When it arrives: 0 if it is there, [`NOT_IN_FLIGHT`] if
-    /// it was not requested.
+    /// Looks up a line and marks it as used. Returns its arrival: 0 if it is resident,
+    /// [`NOT_IN_FLIGHT`] if it was not requested.
     fn look_up(&mut self, line: u32, now: u64) -> u64;
 
-    /// When a line arrives that is in flight; [`NOT_IN_FLIGHT`] if it is not.
+    /// Arrival of a line in flight, or [`NOT_IN_FLIGHT`].
     fn arrival(&mut self, line: u32, now: u64) -> u64;
 
-    /// True if the line is there or in flight. Marks nothing as used.
+    /// True if the line is resident or in flight. Marks nothing as used.
     fn holds(&mut self, line: u32, now: u64) -> bool;
 
-    /// Fills a line that is neither there nor in flight: at once, or when it arrives. [`Self::look_up`] or
-    /// [`Self::holds`] was called for it in this cycle.
+    /// Fills a line that is neither resident nor in flight, immediately or at its arrival.
+    /// [`Self::look_up`] or [`Self::holds`] was called for it in this cycle.
     fn enter(&mut self, line: u32, now: u64, arrival: u64);
 
-    /// Takes a line out that has arrived; one in flight still arrives. True if it was there.
+    /// Removes a resident line; one in flight still arrives. Returns true if it was resident.
     fn remove(&mut self, line: u32, now: u64) -> bool;
 
-    /// Appends the lines that were evicted since the last call, where the cache keeps a list of them.
+    /// Appends the lines evicted since the last call, if the cache records them.
     fn take_evicted(&mut self, _lines: &mut Vec<u32>) {}
 
     /// Empties the cache and drops the lines in flight.
     fn clear(&mut self);
 }
 
-/// A cache that can fill later.
+/// A cache that supports delayed fills.
 pub trait Delay {
-    /// It and what is in flight.
+    /// The cache with its lines in flight.
     type Delayed: DelayedFill;
 
-    /// An empty cache, into which most lines arrive within `usual_cycles`.
+    /// An empty cache; most lines arrive within `usual_cycles`.
     fn delayed(self, usual_cycles: u64) -> Self::Delayed;
 }
 
-/// Any policy: filled in the order of time.
+/// Any policy fills in order of time.
 impl Delay for Box<dyn Cache> {
     type Delayed = TimeOrder<Self>;
 
@@ -72,7 +71,7 @@ impl Delay for Box<dyn Cache> {
     }
 }
 
-/// Sets are independent, so each is filled when it is next accessed.
+/// Sets are independent, so each fills when it is next accessed.
 impl Delay for FourWayLru {
     type Delayed = SetOrder;
 
@@ -81,7 +80,7 @@ impl Delay for FourWayLru {
     }
 }
 
-/// A cache that is filled before each look-up, line after line in the order of time.
+/// A cache that fills arrived lines in order of time before each look-up.
 #[derive(Debug)]
 pub struct TimeOrder<C> {
     cache: C,

@@ -1,30 +1,31 @@
-//! Lines in flight into a cache, to be found by number.
+//! A hash table of the lines in flight into a cache.
 //!
-//! Entries expire: a line whose arrival is not later than `now` counts as filled, and its entry can be reused. A line
-//! has one of the four entries of its bucket, which are compared at once.
+//! Entries expire: a line whose arrival time is not later than `now` counts as filled, and its
+//! entry can be reused. A line can be in any of the four entries of its bucket, which are compared
+//! together.
 
 use super::NOT_IN_FLIGHT;
 use std::hint::select_unpredictable;
 
-/// Buckets of four places. Texture units have some dozens of lines in flight.
+/// Buckets of four entries. Texture units have a few dozen lines in flight.
 const BUCKETS: usize = 128;
 
-/// Places for lines of one hash.
+/// Entries for lines with the same hash.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
     lines: [u32; 4],
-    /// When each arrives; 0 in an unused entry.
+    /// Arrival of each line; 0 in an unused entry.
     arrivals: [u64; 4],
 }
 
 /// Lines in flight.
 #[derive(Clone, Debug)]
 pub struct Mshrs {
-    /// As many as a hash has values, which spares checks.
+    /// One bucket per hash value, which avoids bounds checks.
     buckets: Box<[Bucket; BUCKETS]>,
-    /// Lines whose bucket was full: line and arrival.
+    /// Lines whose bucket was full, with their arrivals.
     others: Vec<(u32, u64)>,
-    /// When the last of these arrives.
+    /// The latest arrival among these.
     others_until: u64,
 }
 
@@ -41,13 +42,13 @@ impl Mshrs {
         }
     }
 
-    /// When a line arrives, after `now`, or [`NOT_IN_FLIGHT`].
+    /// Arrival of a line, after `now`, or [`NOT_IN_FLIGHT`].
     #[inline(always)]
     pub fn arrival(&self, line: u32, now: u64) -> u64 {
         let bucket = &self.buckets[bucket(line)];
         let mut found = NOT_IN_FLIGHT;
         for (&other, &arrival) in bucket.lines.iter().zip(&bucket.arrivals) {
-            // Without a branch, which would be unpredictable.
+            // A branch would be unpredictable.
             found = select_unpredictable((other == line) & (arrival > now), arrival, found);
         }
         if self.others_until > now {
@@ -63,13 +64,12 @@ impl Mshrs {
         found.map_or(NOT_IN_FLIGHT, |(_, arrival)| arrival)
     }
 
-    /// A line that is not in flight `now` arrives later.
+    /// Adds a line that is not in flight at `now`.
     #[inline(always)]
     pub fn enter(&mut self, line: u32, now: u64, arrival: u64) {
         let Bucket { lines, arrivals } = &mut self.buckets[bucket(line)];
         let mut place = arrivals.len();
         for (index, &other) in arrivals.iter().enumerate() {
-            // Without a branch, as above.
             place = select_unpredictable(other <= now, index, place);
         }
         match arrivals.get_mut(place) {
@@ -90,7 +90,7 @@ impl Mshrs {
     }
 }
 
-/// By the high bits of a product: lines of one set, of which many may be in flight, share their low bits.
+/// Hashes by the high bits of a product, because lines in flight into one set share their low bits.
 #[inline(always)]
 fn bucket(line: u32) -> usize {
     line.wrapping_mul(0x9e37_79b1) as usize >> (u32::BITS - BUCKETS.ilog2())
@@ -103,7 +103,7 @@ mod tests {
     use std::collections::HashMap;
 
     proptest! {
-        /// More lines than there are places for.
+        /// Uses more lines than the table has entries.
         #[test]
         fn lines_are_found_until_they_arrive(
             steps in prop::collection::vec((0_u64..4, 0_u32..4000, 1_u64..300), 1..3000),

@@ -1,11 +1,11 @@
-//! First in, first out: a hit changes nothing, the oldest line goes.
+//! First in, first out: a hit changes nothing, and the oldest line is evicted.
 
 use super::{Cache, EMPTY};
 
 /// A FIFO cache.
 pub struct Fifo {
     tags: Vec<u32>,
-    /// The way to be replaced next, by set.
+    /// The next victim's way, by set.
     oldest: Vec<u8>,
     ways: usize,
     set_mask: u32,
@@ -47,7 +47,7 @@ impl Cache for Fifo {
         evicted
     }
 
-    /// Older lines move up, so that the way that is replaced next is the empty one.
+    /// Moves older lines up, so that the emptied way is the next victim.
     fn remove(&mut self, line: u32) -> bool {
         let set = (line & self.set_mask) as usize;
         let tags = &mut self.tags[set * self.ways..][..self.ways];

@@ -1,4 +1,5 @@
-//! Replacement policies, one a file. A new one is a file with a [`Cache`] (its `mod` line below) and a row of the table.
+//! Replacement policies, one per file. A new policy is a file with a [`Cache`] (its `mod` line
+//! below) and a row of the table.
 
 mod fifo;
 mod lru;
@@ -19,7 +20,7 @@ use ship::Ship;
 use tree_plru::TreePlru;
 
 registry! { PolicyRow:
-    // constant   name          help                    ways that it can have                          built by
+    // constant   name          help                    supported ways                                 constructor
     LRU =       row("lru",       "Least recently used", ANY_WAYS,                                      |g| lru(g.sets, g.ways));
     FIFO =      row("fifo",      "First in, first out", ANY_WAYS,                                      |g| boxed(Fifo::new(g.sets, g.ways)));
     TREE_PLRU = row("tree-plru", "Tree pseudo-LRU",     ("1, 2, 4 ... 64", tree_plru::accepts_ways),   |g| boxed(TreePlru::new(g.sets, g.ways)));
@@ -30,7 +31,7 @@ registry! { PolicyRow:
     SHIP =      row("ship",      "Signature-based hit prediction by memory region", ANY_WAYS,          |g| boxed(Ship::new(g.sets, g.ways)));
 }
 
-/// A replacement policy by name.
+/// A named replacement policy.
 pub type Replacement = Named<PolicyRow>;
 
 impl Default for Replacement {
@@ -48,10 +49,10 @@ pub struct PolicyRow {
     build: fn(Geometry) -> AnyCache,
 }
 
-/// Which associativities a policy can have: in words, and as a test.
+/// The associativities that a policy supports, as text and as a test.
 pub(crate) type WaysRule = (&'static str, fn(u32) -> bool);
 
-/// Ways are counted in a byte.
+/// Ways are stored in a byte.
 const ANY_WAYS: WaysRule = ("1 to 255", |ways| (1..=255).contains(&ways));
 
 const fn row(
@@ -74,13 +75,13 @@ impl Replacement {
         (self.row().build)(geometry)
     }
 
-    /// The associativities that the policy can have.
+    /// The associativities that the policy supports.
     pub(crate) fn ways_rule(self) -> WaysRule {
         self.row().ways
     }
 }
 
-/// What a policy is built from.
+/// Parameters of a policy.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::memory) struct Geometry {
     /// A power of two.
@@ -89,10 +90,10 @@ pub(in crate::memory) struct Geometry {
     pub(in crate::memory) seed: u64,
 }
 
-/// Tag of a way that holds nothing; no line has this number.
+/// Tag of an empty way; no line has this number.
 pub(in crate::memory) const EMPTY: u32 = u32::MAX;
 
-/// Empties the way of a set that holds a line: its number.
+/// Empties the way that holds a line, and returns its index.
 fn empty_way(tags: &mut [u32], line: u32) -> Option<usize> {
     let way = tags.iter().position(|&tag| tag == line)?;
     tags[way] = EMPTY;

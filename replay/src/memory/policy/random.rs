@@ -41,7 +41,7 @@ impl Cache for RandomReplacement {
             self.state ^= self.state << 13;
             self.state ^= self.state >> 7;
             self.state ^= self.state << 17;
-            // The high bits, scaled: xorshift's low bits are its weak ones.
+            // Uses the high bits, scaled, because the low bits of xorshift are weak.
             (((self.state >> 32) * set.len() as u64) >> 32) as usize
         });
         std::mem::replace(&mut set[way], line)

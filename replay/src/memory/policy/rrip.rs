@@ -1,7 +1,9 @@
-//! Re-reference interval prediction: SRRIP, BRRIP and DRRIP (Jaleel et al., ISCA 2010, sections 4 and 5), 2 bits per line.
+//! Re-reference interval prediction: SRRIP, BRRIP and DRRIP (Jaleel et al., ISCA 2010, sections 4
+//! and 5), 2 bits per line.
 //!
-//! A line is promoted by a hit once another line has been filled into its set. Accesses before that belong to the quads that
-//! fetched the line, and count as one: all policies here rely on it that repeats of an access change nothing.
+//! A hit promotes a line only after another line has been filled into its set. Earlier accesses
+//! belong to the quads that fetched the line and count as one access: all policies here rely on
+//! repeated accesses changing nothing.
 
 use super::{Cache, EMPTY, empty_way};
 
@@ -9,18 +11,18 @@ use super::{Cache, EMPTY, empty_way};
 pub(super) const DISTANT: u8 = 3;
 /// A long re-reference.
 pub(super) const LONG: u8 = 2;
-/// One fill of so many is long where the others are distant.
+/// Every 32nd bimodal fill is long, the others are distant.
 const BIMODAL: u32 = 32;
-/// Sets that always take one of the two dueling insertions.
+/// Sets dedicated to each of the two duelling insertions.
 const LEADERS: u32 = 32;
-/// Largest value of the counter of the dueling sets, 10 bits.
+/// Maximum of the 10-bit counter of the duelling sets.
 const MOST_SELECTED: u32 = 1023;
 
 /// Lines with their predictions.
 pub(super) struct Sets {
     tags: Vec<u32>,
     predictions: Vec<u8>,
-    /// The way that was filled last, by set.
+    /// The most recently filled way, by set.
     newest: Vec<u8>,
     ways: usize,
     set_mask: u32,
@@ -43,7 +45,7 @@ impl Sets {
         (line & self.set_mask) as usize
     }
 
-    /// Looks a line up and promotes it: its place, and whether it had not been promoted since its fill.
+    /// Looks a line up and promotes it. Returns its place, and whether this is the first promotion since its fill.
     pub(super) fn lookup(&mut self, line: u32) -> Option<(usize, bool)> {
         let set = self.set(line);
         let first = set * self.ways;
@@ -58,8 +60,8 @@ impl Sets {
         Some((first + way, is_first))
     }
 
-    /// The place of the next line of a set, empty or of the victim: the first way whose re-reference is distant, after all have
-    /// aged until there is one.
+    /// The place for the next line of a set: an empty way, or the victim. The victim is the first
+    /// way with a distant re-reference, after ageing all ways until there is one.
     pub(super) fn victim(&mut self, set: usize) -> usize {
         let first = set * self.ways;
         let ways = first..first + self.ways;
@@ -74,18 +76,18 @@ impl Sets {
         first + predictions.iter().position(|&p| p == DISTANT).unwrap_or(0)
     }
 
-    /// True if the line is there.
+    /// True if the line is resident.
     pub(super) fn contains(&self, line: u32) -> bool {
         let first = self.set(line) * self.ways;
         self.tags[first..first + self.ways].contains(&line)
     }
 
-    /// The line at a place, [`EMPTY`] where there is none.
+    /// The line at a place, or [`EMPTY`].
     pub(super) fn line(&self, place: usize) -> u32 {
         self.tags[place]
     }
 
-    /// Puts a line at a place of its set.
+    /// Writes a line to a place of its set.
     pub(super) fn insert(&mut self, place: usize, line: u32, prediction: u8) {
         let set = self.set(line);
         self.tags[place] = line;
@@ -93,7 +95,7 @@ impl Sets {
         self.newest[set] = (place - set * self.ways) as u8;
     }
 
-    /// Takes a line out. True if it was there.
+    /// Removes a line. Returns true if it was resident.
     pub(super) fn remove(&mut self, line: u32) -> bool {
         let set = self.set(line);
         let first = set * self.ways;
@@ -107,7 +109,7 @@ impl Sets {
         true
     }
 
-    /// Takes all lines out.
+    /// Removes all lines.
     pub(super) fn clear(&mut self) {
         self.tags.fill(EMPTY);
         self.predictions.fill(DISTANT);
@@ -115,14 +117,14 @@ impl Sets {
     }
 }
 
-/// What re-reference a new line is predicted to have.
+/// The re-reference predicted for a new line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Insertion {
     /// Long.
     Static,
-    /// Distant, but for one fill of 32.
+    /// Distant, except for one fill in 32.
     Bimodal,
-    /// That of the two which misses less in the sets that always use it.
+    /// The one of the two that misses less in its dedicated sets.
     Dueling,
 }
 
@@ -132,9 +134,9 @@ pub struct Rrip {
     insertion: Insertion,
     /// Bimodal fills so far.
     fills: u32,
-    /// Grows with misses of leaders with static insertion, falls with those of bimodal ones.
+    /// Incremented by misses in sets dedicated to static insertion, decremented by those of bimodal insertion.
     selected: u32,
-    /// Distance between leaders of a kind.
+    /// Distance between sets dedicated to the same insertion.
     stride: u32,
 }
 
@@ -151,7 +153,7 @@ impl Rrip {
         }
     }
 
-    /// The insertion that a fill of a set uses. A fill is a miss, which the duel counts.
+    /// The insertion for a fill of a set. Counts the fill as a miss in the duel.
     fn insertion(&mut self, set: usize) -> Insertion {
         if self.insertion != Insertion::Dueling {
             return self.insertion;
@@ -203,7 +205,7 @@ impl Cache for Rrip {
         self.sets.remove(line)
     }
 
-    /// The duel begins anew as well: other work between two frames trains the counter for itself.
+    /// Also restarts the duel, because other work between two frames would train the counter for itself.
     fn clear(&mut self) {
         self.sets.clear();
         self.fills = 0;

@@ -1,6 +1,7 @@
 //! Signature-based hit prediction by memory region (SHiP-Mem: Wu et al., MICRO 2011) on SRRIP.
 //!
-//! A table counts by region whether lines are used again after their fill. Lines of regions that are not used again are inserted as the next victims.
+//! A table of counters records per region whether lines are used again after their fill. Lines of
+//! regions without reuse are inserted as the next victims.
 
 use super::rrip::{DISTANT, LONG, Sets};
 use super::{Cache, EMPTY};
@@ -10,13 +11,13 @@ const REGION_LINES: u32 = 256;
 /// Counters, 3 bits each.
 const SIGNATURES: usize = 1 << 14;
 const MOST_COUNTED: u8 = 7;
-/// Of a region that is not known yet.
+/// Initial counter of a region.
 const UNTRAINED: u8 = 1;
 
-/// A cache with hit prediction by region.
+/// A cache with hit prediction per region.
 pub struct Ship {
     sets: Sets,
-    /// Whether the line of each place was used again.
+    /// Whether the line at each place was used again.
     is_reused: Vec<bool>,
     counters: Vec<u8>,
 }

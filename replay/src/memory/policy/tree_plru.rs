@@ -1,18 +1,17 @@
-//! Tree pseudo-LRU: one bit a node of a binary tree over the ways points to the half that was not
-//! used last.
+//! Tree pseudo-LRU: one bit per node of a binary tree over the ways points to the half that was not used last.
 
 use super::{Cache, EMPTY, empty_way};
 
 /// A tree-PLRU cache.
 pub struct TreePlru {
     tags: Vec<u32>,
-    /// Bits of the tree by set: node 1 is the root, node `n` has children `2n` and `2n + 1`.
+    /// Tree bits by set: node 1 is the root, node `n` has the children `2n` and `2n + 1`.
     trees: Vec<u64>,
     ways: usize,
     set_mask: u32,
 }
 
-/// A binary tree of 64 bits has up to 64 leaves.
+/// A tree of 64 bits has at most 64 leaves.
 pub fn accepts_ways(ways: u32) -> bool {
     ways.is_power_of_two() && ways <= 64
 }

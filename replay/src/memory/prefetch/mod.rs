@@ -1,4 +1,5 @@
-//! Prefetchers of the L2, one a file. A new one is a file with a `Prefetcher` (its `mod` line below) and a row of the table.
+//! Prefetchers of the L2, one per file. A new prefetcher is a file with a `Prefetcher` (its `mod`
+//! line below) and a row of the table.
 
 mod aligned_block;
 mod next_line;
@@ -15,14 +16,15 @@ use std::sync::Arc;
 use tile_ahead::TileAhead;
 
 registry! { PrefetchRow:
-    // constant        name             help                                                                               lines; usual lines     built from [`Parts`]
+    // constant        name             help
+    // lines; default lines   built from [`Parts`]
     NEXT_LINE =     row("next-line",     "The next lines after each miss and each first use of a prefetched line",         ANY_LINES, 4,          |of| Box::new(NextLine { lines: of.lines }));
     ALIGNED_BLOCK = row("aligned-block", "The other lines of the aligned block of each line that misses",                  POWERS_OF_TWO, 4,      |of| Box::new(AlignedBlock { lines: of.lines }));
     NEXT_MIP =      row("next-mip",      "The same place of the coarser mip levels of each line that misses; textures only",    ANY_LINES, 1,          |of| Box::new(NextMip { levels: of.lines, layout: of.layout, line_bytes: of.line_bytes }));
     TILE_AHEAD =    row("tile-ahead",    "The lines of the next work item when an item starts; not in functional mode",       MANY_LINES, 4096,      |of| Box::new(TileAhead { lines: of.lines }));
 }
 
-/// A prefetcher by name.
+/// A named prefetcher.
 pub type Prefetching = Named<PrefetchRow>;
 
 /// A row of the table of prefetchers.
@@ -35,17 +37,17 @@ pub struct PrefetchRow {
     build: fn(Parts) -> Box<dyn Prefetcher>,
 }
 
-/// What a prefetcher is built from.
+/// Parameters of a prefetcher.
 pub struct Parts {
     /// The key `lines`.
     lines: u32,
-    /// Line size of the L2.
+    /// Line size of the L2 in bytes.
     line_bytes: u64,
-    /// Where textures lie; none where lines are no textures.
+    /// Location of textures, if lines belong to textures.
     layout: Option<Arc<Layout>>,
 }
 
-/// Which values of `lines` a prefetcher can have: in words, and as a test.
+/// The values of `lines` that a prefetcher supports, as text and as a test.
 type LinesRule = (&'static str, fn(u32) -> bool);
 
 const ANY_LINES: LinesRule = ("1 to 64", |lines| matches!(lines, 1..=64));
@@ -72,47 +74,47 @@ const fn row(
 }
 
 impl Prefetching {
-    /// The values of `lines` that the prefetcher can have.
+    /// The values of `lines` that the prefetcher supports.
     pub(crate) fn lines_rule(self) -> LinesRule {
         self.row().lines
     }
 
-    /// The number of lines where a configuration gives none.
+    /// The default number of lines.
     pub(crate) fn usual_lines(self) -> u32 {
         self.row().usual_lines
     }
 }
 
-/// How a demand request was answered.
+/// The outcome of a demand request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demand {
-    /// The line was neither there nor in flight.
+    /// The line was neither resident nor in flight.
     Miss,
-    /// The line was there or in flight because it had been prefetched, and was not requested since.
+    /// First request of a prefetched line that is resident or in flight.
     FirstUse,
-    /// Any other hit, or a request merged with another's fetch.
+    /// Any other hit, or a request merged with a fetch in flight.
     Hit,
 }
 
-/// Decides what is prefetched.
+/// A prefetching algorithm.
 pub trait Prefetcher: Send {
-    /// Sees a demand request of the L2, and appends the lines to fetch, the first one first. Lines that are there or in
-    /// flight are skipped afterwards.
+    /// Observes a demand request of the L2 and appends the lines to prefetch, first one first. The
+    /// caller skips lines that are resident or in flight.
     fn observe(&mut self, line: u32, demand: Demand, lines: &mut Vec<u32>);
 
-    /// True if it must know where textures lie.
+    /// True if it needs the location of textures.
     fn needs_layout(&self) -> bool {
         false
     }
 
-    /// Lines of the next work item that are fetched when an item starts, at most.
+    /// Maximum number of lines of the next work item to prefetch when an item starts.
     fn lines_of_next_item(&self) -> usize {
         0
     }
 }
 
 impl PrefetchConfig {
-    /// The prefetcher.
+    /// Builds the prefetcher.
     pub(crate) fn build(
         &self,
         line_bytes: u32,

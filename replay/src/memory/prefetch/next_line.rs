@@ -1,9 +1,9 @@
-//! Tagged next-line prefetching (Smith, Cache Memories, ACM Computing Surveys 1982, section 2.1): a miss, and the first use of
-//! a prefetched line, fetch the lines that follow.
+//! Tagged next-line prefetching (Smith, Cache Memories, ACM Computing Surveys 1982, section 2.1): a
+//! miss and the first use of a prefetched line fetch the following lines.
 
 use super::{Demand, Prefetcher};
 
-/// Fetches so many following lines.
+/// Fetches this many following lines.
 pub struct NextLine {
     pub lines: u32,
 }

@@ -1,14 +1,14 @@
-//! A miss in a mip level fetches the lines of the same place in the coarser levels of the texture: what a texture unit needs
-//! next when a surface moves away or its slope grows.
+//! A miss in a mip level fetches the lines at the same place of the coarser levels, which are
+//! needed next if a surface recedes or its slope grows.
 
 use super::{Demand, Prefetcher};
 use formats::layout::Layout;
 use std::sync::Arc;
 
-/// Fetches lines of so many coarser levels.
+/// Fetches lines of this many coarser levels.
 pub struct NextMip {
     pub levels: u32,
-    /// None where lines are no textures.
+    /// None if lines do not belong to textures.
     pub layout: Option<Arc<Layout>>,
     pub line_bytes: u64,
 }
@@ -31,7 +31,7 @@ impl Prefetcher for NextMip {
             let Some(size) = texture.levels.get(level as usize).map(|level| level.size) else {
                 return;
             };
-            // The middle of the block, so that rounding meets the right one of levels with odd sizes.
+            // The middle of the block, so that rounding finds the right block in levels with odd sizes.
             let texel = [0, 1].map(|axis: usize| {
                 let edge = texture.block.texels[axis];
                 let middle = (at.block[axis] * edge + edge / 2) >> steps;
@@ -49,7 +49,7 @@ mod tests {
     use formats::layout::LayoutConfig;
     use formats::texture::{ColorSpace, TexelFormat, Texture};
 
-    /// Of a miss at a texel, the lines of that texel halved, quartered, ... on the coarser levels that exist.
+    /// A miss at a texel prefetches the lines of that texel halved, quartered, ... on the existing coarser levels.
     #[test]
     fn a_miss_fetches_the_same_place_of_the_coarser_levels() {
         let texture = Texture {
@@ -75,7 +75,7 @@ mod tests {
         let expected = [(1, [20, 10]), (2, [10, 5]), (3, [5, 2])].map(|(l, at)| line(l, at));
         assert_eq!(found(line(0, [40, 20]), Demand::Miss), expected);
         assert_eq!(found(line(0, [40, 20]), Demand::Hit), [0; 0]);
-        // There are fewer coarser levels than wanted.
+        // Fewer coarser levels exist than configured.
         let last = [line(5, [1, 0]), line(6, [0, 0])];
         assert_eq!(found(line(4, [3, 1]), Demand::Miss), last);
         assert_eq!(found(line(6, [0, 0]), Demand::Miss), [0; 0]);

@@ -1,9 +1,10 @@
-//! The lines of the next work item are fetched when an item starts: an upper bound of what a tile-based GPU can know ahead, since
-//! it has the next tile's primitives before it shades this one.
+//! Fetches the lines of the next work item when an item starts. This is an upper bound for
+//! prefetching in a tile-based GPU, which knows the next tile's primitives before it shades the
+//! current tile.
 
 use super::{Demand, Prefetcher};
 
-/// Fetches up to so many lines of the next item, in the order of their first use.
+/// Fetches up to this many lines of the next item, in order of first use.
 pub struct TileAhead {
     pub lines: u32,
 }

@@ -1,11 +1,11 @@
-//! Many LRU hierarchies in one pass over an order's lines, each counted as if it were alone.
+//! Simulates many LRU hierarchies in one pass over an order's lines.
 //!
-//! Without latencies the cores' interleaving does not depend on what the caches hold, so all
-//! configurations see the same accesses. One [`Forest`] a core stands for all L1 caches; under each
-//! L1 size and associativity a forest stands for all L2 caches, since what reaches those are the
-//! misses of that L1. A level's misses are counted once a number of sets, by how many of its
-//! associativities they miss. Only the L1 caches run line by line; what misses one of them waits until
-//! there is enough for the L2 caches and the counters to be run one after another ([`pending`]).
+//! Without latencies, the interleaving of cores does not depend on cache contents, so all configurations
+//! see the same accesses. One [`Forest`] per core represents all L1 caches. The misses of each L1 size and
+//! associativity go to another forest, which represents all L2 caches below it. A level's misses are
+//! counted per number of sets, by the number of associativities that miss. Only the L1 caches are simulated
+//! line by line; their misses are collected and processed in batches by the L2 caches and the counters
+//! ([`pending`]).
 
 mod pending;
 mod tally;
@@ -24,10 +24,10 @@ use crate::stream::{Bins, Consumer, Cores, QuadLines, StreamError, Tag, interlea
 /// Sets and ways of a cache.
 pub type Geometry = (u32, u32);
 
-/// Both levels of a configuration.
+/// Geometry of both levels.
 pub type LevelGeometry = (Geometry, Geometry);
 
-/// The geometry of a configuration, if all its caches are plain LRU.
+/// The geometry of a configuration whose caches are all plain LRU.
 pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
     let of = |cache: &LevelConfig, level| {
         let lru = cache.is_plain_lru();
@@ -40,16 +40,16 @@ pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
 /// A set of LRU hierarchies.
 pub struct OnePass {
     l1: Level,
-    /// By core.
+    /// One per core.
     forests: Vec<Forest>,
     under: Vec<Under>,
-    /// Every L1 cache has at least so many ways.
+    /// The smallest associativity of the L1 caches.
     least_ways: u32,
     pending: Pending,
 }
 
 impl OnePass {
-    /// Empty caches of all `geometries`, of which there is at least one.
+    /// Empty caches of at least one geometry.
     pub fn new(bins: &Bins, cores: u32, tile_maps: bool, geometries: &[LevelGeometry]) -> Self {
         let by_tile = |what| tile_maps.then_some(what);
         let l1 = geometries.iter().map(|g| g.0);
@@ -78,7 +78,7 @@ impl OnePass {
         }
     }
 
-    /// What one of the hierarchies missed.
+    /// The misses of one hierarchy.
     fn counts(&self, (l1, l2): LevelGeometry) -> CacheCounts {
         let (tree, rank) = self.l1.find(l1);
         let first = &self.l1.tallies[tree];
@@ -115,7 +115,7 @@ impl OnePass {
         }
     }
 
-    /// The line at `index` missed some L1, its depths are pending: accesses the others of its footprint.
+    /// Handles a miss in some L1: the depths of the line at `index` are pending. Accesses the rest of its footprint.
     #[inline(never)]
     fn missed(&mut self, core: usize, quad: &QuadLines<'_>, mut index: usize) -> usize {
         let (cell, tile) = (quad.cell(index) as u32, quad.tile() as u32);
@@ -150,7 +150,7 @@ impl Consumer for OnePass {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
         let end = quad.lines.len();
         if self.least_ways >= 4 {
-            // The lines of a footprint cannot crowd each other out: repeats find all of them.
+            // The lines of a footprint cannot evict each other, so its repeats hit.
             self.access(core, &quad, 0, end);
             return;
         }
@@ -186,7 +186,7 @@ impl Machine for OnePass {
     }
 
     fn outcome(&self, config: &RunConfig) -> Outcome {
-        // Only configurations with a geometry are put into a pass.
+        // Only configurations with a geometry are in a group of several.
         let counts = geometry(config).map(|geometry| self.counts(geometry));
         let mut counts = counts.unwrap_or_else(|| CacheCounts {
             cells: Vec::new(),

@@ -1,22 +1,21 @@
-//! Footprints that some L1 does not hold: counted, and their misses sent on to the L2 caches, many at
-//! once.
+//! Footprints that miss in some L1, collected to be counted and sent to the L2 caches in batches.
 //!
-//! What an L2 holds depends only on the order of its accesses, so it may lag behind the L1 caches. One
-//! number of sets after another, the loops are short and have no branches that depend on what is found.
+//! An L2's contents depend only on the order of its accesses, so it may lag behind the L1 caches.
+//! Processing a batch for one number of sets at a time keeps the loops short and free of unpredictable
+//! branches.
 
 use super::tally::{Access, Level};
 use crate::memory::Forest;
 
-/// So many accesses are drained: few enough for the processor's first cache, and very few in tests, which
-/// replay little.
+/// Accesses per batch: few enough for the processor's L1 cache, and very few in tests, which replay little.
 const MOST: usize = if cfg!(test) { 16 } else { 1024 };
 
-/// Lines of a footprint at most.
+/// Maximum lines per footprint.
 const LINES: usize = 4;
 
-/// All L2 caches under one L1.
+/// All L2 caches below one L1.
 pub(super) struct Under {
-    /// The L1: number of sets, ways, and rank of these.
+    /// The L1's number of sets, its number of ways, and the rank of the latter.
     pub(super) tree: usize,
     pub(super) ways: u8,
     pub(super) rank: usize,
@@ -24,14 +23,14 @@ pub(super) struct Under {
     pub(super) forest: Forest,
 }
 
-/// Accesses to L1 caches, in order, of all cores.
+/// Accesses to the L1 caches of all cores, in order.
 pub(super) struct Pending {
     accesses: Vec<Access>,
-    /// How deep the lines lay, by number of sets; with room for one more footprint.
+    /// Depth of each line, by number of sets, with room for one more footprint.
     depths: Vec<u8>,
-    /// Numbers of sets of the L1 caches.
+    /// Number of L1 set counts.
     trees: usize,
-    /// Those that miss one L1, and how deep they lay for one number of sets of an L2.
+    /// Misses of one L1, with their depths for one number of L2 sets.
     missed: Vec<Access>,
     l2_depths: Vec<u8>,
 }
@@ -47,32 +46,32 @@ impl Pending {
         }
     }
 
-    /// Where the next access' depths belong.
+    /// The slot for the depths of the next access.
     #[inline(always)]
     pub(super) fn next_depths(&mut self) -> &mut [u8] {
         let first = self.accesses.len() * self.trees;
         &mut self.depths[first..first + self.trees]
     }
 
-    /// A number for a footprint whose first access comes next.
+    /// Identifies the footprint whose first access comes next.
     #[inline(always)]
     pub(super) fn footprint(&self) -> u32 {
         self.accesses.len() as u32
     }
 
-    /// Adds an access whose depths are in place.
+    /// Adds an access whose depths have been written.
     #[inline(always)]
     pub(super) fn push(&mut self, access: Access) {
         self.accesses.push(access);
     }
 
-    /// True if no other footprint may be added.
+    /// True if there is no room for another footprint.
     #[inline(always)]
     pub(super) fn is_full(&self) -> bool {
         self.accesses.len() >= MOST
     }
 
-    /// Counts all accesses and does those of the L2 caches.
+    /// Counts all accesses and simulates the L2 caches.
     pub(super) fn drain(&mut self, l1: &mut Level, under: &mut [Under]) {
         for (tree, tally) in l1.tallies.iter_mut().enumerate() {
             let depths = of_tree(&self.depths, self.trees, tree);
@@ -89,7 +88,7 @@ impl Pending {
                 let depths = self.l2_depths.iter().copied();
                 tally.count(&self.missed, depths.clone());
                 if tree < last {
-                    // A line on top with fewer sets is so with more.
+                    // A line on top with fewer sets is on top with more sets.
                     retain(&mut self.missed, depths, 1);
                 }
             }
@@ -98,18 +97,18 @@ impl Pending {
     }
 }
 
-/// How deep the lines lay for one number of sets.
+/// Depths for one number of sets.
 #[inline(always)]
 fn of_tree(depths: &[u8], trees: usize, tree: usize) -> impl Iterator<Item = u8> {
     depths.chunks_exact(trees).map(move |depths| depths[tree])
 }
 
-/// Keeps the accesses whose lines lay so deep or deeper, without a branch.
+/// Branch-free: keeps the accesses with a depth of at least `least`.
 #[inline(always)]
 fn retain(accesses: &mut Vec<Access>, depths: impl Iterator<Item = u8>, least: u8) {
     let mut kept = 0;
     for (index, depth) in (0..accesses.len()).zip(depths) {
-        // If it is not kept, the next one takes its place.
+        // A dropped access is overwritten by the next one.
         accesses[kept] = accesses[index];
         kept += usize::from(depth >= least);
     }

@@ -1,7 +1,6 @@
-//! Misses of all caches of a level, counted by how many associativities miss a line.
+//! Counts the misses of all caches of a level by the number of associativities that miss.
 //!
-//! Accesses are counted many at once, without a branch for what each found: whether a line misses is
-//! a coin toss to the processor.
+//! Accesses are counted in batches and without branches, because whether a line misses is unpredictable.
 
 use super::Geometry;
 use crate::engine::counts::Misses;
@@ -9,18 +8,18 @@ use crate::memory::Forest;
 use crate::stream::Bins;
 use std::hint::select_unpredictable;
 
-/// A line of a footprint that misses some cache.
+/// A line of a footprint that misses in some cache.
 #[derive(Clone, Copy)]
 pub(super) struct Access {
     pub(super) line: u32,
     pub(super) cell: u32,
     pub(super) tile: u32,
-    /// Differs from those of the footprints before and after it.
+    /// Distinguishes the footprint from its neighbours.
     pub(super) footprint: u32,
 }
 
 impl Access {
-    /// Comes before the first.
+    /// Placeholder before the first access.
     const NONE: Self = Self {
         line: 0,
         cell: 0,
@@ -29,17 +28,17 @@ impl Access {
     };
 }
 
-/// What is counted by tile.
+/// The per-tile count.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum ByTile {
     Footprints,
     Lines,
 }
 
-/// Counts by bin (a cell or a tile) and number of associativities that miss, from one on. That of
-/// none is no place of its own: nothing is added there.
+/// Counts by bin (a cell or a tile) and by the number of associativities that miss, from one on. Index zero
+/// would belong to hits; it overlaps the previous bin, and nothing is added there.
 struct Classes<T> {
-    /// One before the first bin's.
+    /// Starts one before the first bin.
     counts: Vec<T>,
     classes: usize,
 }
@@ -52,19 +51,19 @@ impl<T: Copy + Default> Classes<T> {
         }
     }
 
-    /// Counts of one associativity, the `rank`-th, by bin.
+    /// Counts of the associativity with this rank, by bin.
     fn of(&self, rank: usize, sum: impl Fn(&[T]) -> T) -> impl Iterator<Item = T> {
         let bins = self.counts[1..].chunks(self.classes);
         bins.map(move |counts| sum(&counts[rank..]))
     }
 }
 
-/// Misses of all caches of one number of sets.
+/// Misses of all caches with one number of sets.
 pub(super) struct Tally {
     pub(super) sets: u32,
     /// Associativities, ascending.
     ways: Vec<u32>,
-    /// How many of the associativities miss a line, by its depth.
+    /// Number of associativities that miss a line, by its depth.
     missing: Vec<u8>,
     lines: Classes<u64>,
     footprints: Classes<u64>,
@@ -77,7 +76,7 @@ impl Tally {
         self.ways.last().copied().unwrap_or(0)
     }
 
-    /// Counts accesses, footprint after footprint; `depths` says how deep each line lay in its stack.
+    /// Counts accesses, footprint by footprint. `depths` has each line's depth in its stack.
     pub(super) fn count(&mut self, accesses: &[Access], depths: impl Iterator<Item = u8>) {
         match *self.ways {
             [ways] => self.count_one(ways as u8, accesses, depths),
@@ -85,9 +84,9 @@ impl Tally {
         }
     }
 
-    /// A footprint counts at its first miss.
+    /// For one associativity: a footprint counts at its first miss.
     fn count_one(&mut self, ways: u8, accesses: &[Access], depths: impl Iterator<Item = u8>) {
-        // Borrowed one by one, so that they stay in registers.
+        // Separate borrows, so that they stay in registers.
         let (lines, footprints) = (
             &mut self.lines.counts[1..],
             &mut self.footprints.counts[1..],
@@ -113,7 +112,8 @@ impl Tally {
         }
     }
 
-    /// A footprint counts when it ends, by the most associativities that miss a line of it.
+    /// For several associativities: a footprint counts at its end, by the most associativities that miss
+    /// any of its lines.
     fn count_several(&mut self, accesses: &[Access], depths: impl Iterator<Item = u8>) {
         let classes = self.ways.len();
         let place = |bin: u32, missing: u8| bin as usize * classes + usize::from(missing);
@@ -126,7 +126,7 @@ impl Tally {
             }
         };
         let mut last = Access::NONE;
-        // How many associativities miss some line of the last access' footprint.
+        // The most associativities that miss a line of the current footprint.
         let mut most = 0;
         for (access, depth) in accesses.iter().zip(depths) {
             let missing = missing[usize::from(depth)];
@@ -143,7 +143,7 @@ impl Tally {
         tile(ByTile::Footprints, last.tile, most, most > 0);
     }
 
-    /// Misses of one associativity, the `rank`-th, by cell.
+    /// Misses of the associativity with this rank, by cell.
     pub(super) fn misses(&self, rank: usize) -> impl Iterator<Item = Misses> {
         let sum = |counts: &[u64]| counts.iter().sum();
         let footprints = self.footprints.of(rank, sum);
@@ -167,7 +167,7 @@ impl Tally {
     }
 }
 
-/// All caches of a level that see the same lines.
+/// All caches of a level that receive the same lines.
 pub(super) struct Level {
     /// By number of sets, ascending.
     pub(super) tallies: Vec<Tally>,
@@ -207,7 +207,7 @@ impl Level {
         Forest::new(&self.tallies.iter().map(tree).collect::<Vec<_>>())
     }
 
-    /// Number of sets and rank of the associativity.
+    /// Index of the number of sets, and rank of the associativity.
     pub(super) fn find(&self, (sets, ways): Geometry) -> (usize, usize) {
         let tree = self.tallies.partition_point(|tally| tally.sets < sets);
         (tree, self.tallies[tree].rank(ways))

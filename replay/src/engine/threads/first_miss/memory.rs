@@ -1,5 +1,5 @@
-//! The caches as threads see them that stop at a miss, and the two ways of counting: primary misses
-//! with the bytes that memory sends, and first look-ups.
+//! The caches of threads that stop at a miss, with both ways of counting: primary misses with DRAM traffic,
+//! and first look-ups.
 
 use super::super::Shared;
 use super::thread::{FETCHES_UNTIL_KEPT, Thread};
@@ -8,22 +8,22 @@ use crate::engine::counts::{CacheCounts, CellMisses};
 use crate::memory::{Answer, Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT, SecondLevel};
 use crate::result::{FirstLookups, MemoryResult};
 
-/// What a footprint finds in its core's own cache.
+/// Outcome of a footprint's look-up in the core's L1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
-    /// All its lines.
+    /// All lines are resident.
     All,
-    /// Not all of them: [`Memory::ask`] knows which.
+    /// Some lines are missing; [`Memory::ask`] requests them.
     NotAll,
 }
 
-/// L1 caches over a shared L2.
+/// L1 caches above a shared L2.
 pub struct Memory<D> {
     shared: Shared<D>,
-    /// Lines of the footprint looked up last that were not there, by core: index and arrival.
+    /// Per core, the missing lines of the last footprint looked up: index and arrival.
     missing: Vec<Vec<(usize, u64)>>,
     first: FirstLookups,
-    /// Look-ups that found their data with the thread, not in the cache.
+    /// Look-ups served by data that the thread kept, not by the cache.
     pub forwarded: u64,
 }
 
@@ -46,7 +46,7 @@ impl<D: DelayedFill> Memory<D> {
         }
     }
 
-    /// What was counted beside and below the L2.
+    /// Counts beside and below the L2.
     pub fn result(&self) -> MemoryResult {
         self.shared.l2.result()
     }
@@ -56,7 +56,7 @@ impl<D: DelayedFill> Memory<D> {
         &self.shared.counts
     }
 
-    /// First look-ups of so many footprints.
+    /// First look-ups, with rates of this number of footprints.
     pub fn first_lookups(&self, footprints: u64) -> FirstLookups {
         FirstLookups {
             forwarded: self.forwarded,
@@ -70,7 +70,7 @@ impl<D: DelayedFill> Memory<D> {
         &mut self.shared
     }
 
-    /// The L2 and what lies beside and below it.
+    /// The L2 and everything beside and below it.
     pub fn l2(&mut self) -> &mut SecondLevel<D> {
         &mut self.shared.l2
     }
@@ -80,8 +80,7 @@ impl<D: DelayedFill> Memory<D> {
         self.shared.flush();
     }
 
-    /// Looks up all lines of a footprint in the core's own cache. Doing so once more at the same
-    /// cycle changes nothing.
+    /// Looks up all lines of a footprint in the core's L1. A second look-up in the same cycle changes nothing.
     #[inline(always)]
     pub fn look_up(&mut self, core: usize, now: u64, lines: &[u32]) -> Seen {
         let missing = &mut self.missing[core];
@@ -96,8 +95,7 @@ impl<D: DelayedFill> Memory<D> {
         }
     }
 
-    /// The footprint that was looked up last asks for the lines that it did not find, unless they
-    /// are in flight.
+    /// Requests the missing lines of the last footprint looked up, except those in flight.
     pub fn ask(&mut self, core: usize, now: u64, thread: &mut Thread) {
         let Some(footprint) = thread.footprint() else {
             return;
@@ -106,7 +104,7 @@ impl<D: DelayedFill> Memory<D> {
         let mut state = thread.state;
         let first = !std::mem::replace(&mut state.tried, true);
         if state.kept_from.is_some() {
-            // All is asked for; the thread waits for the last of it.
+            // Everything is requested; the thread waits for the last line.
             return;
         }
         self.first.l1_misses += u64::from(first);
@@ -122,7 +120,7 @@ impl<D: DelayedFill> Memory<D> {
             let line = footprint.lines[index];
             if arrival != NOT_IN_FLIGHT {
                 if first {
-                    // A line in flight into the L1 is a miss of the L2 until memory has sent it.
+                    // A line in flight into the L1 counts as an L2 miss until memory has sent it.
                     let in_l2 = second.cache(core).arrival(line, now);
                     self.first.l2_lookups += 1;
                     self.first.l2_misses += u64::from(in_l2 != NOT_IN_FLIGHT);
@@ -154,7 +152,7 @@ impl<D: DelayedFill> Memory<D> {
         }
         l1.lines += u64::from(fetched);
         l2.lines += u64::from(from_memory);
-        // A footprint counts once, however often it asks.
+        // A footprint counts once, however often it requests lines.
         let newly_fetched = fetched > 0 && !std::mem::replace(&mut state.fetched, true);
         let newly_missed = from_memory > 0 && !std::mem::replace(&mut state.from_memory, true);
         l1.footprints += u64::from(newly_fetched);

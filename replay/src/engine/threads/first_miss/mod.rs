@@ -1,9 +1,8 @@
-//! The machine that the Z2 paper very probably simulates: a thread stops at its first footprint
-//! that misses, and rates count first look-ups. `docs/paper-comparison.md` states the rules and
-//! what speaks for them.
+//! The machine that the Z2 paper probably simulates: a thread stops at its first footprint that misses, and
+//! rates count first look-ups. `docs/paper-comparison.md` states the rules and the evidence for them.
 //!
-//! A core's first stage takes one look-up a cycle: of the thread that runs, else of a thread that
-//! is due again, else of a new one. Of cores at the same cycle, the first one goes first.
+//! A core's first stage performs one look-up per cycle: for the running thread, else for a returning
+//! thread, else for a new one. In the same cycle, cores with lower numbers go first.
 
 mod memory;
 mod thread;
@@ -31,29 +30,28 @@ pub struct FirstMiss<D> {
 #[derive(Default)]
 struct Unit {
     clock: u64,
-    /// The thread that takes the slots, and the cycle at which this pass of it began.
+    /// The running thread, and the cycle at which its current trip began.
     running: Option<(u64, Thread)>,
-    /// Threads on their way back and the cycles at which they are there, which ascend: a pass begins
-    /// after the one before has ended.
+    /// Returning threads and the cycles of their return, which ascend, because trips do not overlap.
     waiting: VecDeque<(u64, Thread)>,
-    /// Threads that are done: their memory is used again.
+    /// Finished threads, whose allocations are reused.
     spare: Vec<Thread>,
     drained: bool,
     stats: PipelineStats,
 }
 
-/// What the first stage does next.
+/// State of the first stage.
 enum Next {
-    /// A thread has the slot.
+    /// A thread occupies the slot.
     Run,
-    /// The slot is free for a new thread.
+    /// A new thread can use the slot.
     Free,
-    /// No thread is left.
+    /// No threads are left.
     Done,
 }
 
 impl Unit {
-    /// Lets time pass until a thread has the slot, or a new one may have it.
+    /// Advances time until a thread occupies the slot or a new one can.
     fn next(&mut self, threads: u32) -> Next {
         if self.running.is_some() {
             return Next::Run;
@@ -75,7 +73,7 @@ impl Unit {
 }
 
 impl<D: DelayedFill> FirstMiss<D> {
-    /// Empty caches, a texture unit for each L1.
+    /// Empty caches, and one texture unit per L1.
     pub fn new<C: Delay<Delayed = D>>(
         caches: Caches<C>,
         config: &RunConfig,
@@ -89,8 +87,7 @@ impl<D: DelayedFill> FirstMiss<D> {
         }
     }
 
-    /// Runs the thread that has the slot until it misses or is done; false if it wants to ask the L2
-    /// after `until`.
+    /// Runs the current thread until it misses or finishes. Returns false if it must access the L2 later than `until`.
     fn pass(&mut self, core: usize, until: u64) -> bool {
         let unit = &mut self.units[core];
         let Some((began, mut thread)) = unit.running.take() else {

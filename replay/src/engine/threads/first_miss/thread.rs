@@ -1,29 +1,28 @@
-//! A quad on its way through a texture unit, footprint by footprint.
+//! A quad in a texture unit, processed footprint by footprint.
 
 use crate::stream::QuadLines;
 
-/// Look-ups of one footprint that asked for lines, after which the thread keeps what has arrived.
+/// Number of requesting look-ups of a footprint after which the thread keeps arriving data.
 ///
-/// Fills are delayed: lines that crowd each other out of a set may do so for ever, each thread's
-/// arrival taking away what the other one is about to use. A thread that has asked so often for the
-/// same footprint gets its data from the fill itself.
+/// With delayed fills, threads can evict each other's lines from a set forever, each fill evicting the line
+/// that the other thread needs next. After this many attempts a thread takes its data from the fill itself.
 pub const FETCHES_UNTIL_KEPT: u32 = 8;
 
-/// A thread's footprints and how far it has come.
+/// A thread's footprints and its progress.
 #[derive(Debug, Default)]
 pub struct Thread {
     lines: Vec<u32>,
     footprints: Vec<Listed>,
     tile: usize,
-    /// Footprint that is next, its first line, and how often it was filtered already.
+    /// Index of the next footprint, index of its first line, and number of its repeats already filtered.
     at: usize,
     line: usize,
     filtered: u32,
-    /// What has become of the footprint that is next.
+    /// State of the next footprint.
     pub state: FootprintState,
 }
 
-/// A footprint and how often it follows itself.
+/// A footprint and its number of repeats.
 #[derive(Debug)]
 struct Listed {
     end: usize,
@@ -31,34 +30,34 @@ struct Listed {
     cell: usize,
 }
 
-/// What has become of a footprint.
+/// Progress of a footprint.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FootprintState {
-    /// It was looked up before.
+    /// It has been looked up.
     pub tried: bool,
-    /// It asked the L2.
+    /// It has requested lines from the L2.
     pub fetched: bool,
-    /// It made the L2 ask memory.
+    /// It has caused a fetch from memory.
     pub from_memory: bool,
-    /// Look-ups that asked the L2.
+    /// Number of look-ups that requested lines.
     pub fetches: u32,
     /// From this cycle on the thread has its data, whatever the cache holds.
     pub kept_from: Option<u64>,
 }
 
-/// The footprint that is next.
+/// The next footprint.
 #[derive(Clone, Copy, Debug)]
 pub struct Current<'a> {
     /// Its distinct lines.
     pub lines: &'a [u32],
-    /// Where it counts.
+    /// Its cell for counts.
     pub cell: usize,
     /// Its tile.
     pub tile: usize,
 }
 
 impl Thread {
-    /// A new thread, in the memory of an old one.
+    /// Starts a thread, reusing the allocations of a finished one.
     pub fn begin(&mut self, quad: QuadLines<'_>) {
         self.lines.clear();
         self.lines.extend_from_slice(quad.lines);
@@ -77,7 +76,7 @@ impl Thread {
         self.state = FootprintState::default();
     }
 
-    /// The footprint that is next; none when all are filtered.
+    /// The next footprint, or none when all are filtered.
     #[inline]
     pub fn footprint(&self) -> Option<Current<'_>> {
         let listed = self.footprints.get(self.at)?;
@@ -88,13 +87,13 @@ impl Thread {
         })
     }
 
-    /// True if the thread has the data of the footprint that is next.
+    /// True if the thread has kept the data of the next footprint.
     #[inline]
     pub fn has_kept(&self, now: u64) -> bool {
         self.state.kept_from.is_some_and(|from| from <= now)
     }
 
-    /// The footprint is filtered.
+    /// Marks the footprint as filtered.
     #[inline]
     pub fn advance(&mut self) {
         let listed = &self.footprints[self.at];

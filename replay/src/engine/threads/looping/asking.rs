@@ -1,5 +1,5 @@
-//! A thread requests the lines that are neither there nor in flight: in the order of its footprints, so many in each
-//! trip.
+//! Requests the lines of a thread that are neither resident nor in flight, in the order of its footprints
+//! and a limited number per trip.
 
 use crate::config::TmuConfig;
 use crate::engine::counts::{CacheCounts, FootprintMisses};
@@ -8,28 +8,28 @@ use crate::stream::{QuadLines, Use};
 use crate::tmu::{Pending, Waiting};
 use std::hint::select_unpredictable;
 
-/// A line that is neither there nor in flight, and its uses.
+/// A line that is neither resident nor in flight, and its uses.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Absent {
     pub line: u32,
     pub of: Use,
 }
 
-/// Lines that a thread asked for: so many in each of its trips.
+/// Requests of a thread so far, a limited number per trip.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Trips {
     fetches: u32,
     full_trips: u32,
 }
 
-/// A thread that asks for its lines.
+/// A thread that requests its lines.
 pub struct Asking<'m, D> {
     pub core: usize,
     pub l1: &'m mut D,
     pub l2: &'m mut SecondLevel<D>,
-    /// Cycles that a line takes from the L2 to the L1.
+    /// Cycles in which a line travels from the L2 to the L1.
     pub l2_cycles: u64,
-    /// True if lines arrive in the cycle in which they are requested.
+    /// True if lines arrive in the cycle of their request.
     pub is_instant: bool,
     pub tmu: &'m TmuConfig,
     pub counts: &'m mut CacheCounts,
@@ -39,7 +39,7 @@ pub struct Asking<'m, D> {
 }
 
 impl<D: DelayedFill> Asking<'_, D> {
-    /// Asks for the `absent` lines of a segment in the order in which its footprints do.
+    /// Requests the `absent` lines of a segment in the order of their first use.
     #[inline(always)]
     pub fn segment(
         &mut self,
@@ -48,7 +48,7 @@ impl<D: DelayedFill> Asking<'_, D> {
         segment: u32,
         by_first_use: &mut [Absent; Use::FIRST_LINES],
     ) {
-        // A bit for the first use of each.
+        // One bit per first use.
         let mut first_uses = [0_u64; Use::FIRST_LINES / 64];
         for one in absent {
             let first = one.of.first_line();
@@ -56,7 +56,7 @@ impl<D: DelayedFill> Asking<'_, D> {
             by_first_use[first] = *one;
         }
         let mut asking = 0;
-        // Of the footprint that asks: whether it has fetched, and from memory.
+        // Whether the requesting footprint has fetched a line, and one from memory.
         let mut missed = [false; 2];
         for (by_first_use, mut rest) in by_first_use.chunks_exact(64).zip(first_uses) {
             while rest != 0 {
@@ -66,7 +66,7 @@ impl<D: DelayedFill> Asking<'_, D> {
                 let first_user = users & users.wrapping_neg();
                 missed = missed.map(|missed| missed & (first_user == asking));
                 asking = first_user;
-                // Another segment, or another cell of this one, may have asked for it just now.
+                // Another segment or cell of the quad may have requested the line in this cycle.
                 let known = match of.may_be_listed() {
                     true => self.l1.arrival(line, self.now),
                     false => NOT_IN_FLIGHT,
@@ -90,8 +90,8 @@ impl<D: DelayedFill> Asking<'_, D> {
         }
     }
 
-    /// Looks up footprint after footprint: where a miss may change a cache at once, and where distinct lines
-    /// are not listed.
+    /// Looks up one footprint at a time. Used if a miss can change a cache immediately and if distinct
+    /// lines are not listed.
     #[inline(never)]
     pub fn one_by_one(&mut self, quad: &QuadLines<'_>) {
         let now = self.now;
@@ -124,7 +124,7 @@ impl<D: DelayedFill> Asking<'_, D> {
         }
     }
 
-    /// Asks the L2 for a line that is not in flight into the L1; says when it arrives there.
+    /// Requests a line from the L2 that is not in flight into the L1. Returns its arrival at the L1.
     #[inline(always)]
     fn fetch(&mut self, line: u32, misses: &mut FootprintMisses) -> u64 {
         let now = self.now;
@@ -142,7 +142,7 @@ impl<D: DelayedFill> Asking<'_, D> {
 }
 
 impl Trips {
-    /// The trip in which the next line is asked for.
+    /// The trip of the next request.
     #[inline(always)]
     fn next(&mut self, fetches_per_trip: u32) -> u32 {
         let trip = self.full_trips;

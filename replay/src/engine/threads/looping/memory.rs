@@ -1,10 +1,10 @@
-//! The caches as texture units see them: a thread's first trip looks up every footprint's tags, and
-//! what is missing is fetched.
+//! The caches as seen by texture units: a thread's first trip looks up the tags of all its footprints, and
+//! missing lines are fetched.
 //!
-//! While a thread is looked up nothing arrives, so each of its distinct lines is there, in flight or
-//! neither, once for all its footprints; and what its look-ups leave behind in the L1 depends only on
-//! the order of each line's last one. So the distinct lines are looked up, in that order, and
-//! footprints only where one of them was not there.
+//! Nothing arrives during a thread's look-up. Each distinct line is therefore resident, in flight or absent
+//! for all of its footprints alike, and the state left in the L1 depends only on the order of each line's
+//! last look-up. So the distinct lines are looked up in that order, and single footprints matter only if a
+//! line was missing.
 
 use super::super::Shared;
 use super::asking::{Absent, Asking, Trips};
@@ -16,38 +16,38 @@ use crate::stream::{QuadLines, Use};
 use crate::tmu::{Pending, Waiting};
 use std::ops::Range;
 
-/// The thread of a core that was looked up last.
+/// The last thread looked up on a core.
 #[derive(Default)]
 struct LookedUp {
-    /// The arrivals that it waits for.
+    /// The arrivals it waits for.
     waiting: Waiting,
-    /// Its distinct lines that are neither there nor in flight, segment by segment.
+    /// Its distinct lines that are neither resident nor in flight, by segment.
     absent: Vec<Absent>,
-    /// Where those of each segment end, if there are several.
+    /// End of each segment in `absent`, if there are several.
     segments: Vec<usize>,
 }
 
-/// What a thread finds in its core's own cache.
+/// Outcome of a thread's look-up in the core's L1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// All its lines.
+    /// All lines are resident.
     All,
-    /// Lines that are not there, but in flight.
+    /// The missing lines are all in flight.
     InFlight,
-    /// Lines that it has to request from the L2.
+    /// Some lines must be requested from the L2.
     NotAll,
 }
 
-/// L1 caches over a shared L2.
+/// L1 caches above a shared L2.
 pub struct Memory<D> {
     shared: Shared<D>,
-    /// By core.
+    /// One per core.
     threads: Vec<LookedUp>,
     tmu: TmuConfig,
     memory_cycles: u64,
-    /// True where a miss changes a cache at once, so that a thread's later look-ups see it.
+    /// True if a miss fills the cache immediately, so that later look-ups of the same thread hit.
     misses_change_caches_at_once: bool,
-    /// The lines of a segment that are neither there nor in flight, by first use.
+    /// The absent lines of a segment, by first use.
     by_first_use: [Absent; Use::FIRST_LINES],
 }
 
@@ -60,7 +60,7 @@ impl<D: DelayedFill> Memory<D> {
         path: MissPath,
     ) -> Self {
         let memory_cycles = u64::from(config.level.l2.hit_cycles) + u64::from(config.memory_cycles);
-        // Later trips of threads that miss many lines included.
+        // Includes later trips of threads with many missing lines.
         let l1_cycles = memory_cycles + 8 * u64::from(config.tmu.loop_cycles);
         let threads = caches.l1.iter().map(|_| LookedUp::default());
         Self {
@@ -73,17 +73,17 @@ impl<D: DelayedFill> Memory<D> {
         }
     }
 
-    /// What missed.
+    /// Misses so far.
     pub fn counts(&self) -> &CacheCounts {
         &self.shared.counts
     }
 
-    /// What was counted beside and below the L2.
+    /// Counts beside and below the L2.
     pub fn result(&self) -> MemoryResult {
         self.shared.l2.result()
     }
 
-    /// Fetches of the L2 by interval of time, where they are recorded.
+    /// Fetches of the L2 per interval of time, if recorded.
     pub fn fetched_lines(&self) -> &[u32] {
         self.shared.l2.fetched_lines()
     }
@@ -93,7 +93,7 @@ impl<D: DelayedFill> Memory<D> {
         &mut self.shared
     }
 
-    /// The L2 and what lies beside and below it.
+    /// The L2 and everything beside and below it.
     pub fn l2(&mut self) -> &mut SecondLevel<D> {
         &mut self.shared.l2
     }
@@ -103,8 +103,8 @@ impl<D: DelayedFill> Memory<D> {
         self.shared.flush();
     }
 
-    /// Looks up all lines of a thread that enters `now`, in its core's own cache. If some are
-    /// neither there nor in flight, the caller must call [`Self::ask`].
+    /// Looks up all lines of a thread that enters at `now` in the core's L1. If lines are neither resident
+    /// nor in flight, the caller must call [`Self::ask`].
     #[inline(always)]
     pub fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> Found {
         let LookedUp {
@@ -115,7 +115,7 @@ impl<D: DelayedFill> Memory<D> {
         waiting.clear();
         absent.clear();
         if self.misses_change_caches_at_once || quad.distinct.is_empty() {
-            // Nothing absent either: one by one.
+            // Distinct lines are not listed; `ask` looks footprints up one by one.
             return Found::NotAll;
         }
         let (cache, counts) = (&mut self.shared.l1[core], &mut self.shared.counts);
@@ -133,7 +133,7 @@ impl<D: DelayedFill> Memory<D> {
             absent.len()
         };
         if quad.is_one_segment() {
-            // Nearly all quads: nothing to search for where a segment ends.
+            // The case of nearly all quads, which needs no search for segment ends.
             look_up(0..quad.distinct.len(), 0);
         } else {
             segments.clear();
@@ -150,14 +150,13 @@ impl<D: DelayedFill> Memory<D> {
         }
     }
 
-    /// What the thread that was looked up last waits for.
+    /// The arrivals that the last thread looked up waits for.
     #[inline(always)]
     pub fn waiting(&mut self, core: usize) -> &mut Waiting {
         &mut self.threads[core].waiting
     }
 
-    /// Requests the lines that are neither there nor in flight, when it is the core's turn at the L2. Returns what
-    /// the thread's footprints wait for.
+    /// Requests the absent lines when the core has access to the L2. Returns the arrivals that the footprints wait for.
     #[inline(never)]
     pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Waiting {
         let first = &mut self.threads[core];
@@ -172,7 +171,7 @@ impl<D: DelayedFill> Memory<D> {
             l1: &mut l1[core],
             l2,
             l2_cycles: *l2_cycles,
-            // Without latencies nothing loops, so there is no later trip to wait for.
+            // Without latencies no thread loops, so there are no later trips.
             is_instant: *l2_cycles + self.memory_cycles == 0,
             tmu: &self.tmu,
             counts,

@@ -1,5 +1,5 @@
-//! A thread requests all lines that its footprints miss, and loops through the pipeline until they have arrived
-//! ("looping for the next chance").
+//! A thread requests all missing lines of its footprints and loops through the pipeline until they are
+//! filled ("looping for the next chance").
 
 mod asking;
 mod memory;
@@ -16,18 +16,18 @@ use crate::tmu::{Pipeline, Turn};
 use memory::{Found, Memory};
 use timeline::Recorder;
 
-/// Texture units, and the caches that they share.
+/// Texture units and their shared caches.
 pub struct Looping<D> {
     memory: Memory<D>,
     units: Vec<Pipeline>,
-    /// Cores whose thread has been looked up and is to ask the L2.
+    /// Per core, whether its thread has been looked up and has requests for the L2.
     asking: Vec<bool>,
-    /// What `--timeline` shows.
+    /// Records the timeline, if requested.
     recorder: Option<Recorder>,
 }
 
 impl<D: DelayedFill> Looping<D> {
-    /// Empty caches, a texture unit for each L1.
+    /// Empty caches, and one texture unit per L1.
     pub fn new<C: Delay<Delayed = D>>(
         caches: Caches<C>,
         config: &RunConfig,

@@ -1,19 +1,19 @@
-//! Records which core works on which tiles when, for `replay run --timeline`.
+//! Records the tiles that each core works on over time, for `replay run --timeline`.
 
 use crate::order::WorkItem;
 use crate::result::{TileAt, Timeline, TimelineItem};
 use crate::tmu::PipelineStats;
 
-/// The items of a replay so far.
+/// The items recorded so far.
 #[derive(Clone, Debug)]
 pub struct Recorder {
     timeline: Timeline,
-    /// Counters at the start of each core's item.
+    /// Counters at the start of each core's current item.
     at_start: Vec<Option<(u64, PipelineStats, Vec<TileAt>)>>,
 }
 
 impl Recorder {
-    /// Nothing recorded.
+    /// An empty record.
     pub fn new(cores: usize) -> Self {
         Self {
             timeline: Timeline::default(),
@@ -21,7 +21,7 @@ impl Recorder {
         }
     }
 
-    /// The core ends its item, if it has one, and starts another.
+    /// Ends the core's current item, if any, and starts another.
     pub fn start(&mut self, core: usize, cycle: u64, stats: PipelineStats, item: &WorkItem) {
         self.end(core, cycle, stats);
         let tile = |at: crate::order::TileRef| TileAt {
@@ -31,7 +31,7 @@ impl Recorder {
         self.at_start[core] = Some((cycle, stats, item.tiles().map(tile).collect()));
     }
 
-    /// The core ends its item, if it has one.
+    /// Ends the core's current item, if any.
     pub fn end(&mut self, core: usize, cycle: u64, stats: PipelineStats) {
         let Some((start_cycle, before, tiles)) = self.at_start[core].take() else {
             return;
@@ -46,7 +46,7 @@ impl Recorder {
         });
     }
 
-    /// All items, by start and core, with the lines fetched in each interval.
+    /// All items, sorted by start and core, and the lines fetched in each interval.
     pub fn timeline(&self, fetched_lines: &[u32]) -> Timeline {
         let mut timeline = self.timeline.clone();
         (timeline.items).sort_by_key(|item| (item.start_cycle, item.core));

@@ -4,7 +4,7 @@ use crate::memory::dram::DramConfig;
 use proptest::prelude::*;
 use std::collections::HashMap;
 
-/// An LRU level as lists of lines, most recent last.
+/// An LRU level as lists of lines, most recently used last.
 struct Twin {
     sets: Vec<Vec<u32>>,
     ways: usize,
@@ -15,7 +15,7 @@ struct Twin {
 }
 
 impl Twin {
-    /// True for a hit.
+    /// Returns true for a hit.
     fn access(&mut self, line: u32) -> bool {
         let line = line / self.ratio;
         let index = line as usize % self.sets.len();
@@ -49,7 +49,7 @@ fn twins(config: &RunConfig) -> Vec<Twin> {
         .collect()
 }
 
-/// When the line arrives, level by level.
+/// Arrival of the line, computed level by level.
 fn twin_read(twins: &mut [Twin], line: u32, now: u64, memory_cycles: u64) -> u64 {
     let Some((first, below)) = twins.split_first_mut() else {
         return now + memory_cycles;
@@ -83,7 +83,7 @@ fn counts(below: &Below) -> Vec<[u64; 3]> {
 }
 
 proptest! {
-    /// One to four levels, with lines that grow from level to level, where time passes and where it does not.
+    /// One to four levels with line sizes growing from level to level, with and without time.
     #[test]
     fn levels_equal_lists_of_lines(
         shapes in prop::collection::vec((0_u32..4, 1_u32..6, 0_u32..3, 0_u32..90), 1..5),
@@ -104,7 +104,7 @@ proptest! {
             let found = timed.read_at(0, line, now);
             prop_assert_eq!(found, twin_read(&mut timed_twins, line, now, 200));
             functional.read(0, line);
-            // Every cycle is later than all arrivals: nothing is in flight.
+            // Cycles this far apart leave nothing in flight.
             twin_read(&mut functional_twins, line, now * 1000, 0);
         }
         let of = |twins: &[Twin]| twins.iter().map(|twin| twin.counts).collect::<Vec<_>>();
@@ -115,8 +115,8 @@ proptest! {
     }
 }
 
-/// A stream of N lines through a level whose lines are four times as long: N/4 misses, three of four merged while the
-/// fetch is in flight.
+/// A stream of N lines through a level with lines four times as long has N/4 misses and merges
+/// three of four requests while the fetch is in flight.
 #[test]
 fn a_stream_misses_once_for_each_longer_line() {
     let levels = Levels::default().over(&[level(64, 16, 64, 60)]).unwrap();
@@ -133,7 +133,7 @@ fn a_stream_misses_once_for_each_longer_line() {
     }
     assert_eq!(counts(&below), [[400, 100, 300]]);
     assert_eq!(below.result().1.unwrap().requests, 100);
-    // All are there now.
+    // All lines have arrived.
     assert_eq!(below.read_at(0, 3, 1_000_000), 1_000_060);
     below.clear();
     assert_eq!(below.read_at(0, 3, 1_000_100), 1_000_300);

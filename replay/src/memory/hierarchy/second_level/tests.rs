@@ -27,7 +27,7 @@ fn functional(config: &RunConfig) -> SecondLevel<Box<dyn Cache>> {
     )
 }
 
-/// A timed L2, whatever its type, as a function from line and cycle to the answer.
+/// A timed L2 of any type, as a function from line and cycle to the answer.
 type Request = Box<dyn FnMut(u32, u64) -> Answer>;
 
 fn timed(config: &RunConfig) -> [Request; 2] {
@@ -51,7 +51,7 @@ fn prefetch(prefetcher: Prefetching, lines: u32) -> Option<PrefetchConfig> {
     })
 }
 
-/// Sets as lists, most recent last; lists of what was prefetched and not used since.
+/// Sets as lists, most recently used last, and lists of unused prefetched lines.
 #[derive(Default)]
 struct Twin {
     sets: Vec<Vec<u32>>,
@@ -121,7 +121,7 @@ proptest! {
         prop_assert_eq!(misses, twin.misses);
     }
 
-    /// The sets that are filled one by one, against the cache that is filled in the order of time.
+    /// Compares the cache that fills set by set with the one that fills in order of time.
     #[test]
     fn both_kinds_of_timed_cache_answer_alike(
         block in any::<bool>(),
@@ -142,7 +142,7 @@ proptest! {
         }
     }
 
-    /// Asking whether a line is held must not change which lines are evicted.
+    /// `contains` must not change which lines are evicted.
     #[test]
     fn contains_agrees_with_look_ups_and_changes_nothing(
         policy in 0_usize..8,
@@ -162,8 +162,8 @@ proptest! {
     }
 }
 
-/// N lines one after another. The first use of each prefetched line fetches the next: one miss, N lines prefetched. A
-/// block of four: a miss for each, and three lines prefetched.
+/// N consecutive lines. With next-line, the first use of each prefetched line fetches the next: one
+/// miss, N prefetched lines. With blocks of four: one miss per block and three prefetched lines.
 #[test]
 fn a_stream_misses_once_with_the_next_line_and_once_for_each_block() {
     let run = |prefetch| {
@@ -187,7 +187,8 @@ fn a_stream_misses_once_with_the_next_line_and_once_for_each_block() {
     );
 }
 
-/// Requests ten cycles apart: a prefetched line is late until the time between its fetch and its request is the latency.
+/// Requests ten cycles apart: a prefetched line is late until the time between its fetch and its
+/// request reaches the latency.
 #[test]
 fn a_prefetched_line_arrives_after_the_latency_of_its_own_fetch() {
     let config = config(prefetch(Prefetching::NEXT_LINE, 1));
