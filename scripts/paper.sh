@@ -1,5 +1,5 @@
 #!/bin/sh
-# Measures the tables of docs/paper-comparison.md that compare savings with the paper's: `scripts/paper.sh SCENES`
+# Measures the tables of docs/results/z2-comparison.md that compare savings with the paper's: `scripts/paper.sh SCENES`
 #   results/paper-savings.csv   every scene, cache configuration and order
 #   results/paper-means.csv     its means over cache configurations
 #   results/paper-preset.csv    Crytek Sponza as the paper counts

@@ -34,7 +34,7 @@ impl Preset {
     }
 }
 
-/// The nearest stated model. Its one free number is the loop; `docs/paper-comparison.md` says what it
+/// The nearest stated model. Its one free number is the loop; `docs/models/z2.md` says what it
 /// was calibrated on, and why textures begin at multiples of 64 KiB. The paper's shadow rows save nothing or lose: of
 /// the layouts of a shadow map that were tried, a linear one comes nearest to that.
 fn z2_paper(mut config: RunConfig) -> RunConfig {

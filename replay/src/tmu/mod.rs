@@ -1,5 +1,5 @@
 //! The texture mapping unit: "looping for the next chance" (RayCore, TOG 2014), as the Z2 paper's
-//! simulator uses it. `docs/tmu-model.md` states the model and its parameters in one page.
+//! simulator uses it. `docs/models/texture-unit.md` states the model and its parameters in one page.
 
 mod closed_form;
 mod pipeline;

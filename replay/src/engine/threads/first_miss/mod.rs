@@ -1,5 +1,5 @@
 //! The machine that the Z2 paper very probably simulates: a thread stops at its first footprint
-//! that misses, and rates count first look-ups. `docs/paper-comparison.md` states the rules and
+//! that misses, and rates count first look-ups. `docs/models/z2.md` states the rules and
 //! what speaks for them.
 //!
 //! A core's first stage takes one look-up a cycle: of the thread that runs, else of a thread that
