@@ -106,7 +106,7 @@ for row in rows("preset.csv"):
 write("paper-preset.csv", [
     "scripts/paper.sh SCENES  (tracegen raster crytek-sponza/sponza.gltf --hmd dk2 -o crytek-sponza.textrace)",
     "replay paper crytek-sponza.textrace --preset z2-paper --base-align 64KiB --csv FILE",
-], ["caches, order", "paper", "preset", "paper saved", "preset saved, L1 x L2", "bytes saved, preset", "bytes saved, today's model"], table)
+], ["caches, order", "paper", "preset", "paper saved", "preset saved, L1 x L2", "bytes saved, preset", "bytes saved, default model"], table)
 
 table = []
 for align, bias in (("64", "0"), ("64KiB", "0"), ("64KiB", "-1"), ("64KiB", "-2")):
