@@ -35,7 +35,7 @@ impl Preset {
 }
 
 /// The model that comes closest to the paper's table. `loop_cycles` is its one free parameter;
-/// `docs/paper-comparison.md` describes its calibration and why textures begin at multiples of 64
+/// `docs/models/z2.md` describes its calibration and why textures begin at multiples of 64
 /// KiB. In the paper, shadow rows gain nothing or lose. Of the shadow map layouts tried, the linear
 /// one comes closest to that.
 fn z2_paper(mut config: RunConfig) -> RunConfig {

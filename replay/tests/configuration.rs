@@ -1,4 +1,4 @@
-//! `docs/configuration.md` says what the code reads: keys, defaults, values and what they mean come
+//! `docs/use/configuration.md` says what the code reads: keys, defaults, values and what they mean come
 //! from the types themselves. `UPDATE_DOCS=1` rewrites the page; review the diff.
 
 use clap::ValueEnum;
@@ -282,7 +282,7 @@ fn page() -> String {
 
 #[test]
 fn the_page_of_keys_is_what_the_code_reads() {
-    let path = root().join("docs/configuration.md");
+    let path = root().join("docs/use/configuration.md");
     let page = page();
     if std::env::var_os("UPDATE_DOCS").is_some() {
         fs::write(&path, &page).unwrap();
@@ -290,7 +290,7 @@ fn the_page_of_keys_is_what_the_code_reads() {
     let found = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         found == page,
-        "docs/configuration.md is not what the code reads; UPDATE_DOCS=1 rewrites it"
+        "docs/use/configuration.md is not what the code reads; UPDATE_DOCS=1 rewrites it"
     );
 }
 

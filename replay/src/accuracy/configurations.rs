@@ -119,7 +119,7 @@ pub const LOD: Study = Study {
     },
 };
 
-/// The loop is moved as far as docs/tmu-model.md says that it may be.
+/// The loop is moved as far as docs/models/texture-unit.md says that it may be.
 pub const LOOP: Study = Study {
     key: "loop",
     title: "Calibrated loop of the cycle model",
@@ -161,7 +161,7 @@ pub const MODEL: Study = Study {
     },
 };
 
-/// As far as docs/paper-comparison.md says that it may be moved.
+/// As far as docs/models/z2.md says that it may be moved.
 pub const FIRST_MISS_LOOP: Study = Study {
     key: "first-miss-loop",
     title: "Calibrated loop of the first-miss model",

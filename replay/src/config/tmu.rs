@@ -45,7 +45,7 @@ impl TmuModel {
     }
 }
 
-/// The texture unit's pipeline; see `docs/tmu-model.md`.
+/// The texture unit's pipeline; see `docs/models/texture-unit.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TmuConfig {

@@ -1,7 +1,7 @@
 //! Locality: the distances between uses of lines, and the resulting hits in caches of every size.
 //!
 //! [`Profile`] analyses a stream of lines, each with its place. [`analyse`] creates the streams of a trace,
-//! one per order, and [`analyse_addresses`] those of plain addresses. `docs/locality.md` defines every
+//! one per order, and [`analyse_addresses`] those of plain addresses. `docs/models/locality.md` defines every
 //! figure.
 
 mod axis;

@@ -39,7 +39,7 @@ pub fn trace<'a>() -> Vec<Figure<'a>> {
     ]
 }
 
-/// Every key of the configuration, as docs/configuration.md lists them.
+/// Every key of the configuration, as docs/use/configuration.md lists them.
 #[rustfmt::skip]
 pub fn config<'a>() -> Vec<Figure<'a>> {
     fn key<'a, V: super::columns::Cell + 'static>(
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn every_key_of_the_configuration_is_a_column() {
-        let page = include_str!("../../../docs/configuration.md");
+        let page = include_str!("../../../docs/use/configuration.md");
         let documented = page.lines().filter_map(|line| {
             let key = line.strip_prefix("| `")?;
             Some(key.split_once('`')?.0)

@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn every_rule_stands_in_the_help_and_in_the_documentation() {
-        let page = include_str!("../../../../docs/reprojection-rules.md");
+        let page = include_str!("../../../../docs/models/reprojection-rules.md");
         for kind in RULES {
             assert!(help().contains(kind.title), "{}", kind.name);
             assert!(page.contains(&format!("| `{}", kind.name)), "{}", kind.name);

@@ -1,5 +1,5 @@
 //! The machine that the Z2 paper probably simulates: a thread stops at its first footprint that misses, and
-//! rates count first look-ups. `docs/paper-comparison.md` states the rules and the evidence for them.
+//! rates count first look-ups. `docs/models/z2.md` states the rules and the evidence for them.
 //!
 //! A core's first stage performs one look-up per cycle: for the running thread, else for a returning
 //! thread, else for a new one. In the same cycle, cores with lower numbers go first.
