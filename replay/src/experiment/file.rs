@@ -258,7 +258,7 @@ pub(super) fn set(table: &mut Table, key: &str, value: Value) {
         return;
     };
     let is_level = |name: &&str| name.eq_ignore_ascii_case(first);
-    if let Some(index) = Levels::NAMES.iter().position(|name| is_level(name))
+    if let Some(index) = Levels::NAMES.iter().position(is_level)
         && let Some(levels) = table.get_mut("level").and_then(Value::as_array_mut)
         && index <= levels.len()
     {
