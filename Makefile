@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques accuracy stress test fuzz faults bench lint build deps golden figures clean
+.PHONY: demo techniques accuracy stress test fuzz faults bench lint build deps golden figures reproduce clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -58,6 +58,11 @@ golden: deps build
 # Rewrites the tables of the documents from results/; review the diff.
 figures:
 	UPDATE_FIGURES=1 $(CARGO) test --release --locked -p parallax-tests --test figures
+
+# Measures the tables of the documents again and prints what moved (docs/use/real-scenes.md):
+#   make reproduce SCENES=folder SCRIPTS="policies levels"
+reproduce: deps build
+	@OUT="$(OUT)" scripts/reproduce.sh "$(SCENES)" $(SCRIPTS)
 
 clean:
 	$(CARGO) clean
