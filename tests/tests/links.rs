@@ -158,3 +158,17 @@ fn documents_that_the_sources_name_exist() {
     }
     assert!(names > 20, "found {names} names of documents");
 }
+
+#[test]
+fn the_glossary_has_each_term_once_in_alphabetical_order() {
+    let text = fs::read_to_string(root().join("docs/glossary.md")).expect("the glossary");
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| "));
+    let terms: Vec<String> = rows
+        .filter_map(|row| Some(row.split_once(" | ")?.0.to_lowercase()))
+        .skip(1)
+        .filter(|term| !term.starts_with("---"))
+        .collect();
+    assert!(terms.len() > 50, "found {} terms", terms.len());
+    let wrong = terms.windows(2).find(|pair| pair[0] >= pair[1]);
+    assert!(wrong.is_none(), "expected alphabetical order: {wrong:?}");
+}
