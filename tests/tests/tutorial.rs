@@ -1,4 +1,4 @@
-//! The commands of `docs/use/tutorial.md` print what the page shows.
+//! The commands of the tutorial and of pages that go on with its trace print what the pages show.
 //!
 //! `UPDATE_FIGURES=1` replaces the lines of a block that differs by those of the output that are most like them; review the diff.
 
@@ -18,7 +18,7 @@ fn blocks(page: &str) -> Vec<Block<'_>> {
     fences.filter_map(|fence| fence.split_once('\n')).collect()
 }
 
-/// Standard error and output of a command line, in a folder.
+/// Standard output and error of a command line, in a folder.
 fn output(folder: &Path, line: &str) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
     let output = run_ok(
@@ -27,7 +27,7 @@ fn output(folder: &Path, line: &str) -> String {
             .current_dir(folder)
             .env("COLUMNS", "200"),
     );
-    [output.stderr, output.stdout]
+    [output.stdout, output.stderr]
         .map(|text| String::from_utf8(text).expect("text"))
         .concat()
 }
@@ -99,25 +99,23 @@ fn driver(trace: &Path) -> String {
     trace.tables().meta.driver.clone()
 }
 
-#[test]
-fn the_tutorial_shows_what_its_commands_print() {
-    let page = root().join("docs/use/tutorial.md");
-    let text = fs::read_to_string(&page).expect("the page");
-    let folder = tempfile::tempdir().expect("a temporary folder");
+/// Runs the commands of a page in `folder` and compares the blocks of text. False if another driver makes other captures.
+fn holds(page: &str, folder: &Path) -> bool {
+    let file = root().join(page);
+    let text = fs::read_to_string(&file).expect("the page");
     let is_command = |line: &&str| line.starts_with("tracegen ") || line.starts_with("replay ");
     let (mut printed, mut compared, mut new) = (String::new(), 0, text.clone());
     for (language, block) in blocks(&text) {
         match language {
-            "toml" => fs::write(folder.path().join("caches.toml"), block).expect("a file"),
+            "toml" => fs::write(folder.join("caches.toml"), block).expect("a file"),
             "sh" => {
                 for line in block.lines().filter(is_command) {
-                    printed = output(folder.path(), line);
-                    let trace = folder.path().join("atrium.textrace");
+                    printed = output(folder, line);
+                    let trace = folder.join("atrium.textrace");
                     if line.starts_with("tracegen raster")
                         && driver(&trace) != driver(&root().join("traces/atrium.textrace"))
                     {
-                        parallax_tests::skipped!("this driver's captures are not the tutorial's");
-                        return;
+                        return false;
                     }
                 }
             }
@@ -128,16 +126,29 @@ fn the_tutorial_shows_what_its_commands_print() {
                 };
                 assert!(
                     std::env::var_os("UPDATE_FIGURES").is_some(),
-                    "docs/use/tutorial.md: expected '{line}' in the output:\n{printed}"
+                    "{page}: expected '{line}' in the output:\n{printed}"
                 );
                 new = new.replace(block, &rewritten(block, &printed));
             }
-            other => panic!("docs/use/tutorial.md: a block of '{other}'"),
+            other => panic!("{page}: a block of '{other}'"),
         }
     }
-    assert!(compared > 6, "compared {compared} blocks");
+    assert!(compared > 0, "{page}: no block to compare");
     if new != text {
-        fs::write(&page, new).expect("the page");
+        fs::write(&file, new).expect("the page");
+    }
+    true
+}
+
+#[test]
+fn pages_show_what_their_commands_print() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    // The first page makes the trace of the others.
+    for page in ["docs/use/tutorial.md", "docs/use/breakdowns.md"] {
+        if !holds(page, folder.path()) {
+            parallax_tests::skipped!("this driver's captures are not those of {page}");
+            return;
+        }
     }
 }
 
