@@ -16,24 +16,25 @@ use toml::{Table, Value};
 const INTRODUCTION: &str = "\
 # Configuration of a replay
 
-`replay run --config FILE` reads the keys below as TOML; flags win over the file, and what neither says
-is the Z2 paper's machine. `replay run --print-config` prints the whole configuration. An unknown key is
-refused. Sizes (`size_bytes`) are numbers of bytes or texts such as `\"16KiB\"`; the number of sets is a power of two,
-and all caches of a level together have at most 2^24 lines.
+This page lists every key of a machine and of an experiment file. It is for users of `--config`, `replay sweep` and `--print-config`. It is made from the source; a test compares it.
+
+`replay run --config FILE` reads the keys as TOML. Flags override the file, and the file overrides the defaults, which are the Z2 paper's
+machine. `replay run --print-config` prints the whole configuration. Unknown keys are refused. Sizes (`size_bytes`) are numbers of bytes or
+texts such as `\"16KiB\"`. The number of sets is a power of two, and all caches of a level together have at most 2^24 lines.
 
     order = \"z2-sta\"
     l1.size_bytes = \"16KiB\"          # a key of one level: l1 to l6
     l3.size_bytes = \"4MiB\"           # a level that is added
     l3.line_bytes = 64
 
-Levels are a list of two to six `[[level]]` tables, the L1 first; such a list in a file replaces the levels of the default
-machine, while `l1.KEY` changes one key of one level.
+Levels are a list of two to six `[[level]]` tables, the L1 first. Such a list in a file replaces the default levels;
+`l1.KEY` changes one key of one level.
 
 ## Experiment files
 
 `replay sweep FILE` replays every point of an experiment:
 
-    traces = [\"crytek.textrace\"]      # beside the file; the command line's traces win
+    traces = [\"crytek.textrace\"]      # beside the file; the command line's traces replace them
     [base]                            # any key below
     mode = \"functional\"
     [axes]                            # crossed with one another
@@ -42,9 +43,9 @@ machine, while `l1.KEY` changes one key of one level.
     [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
     layout.block_order = [\"morton\", \"tiled\"]
 
-At most 100000 points; a point that no machine can have is refused before any is replayed. A sweep that was
-stopped goes on where it stopped: each point's result is a row of a file under `points/` in the output folder.
-[many-machines.md](many-machines.md) tells how to split one over machines.
+A sweep has at most 100000 points. An impossible point is refused before any is replayed. A sweep that was stopped continues
+where it stopped: each point's result is a row of a file under `points/` in the output folder.
+[many-machines.md](many-machines.md) shows how to split a sweep over machines.
 
 ## Keys
 ";

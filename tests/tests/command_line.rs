@@ -1,6 +1,7 @@
 //! What the programs say: versions, completions, manuals, messages.
 
 use parallax_tests::{program, refuse, root, run_ok};
+use std::collections::BTreeSet;
 use std::process::Command;
 
 const PROGRAMS: [&str; 2] = ["tracegen", "replay"];
@@ -22,6 +23,26 @@ fn subcommands(name: &str) -> Vec<String> {
         .collect();
     assert!(names.len() >= 5, "{names:?}");
     names
+}
+
+/// Commands of a program that the page of commands names: the word after the program's in `code`.
+fn commands_of_the_page(page: &str, name: &str) -> BTreeSet<String> {
+    let codes = page.split('`').skip(1).step_by(2);
+    let of_program = codes.filter_map(|code| code.strip_prefix(name)?.strip_prefix(' '));
+    of_program
+        .filter_map(|rest| rest.split_whitespace().next())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn the_page_of_commands_lists_those_of_both_programs_and_no_other() {
+    let page = root().join("docs/use/commands.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    for name in PROGRAMS {
+        let expected: BTreeSet<String> = subcommands(name).into_iter().collect();
+        assert_eq!(commands_of_the_page(&page, name), expected, "{name}");
+    }
 }
 
 #[test]

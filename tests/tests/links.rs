@@ -120,7 +120,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
             if !name.starts_with('.') && !name.starts_with("target") && name != "out" {
                 sources(&path, found);
             }
-        } else if [".rs", ".sh", ".py", ".toml", ".csv"]
+        } else if [".rs", ".wgsl", ".sh", ".py", ".toml", ".csv"]
             .iter()
             .any(|end| name.ends_with(end))
         {
@@ -157,4 +157,46 @@ fn documents_that_the_sources_name_exist() {
         }
     }
     assert!(names > 20, "found {names} names of documents");
+}
+
+#[test]
+fn the_glossary_has_each_term_once_in_alphabetical_order() {
+    let text = fs::read_to_string(root().join("docs/glossary.md")).expect("the glossary");
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| "));
+    let terms: Vec<String> = rows
+        .filter_map(|row| Some(row.split_once(" | ")?.0.to_lowercase()))
+        .skip(1)
+        .filter(|term| !term.starts_with("---"))
+        .collect();
+    assert!(terms.len() > 50, "found {} terms", terms.len());
+    let wrong = terms.windows(2).find(|pair| pair[0] >= pair[1]);
+    assert!(wrong.is_none(), "expected alphabetical order: {wrong:?}");
+}
+
+#[test]
+fn source_files_that_the_documents_name_exist() {
+    let mut files = Vec::new();
+    sources(&root(), &mut files);
+    let (mut names, mut faults) = (0, Vec::new());
+    for page in documents() {
+        let text = prose(&fs::read_to_string(&page).expect("a document"));
+        for code in text.split('`').skip(1).step_by(2) {
+            let is_path = code
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || "/-_.".contains(c));
+            let is_source = [".rs", ".wgsl", ".py", ".sh"]
+                .iter()
+                .any(|end| code.ends_with(end));
+            // `order/NAME.rs` is a file that the reader writes.
+            if !is_path || !is_source || code.contains("NAME") {
+                continue;
+            }
+            names += 1;
+            if !files.iter().any(|file| file.ends_with(code)) {
+                faults.push(format!("{}: no file {code}", page.display()));
+            }
+        }
+    }
+    assert!(names > 50, "found {names} names of source files");
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }

@@ -35,6 +35,7 @@ const VIEWS: &[(&str, &str, View)] = &[
         paper_comparison::shadow_maps,
     ),
     ("sweep-shards", "sweep-shards", shards::table),
+    ("z2-table2", "paper-savings", paper_comparison::table_2),
 ];
 
 const BEGIN: &str = "<!-- figures: ";
