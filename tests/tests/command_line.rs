@@ -171,7 +171,7 @@ fn flags_that_say_nothing_about_what_is_converted_are_refused() {
         ),
         (
             "--to u32 --compress zstd -o a.gz",
-            "--compress zstd: expected gzip, which the name a.gz asks for",
+            "--compress zstd: expected gzip, because the output is named a.gz",
         ),
         (
             "--to textrace --compress gzip -o a",
