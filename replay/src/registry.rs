@@ -19,6 +19,9 @@ pub trait Row: fmt::Debug + Sized + 'static {
     fn names() -> &'static [&'static str];
 }
 
+/// Least Jaro-Winkler similarity of a suggestion.
+const LEAST_SIMILARITY: f64 = 0.8;
+
 /// A reference to a row, serialized as its name.
 #[derive(Debug)]
 pub struct Named<R: 'static>(&'static R);
@@ -38,6 +41,15 @@ impl<R: Row> Named<R> {
     #[must_use]
     pub fn find(name: &str) -> Option<Self> {
         Self::all().find(|row| row.name() == name)
+    }
+
+    /// The row whose name is most similar to a mistyped one, if any is similar.
+    #[must_use]
+    pub fn similar(name: &str) -> Option<Self> {
+        let similarity = |row: &Self| strsim::jaro_winkler(row.name(), &name.to_lowercase());
+        Self::all()
+            .filter(|row| similarity(row) > LEAST_SIMILARITY)
+            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
     }
 
     /// Name in configurations, results and flags.

@@ -56,14 +56,41 @@ pub fn run<C: Parser>(
     }
 }
 
-/// The command line of a program with the footer, for its help and its manual.
+/// The command line of a program, for its help and its manual: with the footer, and with short help that fits on a screen.
 pub(crate) fn command<C: CommandFactory>() -> clap::Command {
-    let command = C::command();
+    let mut command = C::command();
+    let names: Vec<String> = (command.get_subcommands())
+        .map(|subcommand| subcommand.get_name().to_owned())
+        .collect();
+    for name in names {
+        command = command.mut_subcommand(name, |subcommand| {
+            let text = subcommand.get_after_help().map(ToString::to_string);
+            match text {
+                Some(text) => subcommand
+                    .after_help(shortened(&text))
+                    .after_long_help(text),
+                None => subcommand,
+            }
+        });
+    }
     let examples = command.get_after_help().map(ToString::to_string);
     command.after_help(examples.map_or_else(
         || FOOTER.to_owned(),
         |examples| format!("{examples}\n\n{FOOTER}"),
     ))
+}
+
+/// The text after a subcommand's options as `-h` shows it: with at most two examples.
+fn shortened(text: &str) -> String {
+    let mut lines: Vec<&str> = text.lines().collect();
+    if let Some(heading) = lines.iter().position(|line| *line == "Examples:") {
+        lines.truncate(heading + 3);
+    }
+    // An example of several lines is left out if it would be cut.
+    while lines.last().is_some_and(|line| line.ends_with('\\')) {
+        lines.pop();
+    }
+    lines.join("\n")
 }
 
 fn parse<C: Parser>() -> C {
@@ -123,5 +150,14 @@ mod tests {
             text("key ways: expected 3, found 4"),
             "a.toml: key ways: expected 3, found 4"
         );
+    }
+
+    #[test]
+    fn short_help_has_two_whole_examples() {
+        assert_eq!(shortened("Exit code: 0."), "Exit code: 0.");
+        let text = "Note.\n\nExamples:\n  a\n  b\n  c";
+        assert_eq!(shortened(text), "Note.\n\nExamples:\n  a\n  b");
+        let text = "Examples:\n  a\n  b \\\n    --flag\n  c";
+        assert_eq!(shortened(text), "Examples:\n  a");
     }
 }

@@ -43,10 +43,15 @@ pub struct AddressInput {
     #[arg(long, value_name = "FILE")]
     addresses: Option<PathBuf>,
     /// Form of the addresses [default: from the name (.u32, .u64, .din, .gem5) or the content]
-    #[arg(long, value_name = "FORM")]
+    #[arg(long, value_name = "FORM", hide_short_help = true)]
     address_form: Option<FormName>,
     /// Kinds of accesses that the caches process [default: all]
-    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "KINDS",
+        value_delimiter = ',',
+        hide_short_help = true
+    )]
     kinds: Option<Vec<KindName>>,
 }
 
@@ -151,11 +156,12 @@ pub struct AddressArgs {
     #[arg(
         long,
         value_name = "L1/L2,...",
-        conflicts_with_all = ["l1", "l2"]
+        conflicts_with_all = ["l1", "l2"],
+        hide_short_help = true
     )]
     caches: Option<String>,
     /// Print CSV, one row per configuration
-    #[arg(long, conflicts_with = "json")]
+    #[arg(long, conflicts_with = "json", hide_short_help = true)]
     csv: bool,
 }
 

@@ -36,16 +36,26 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     /// Also count by tile (in the JSON)
-    #[arg(long, requires = "json", conflicts_with = "addresses")]
+    #[arg(
+        long,
+        requires = "json",
+        conflicts_with = "addresses",
+        hide_short_help = true
+    )]
     tiles: bool,
     /// Also write which tiles each core renders over time, for ui.perfetto.dev (timed mode)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["addresses", "compare_modes", "print_config"])]
     timeline: Option<PathBuf>,
     /// Rendered picture; colour compression is computed from its tiles (with --frame, tile-based machines)
-    #[arg(long, value_name = "FILE", conflicts_with = "addresses")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with = "addresses",
+        hide_short_help = true
+    )]
     picture: Option<PathBuf>,
     /// Replay in both modes and print the difference
-    #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"])]
+    #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"], hide_short_help = true)]
     compare_modes: bool,
     /// Print the whole configuration as TOML and stop
     #[arg(long, conflicts_with_all = ["json", "compare_modes", "addresses"])]
