@@ -290,7 +290,7 @@ fn the_page_of_keys_matches_the_code() {
     let found = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         found == page,
-        "docs/use/configuration.md is not what the code reads; UPDATE_DOCS=1 rewrites it"
+        "docs/use/configuration.md differs from the code; UPDATE_DOCS=1 rewrites it"
     );
 }
 

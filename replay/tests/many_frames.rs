@@ -1,5 +1,6 @@
-//! Measures the memory of long traces. `FRAMES=300 cargo test --release -p replay --test many_frames --
-//! --nocapture` also prints the time per frame; `TEXTRACE` names a trace whose first frame is repeated.
+//! Measures the memory of long traces.
+//! `FRAMES=300 cargo test --release -p replay --test many_frames -- --nocapture` also prints the time per
+//! frame; `TEXTRACE` names a trace whose first frame is repeated.
 
 use formats::textrace::{Pass, Tables, Textrace, TextraceWriter, Tile};
 use formats::view::FrameViews;

@@ -128,7 +128,7 @@ fn an_unwritable_log_is_ignored_and_an_unwritable_result_is_an_error() {
         command
     };
     let told = run_ok(&mut run(&["run"]));
-    assert!(!told.stderr.is_empty(), "it tells of the run");
+    assert!(!told.stderr.is_empty(), "it prints figures about the run");
     let untold = run_ok(run(&["run"]).stderr(full()));
     assert_eq!(untold.stdout, told.stdout);
     for arguments in [&["run", "no-such"][..], &["run", "--no\u{7}-such"]] {

@@ -134,8 +134,8 @@ pub struct Probes {
 }
 
 impl Probes {
-    /// Offset of a probe from the lane's coordinates, in fixed point rounded to nearest: `i / (N + 1) -
-    /// 1/2` of the axis, with i from 1 to N.
+    /// Offset of a probe from the lane's coordinates, in fixed point rounded to nearest:
+    /// `i / (N + 1) - 1/2` of the axis, with i from 1 to N.
     #[must_use]
     pub fn offset(&self, probe: u32) -> [i32; 2] {
         let parts = i64::from(self.count) + 1;

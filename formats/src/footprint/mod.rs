@@ -85,8 +85,9 @@ pub fn select_levels(lod: f32, sampler: &Sampler, levels: u32) -> LevelSelection
     }
 }
 
-/// Left (or upper) texel of a fetch along one axis, before wrapping: `floor(coordinate * size / (SUBTEXELS
-/// * extent) - 0.5)` for a linear filter, without the half texel for a nearest one. The result is exact.
+/// Left (or upper) texel of a fetch along one axis, before wrapping:
+/// `floor(coordinate * size / (SUBTEXELS * extent) - 0.5)` for a linear filter, without the half texel for
+/// a nearest one. The result is exact.
 #[must_use]
 pub fn texel_before_wrap(coordinate: i32, size: u32, extent: u32, filter: Filter) -> i64 {
     let unit = i64::from(SUBTEXELS) * i64::from(extent);

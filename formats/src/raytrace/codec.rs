@@ -363,7 +363,7 @@ fn decode_ray<'a>(
         _ => input.number_u32("an alpha-test count")?,
     };
     if head & HAS_ALPHA_TESTS != 0 && alpha_tests == 0 {
-        return Err(at.fault("alpha tests where the flag says so", 0));
+        return Err(at.fault("alpha tests, as the flag requires", 0));
     }
     Ok(RayRecord {
         kind,

@@ -57,7 +57,7 @@ impl IndexEntry {
             ensure(
                 input,
                 (span, records, runs) == Default::default(),
-                || "an untouched tile's entry to be zero but for its encoding".to_owned(),
+                || "an untouched tile's entry to be zero except its encoding".to_owned(),
                 format_args!(
                     "{} bytes at {}, {records} records, {runs} runs",
                     span.bytes, span.offset

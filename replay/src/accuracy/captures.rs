@@ -1,5 +1,5 @@
-//! Error from the limited precision of captures: compares each capture with the reference of `tracegen
-//! verify --write-reference`.
+//! Error from the limited precision of captures: compares each capture with the reference of
+//! `tracegen verify --write-reference`.
 
 use super::headline::TEXTURE_FIGURES;
 use super::inputs::Inputs;

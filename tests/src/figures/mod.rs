@@ -1,8 +1,8 @@
 //! Tables in documents, generated from results files.
 //!
 //! A results file is `results/NAME.csv`: comment lines starting with `# command:` name the commands that
-//! made it; a header and rows follow. A table in a document is between `<!-- figures: NAME -->` and `<!--
-//! end -->`. It shows the results file as it is, or as converted by a row of [`VIEWS`].
+//! made it; a header and rows follow. A table in a document is between `<!-- figures: NAME -->` and
+//! `<!-- end -->`. It shows the results file as it is, or as converted by a row of [`VIEWS`].
 
 mod paper_comparison;
 mod reprojection;

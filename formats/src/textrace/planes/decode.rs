@@ -70,7 +70,7 @@ impl<'a> Decoder<'a> {
             let bits = self.front.peek().ok_or(SHORT)?;
             let count = u32::try_from(from_one(power, bits)).unwrap_or(u32::MAX);
             if count > records - first {
-                return Err("a run of no more records than the index tells");
+                return Err("a run of no more records than in the index");
             }
             tile.runs.push(PrimitiveRun {
                 primitive,
@@ -87,7 +87,7 @@ impl<'a> Decoder<'a> {
             next_primitive = u64::from(primitive) + 1;
         }
         if first != records {
-            return Err("runs of as many records as the index tells");
+            return Err("runs of as many records as in the index");
         }
         Ok(())
     }

@@ -196,8 +196,8 @@ pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f32; 2]) -> [i32; 2] {
     [of(dx_u, dy_u), of(dx_v, dy_v)]
 }
 
-/// Estimates the tilt from a quad's numbers, close to the expected one. cross is `-(dx * q + dy * p) / (1 +
-/// p + q)` for u and for v, so this is least squares with a prior.
+/// Estimates the tilt from a quad's numbers, close to the expected one. cross is
+/// `-(dx * q + dy * p) / (1 + p + q)` for u and for v, so this is least squares with a prior.
 #[inline(always)]
 pub(super) fn tilt_of(quad: &Quad, expected: [f32; 2]) -> [f32; 2] {
     let [_, dx, dy, cross] = quad.map(|pair| Vec2::from_array(floats(pair)));

@@ -1,6 +1,7 @@
-//! Computes the code lengths. `TEXTRACES=a.textrace:b.textrace cargo test --release -p formats --lib
-//! planes::train -- --ignored --nocapture` counts symbols in traces and prints `lengths.rs` for them, and
-//! the bits of a record by purpose. It repeats this `ROUNDS` times and uses every `EVERY`th tile.
+//! Computes the code lengths.
+//! `TEXTRACES=a.textrace:b.textrace cargo test --release -p formats --lib planes::train -- --ignored --nocapture`
+//! counts symbols in traces and prints `lengths.rs` for them, and the bits of a record by purpose. It
+//! repeats this `ROUNDS` times and uses every `EVERY`th tile.
 #![allow(
     clippy::indexing_slicing,
     clippy::cast_possible_truncation,

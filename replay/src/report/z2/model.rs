@@ -74,8 +74,8 @@ impl Row for Average {
     }
 }
 
-/// Deviation of the utilisation from the surface of the paper's table, on the machine of `--preset
-/// z2-paper`, which counts rates as the paper does.
+/// Deviation of the utilisation from the surface of the paper's table, on the machine of
+/// `--preset z2-paper`, which counts rates as the paper does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Deviation {
     /// Mean absolute deviation, points.
