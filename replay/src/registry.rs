@@ -19,8 +19,18 @@ pub trait Row: fmt::Debug + Sized + 'static {
     fn names() -> &'static [&'static str];
 }
 
-/// Least Jaro-Winkler similarity of a suggestion.
-const LEAST_SIMILARITY: f64 = 0.8;
+/// The name most similar to a mistyped one, if any is similar.
+#[must_use]
+pub fn most_similar<'n>(typed: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
+    /// Jaro-Winkler similarity of a suggestion.
+    const LEAST_SIMILARITY: f64 = 0.8;
+    let typed = typed.to_lowercase();
+    names
+        .map(|name| (strsim::jaro_winkler(name, &typed), name))
+        .filter(|(similarity, _)| *similarity > LEAST_SIMILARITY)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
+}
 
 /// A reference to a row, serialized as its name.
 #[derive(Debug)]
@@ -46,10 +56,7 @@ impl<R: Row> Named<R> {
     /// The row whose name is most similar to a mistyped one, if any is similar.
     #[must_use]
     pub fn similar(name: &str) -> Option<Self> {
-        let similarity = |row: &Self| strsim::jaro_winkler(row.name(), &name.to_lowercase());
-        Self::all()
-            .filter(|row| similarity(row) > LEAST_SIMILARITY)
-            .max_by(|a, b| similarity(a).total_cmp(&similarity(b)))
+        most_similar(name, R::names().iter().copied()).and_then(Self::find)
     }
 
     /// Name in configurations, results and flags.

@@ -8,6 +8,7 @@ use crate::config::{
 use crate::experiment::parse_config;
 use crate::memory::dram::DramPreset;
 use crate::preset::Preset;
+use crate::registry::most_similar;
 use crate::size::parse_bytes;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -18,7 +19,15 @@ use std::path::{Path, PathBuf};
 
 /// Parses an enum of the formats crate by its serialised name.
 fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
-    T::deserialize(text.into_deserializer()).map_err(|e: ValueError| e.to_string())
+    T::deserialize(text.into_deserializer()).map_err(|error: ValueError| {
+        let message = error.to_string();
+        // "unknown variant `x`, expected one of `a`, `b`"
+        let names = message.split('`').skip(3).step_by(2);
+        match most_similar(text, names) {
+            Some(name) => format!("{message}; did you mean `{name}`?"),
+            None => message,
+        }
+    })
 }
 
 /// Flags of the replay configuration.
@@ -356,5 +365,21 @@ impl ConfigArgs {
         set(&mut config.tmu.fetches_per_trip, self.fetches_per_trip);
         set(&mut config.tmu.allocation, self.allocation);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mistyped_value_comes_with_a_suggestion() {
+        let error = named::<LodFormula>("llvmpip").unwrap_err();
+        assert!(error.ends_with("; did you mean `llvmpipe`?"), "{error}");
+        assert!(
+            !named::<LodFormula>("other")
+                .unwrap_err()
+                .contains("did you mean")
+        );
     }
 }
