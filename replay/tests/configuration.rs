@@ -1,5 +1,5 @@
-//! `docs/use/configuration.md` says what the code reads: keys, defaults, values and what they mean come
-//! from the types themselves. `UPDATE_DOCS=1` rewrites the page; review the diff.
+//! Compares `docs/use/configuration.md` with the code. Keys, defaults, values and their meanings come from
+//! the types. `UPDATE_DOCS=1` rewrites the page; review the diff.
 
 use clap::ValueEnum;
 use replay::config::{
@@ -62,7 +62,7 @@ struct Item {
     line: String,
 }
 
-/// The items of `pub struct name` or `pub enum name`, wherever it stands in the sources.
+/// The items of `pub struct name` or `pub enum name`, searched in all sources.
 fn items(sources: &str, name: &str) -> Vec<Item> {
     let head = ["struct", "enum"].map(|kind| format!("pub {kind} {name} {{\n"));
     let start = head.iter().find_map(|h| Some(sources.find(h)? + h.len()));
@@ -103,7 +103,7 @@ fn kebab(variant: &str) -> String {
     out
 }
 
-/// Names and meanings of the values that a type takes; nothing for numbers and flags.
+/// Names and meanings of a type's values; empty for numbers and flags.
 fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
     fn of<T: ValueEnum>() -> Vec<(String, String)> {
         let variants = T::value_variants().iter();
@@ -145,7 +145,7 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
     }
 }
 
-/// The default configuration, with a prefetcher, an L3 and a DRAM below the caches and all clients of memory.
+/// The default configuration, with a prefetcher, an L3, DRAM and all memory clients.
 fn defaults() -> Table {
     let config = RunConfig {
         prefetch: Some(PrefetchConfig::default()),
@@ -174,7 +174,7 @@ fn with(key: &str, value: Value) -> Result<RunConfig, String> {
     table.try_into().map_err(|e: toml::de::Error| e.to_string())
 }
 
-/// What is accepted for a number, in the words of the refusal of one that is not.
+/// The accepted range of a number, from the error for a value outside it.
 fn range(key: &str) -> Option<String> {
     [-1_000_000, 0, 3, 4_000_000_000]
         .into_iter()
@@ -216,7 +216,7 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             describe(sources, "LevelConfig", &format!("{key}."), inner, page);
             continue;
         }
-        // Keys that the written default leaves out.
+        // Keys that the serialised default omits.
         let left_out = match &*key {
             "hsr" => Value::try_from(Hsr::default()).ok(),
             "between_frames" => Value::try_from(BetweenFrames::default()).ok(),
@@ -282,7 +282,7 @@ fn page() -> String {
 }
 
 #[test]
-fn the_page_of_keys_is_what_the_code_reads() {
+fn the_page_of_keys_matches_the_code() {
     let path = root().join("docs/use/configuration.md");
     let page = page();
     if std::env::var_os("UPDATE_DOCS").is_some() {
@@ -291,12 +291,12 @@ fn the_page_of_keys_is_what_the_code_reads() {
     let found = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         found == page,
-        "docs/use/configuration.md is not what the code reads; UPDATE_DOCS=1 rewrites it"
+        "docs/use/configuration.md differs from the code; UPDATE_DOCS=1 rewrites it"
     );
 }
 
 #[test]
-fn every_key_has_a_line_that_says_what_it_is() {
+fn every_key_has_a_line_with_its_meaning() {
     fn count(table: &Table) -> usize {
         let inner = |value: &Value| match value {
             Value::Array(tables) => tables[0].as_table().map_or(1, count),
@@ -309,7 +309,7 @@ fn every_key_has_a_line_that_says_what_it_is() {
         .lines()
         .filter(|line| line.starts_with("| `"))
         .collect();
-    // Three keys have no default, and thirteen are written where they are another.
+    // Three keys have no default, and for thirteen the default is listed elsewhere.
     let written = count(&defaults());
     assert_eq!(keys.len(), written + 16);
     for line in keys {

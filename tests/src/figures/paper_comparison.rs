@@ -62,7 +62,7 @@ pub fn table_2(results: &Results) -> String {
     markdown(&headings, rows)
 }
 
-/// Crytek Sponza with eyes 500 mm apart beside the paper.
+/// Crytek Sponza with eyes 500 mm apart, compared with the paper.
 pub fn crytek_500mm(results: &Results) -> String {
     let headings = [
         "caches",
@@ -152,7 +152,8 @@ pub fn shadow_maps(results: &Results) -> String {
     markdown(&headings, ours.chain(published))
 }
 
-/// Distance from the paper's table by eyes and bias, for the scene that chooses and those held out.
+/// Distance from the paper's table by eye distance and bias, for the scene used for choosing and for the
+/// held-out scenes.
 pub fn calibration(results: &Results) -> String {
     let headings = [
         "eyes, mm",
@@ -166,7 +167,7 @@ pub fn calibration(results: &Results) -> String {
     let columns: Vec<(String, &str)> = (models.iter())
         .flat_map(|model| ["chooses", "held out"].map(|role| (model.clone(), role)))
         .collect();
-    // Of several scenes held out: the root of the mean square, as the calibration pools them.
+    // Over several held-out scenes: the root mean square, as in the calibration.
     let distance = |ipd: &str, bias: &str, (model, role): &(String, &str)| {
         let of = results.rows.iter().filter(|row| {
             row["model"] == *model
