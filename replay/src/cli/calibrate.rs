@@ -44,13 +44,13 @@ pub struct Args {
     /// Folder for results; a repeated search reads them and continues
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Print one JSON object (schema replay.calibration/1)
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// Runs the subcommand.

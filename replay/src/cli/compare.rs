@@ -31,13 +31,13 @@ pub struct Args {
     /// Orders for the replays of both, comma-separated, or `all`
     #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
     orders: String,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Print one JSON object (schema replay.compare/1)
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// Runs the subcommand.

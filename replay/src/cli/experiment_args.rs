@@ -21,8 +21,6 @@ pub struct ExperimentArgs {
     /// Texture traces
     #[arg(required = true, value_name = "TRACE")]
     traces: Vec<PathBuf>,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Orders to compare, comma-separated, or `all`
     #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
     orders: String,
@@ -41,6 +39,8 @@ pub struct ExperimentArgs {
     images: Vec<String>,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 impl ExperimentArgs {

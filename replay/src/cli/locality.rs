@@ -35,10 +35,6 @@ pub struct Args {
         conflicts_with = "addresses"
     )]
     traces: Vec<PathBuf>,
-    #[command(flatten)]
-    addresses: AddressInput,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Orders to compare, comma-separated, or `all` [default: morton,z2-lrta,z2-sta,z2-sta-merge]
     #[arg(long, value_name = "ORDERS", conflicts_with = "addresses")]
     orders: Option<String>,
@@ -56,6 +52,10 @@ pub struct Args {
     html: Option<PathBuf>,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    addresses: AddressInput,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// Runs the subcommand.

@@ -20,8 +20,6 @@ use std::process::ExitCode;
   replay paper mine.textrace --as crytek-sponza --html out/report.html
   replay paper a.textrace --preset z2-paper --json")]
 pub struct Args {
-    #[command(flatten)]
-    experiment: ExperimentArgs,
     /// Also replay in functional mode and show the difference
     #[arg(long)]
     functional: bool,
@@ -36,6 +34,8 @@ pub struct Args {
     /// Also write the report page, and JSON and CSV files with the same numbers
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    #[command(flatten)]
+    experiment: ExperimentArgs,
 }
 
 /// Runs the subcommand. Exit code 1 if the orders replayed different accesses.

@@ -14,13 +14,13 @@ use std::process::ExitCode;
   replay report crytek.textrace --image crytek-sponza=crytek.png -o out/report.html
   replay report *.textrace --orders all -o out/report.html")]
 pub struct Args {
-    #[command(flatten)]
-    experiment: ExperimentArgs,
     /// Page to write; JSON and CSV files with the same numbers are written next to it
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
     parquet: ParquetArg,
+    #[command(flatten)]
+    experiment: ExperimentArgs,
 }
 
 /// Runs the subcommand. Exit code 1 if the orders replayed different accesses.

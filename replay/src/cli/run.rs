@@ -28,10 +28,6 @@ pub struct Args {
     /// Texture trace; optional with --addresses and --print-config
     #[arg(required_unless_present_any = ["print_config", "addresses"], conflicts_with = "addresses")]
     trace: Option<PathBuf>,
-    #[command(flatten)]
-    machine: ConfigArgs,
-    #[command(flatten)]
-    addresses: AddressArgs,
     /// Print one JSON object (schema replay.run/1, or replay.addresses/1)
     #[arg(long)]
     json: bool,
@@ -62,6 +58,10 @@ pub struct Args {
     print_config: bool,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    addresses: AddressArgs,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// All outputs of the command, including standard output.

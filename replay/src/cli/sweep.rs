@@ -37,13 +37,13 @@ pub struct Args {
     /// Print the points and stop; with --json also their keys, their costs and which are done
     #[arg(long, conflicts_with_all = ["emit_slurm", "merge_only"])]
     plan: bool,
-    #[command(flatten)]
-    shards: ShardArgs,
     /// Replay nothing: merge the rows that shards have written, or list the missing ones
     #[arg(long, conflicts_with_all = ["shard", "emit_slurm"], help_heading = "Many machines")]
     merge_only: bool,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    shards: ShardArgs,
 }
 
 impl Args {

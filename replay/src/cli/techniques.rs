@@ -32,8 +32,6 @@ pub struct Args {
     /// Folders that `tracegen techniques` wrote
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Orders to replay with and without each technique, comma-separated, or `all`
     #[arg(
         long,
@@ -54,6 +52,8 @@ pub struct Args {
     html: Option<PathBuf>,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// Runs the subcommand.
