@@ -200,3 +200,34 @@ fn source_files_that_the_documents_name_exist() {
     assert!(names > 50, "found {names} names of source files");
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
+
+/// Text with every run of white space as one space.
+fn words(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn code_that_the_documents_quote_is_in_the_sources() {
+    let mut files = Vec::new();
+    sources(&root(), &mut files);
+    let texts: Vec<String> = (files.iter())
+        .filter_map(|file| Some(words(&fs::read_to_string(file).ok()?)))
+        .collect();
+    let mut quoted = 0;
+    for page in documents() {
+        let text = fs::read_to_string(&page).expect("a document");
+        let fences = text.split("```").skip(1).step_by(2);
+        for block in fences.filter_map(|fence| fence.strip_prefix("rust\n")) {
+            for part in block.split("\n\n") {
+                let part = words(part);
+                quoted += 1;
+                assert!(
+                    texts.iter().any(|text| text.contains(&part)),
+                    "{}: no source file has: {part}",
+                    page.display()
+                );
+            }
+        }
+    }
+    assert!(quoted > 4, "found {quoted} quotes");
+}
