@@ -1,5 +1,6 @@
 //! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
 
+mod between_frames;
 mod caches;
 mod lower_levels;
 mod prefetch;
@@ -12,6 +13,7 @@ use thiserror::Error;
 
 pub use crate::cache::Replacement;
 pub use crate::order::Order;
+pub use between_frames::BetweenFrames;
 pub use caches::{CacheConfig, Inclusion};
 use formats::footprint::MOST_ANISOTROPY;
 pub use formats::footprint::{
@@ -84,25 +86,6 @@ pub enum Hsr {
 }
 
 impl Hsr {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
-/// What becomes of the caches between the frames of a trace.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum BetweenFrames {
-    /// They keep their lines, so that a frame finds what the one before has left.
-    #[default]
-    Keep,
-    /// They are emptied, as where other work runs between two frames.
-    Flush,
-}
-
-impl BetweenFrames {
     fn is_default(&self) -> bool {
         *self == Self::default()
     }
@@ -346,6 +329,12 @@ impl RunConfig {
             "1 to 16",
             self.sampling.max_anisotropy.to_string(),
         )?;
+        range(
+            self.between_frames.lost_percent().is_none() || !self.has_levels_beside_two(),
+            "between_frames",
+            "keep or flush with further levels, prefetchers, and levels that depend on what others evict",
+            self.between_frames.to_string(),
+        )?;
         let dram = self.dram.as_ref().map_or(Ok(()), DramConfig::check);
         let dram = dram.map_err(|(key, expected, found)| (key, expected, u64::from(found)));
         let frame = self.frame.as_ref().map_or(Ok(()), FrameConfig::check);
@@ -375,6 +364,17 @@ impl RunConfig {
     pub fn levels_depend_on_evictions(&self) -> bool {
         let mut levels = self.level.iter().map(|level| level.inclusion);
         !self.l2.inclusion.is_none() || levels.any(|inclusion| !inclusion.is_none())
+    }
+
+    /// True where more is simulated than L1 caches, an L2 and DRAM.
+    fn has_levels_beside_two(&self) -> bool {
+        !self.level.is_empty() || self.prefetch.is_some() || self.levels_depend_on_evictions()
+    }
+
+    /// How work items are given to cores: as the order says, else as the configuration does.
+    #[must_use]
+    pub fn dispatch(&self) -> Assign {
+        self.order.dispatch(self.assign)
     }
 
     /// True where the misses of the L2 go to further levels or to DRAM.

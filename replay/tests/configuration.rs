@@ -40,6 +40,7 @@ and all caches of a level together have at most 2^24 lines.
     [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
     layout.block_order = [\"morton\", \"tiled\"]
 
+`order` takes the names below, and orders of parts as in `\"strip8+sta+offset+boustro\"` ([orders.md](orders.md)).
 A number in a key is an index into a list of tables: `level.0.size_bytes = [\"1MiB\", \"4MiB\"]` varies the L3, and adds one where `[base]` has none.
 
 At most 100000 points; a point that no machine can have is refused before any is replayed. A sweep that was
@@ -122,18 +123,19 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
         "Allocation" => of::<Allocation>(),
         "Assign" => of::<Assign>(),
         "Hsr" => of::<Hsr>(),
-        "BetweenFrames" => of::<BetweenFrames>(),
         "CountBy" => of::<CountBy>(),
         "Inclusion" => of::<Inclusion>(),
         "DramPreset" => of::<DramPreset>(),
         "Mapping" => of::<Mapping>(),
         "PagePolicy" => of::<PagePolicy>(),
         "FrameMachine" => of::<FrameMachine>(),
-        "FilterOverride" | "LodFormula" | "AnisotropyModel" | "BlockOrder" | "TextureOrder"
-        | "TexelFormat" => {
+        "BetweenFrames" | "FilterOverride" | "LodFormula" | "AnisotropyModel" | "BlockOrder"
+        | "TextureOrder" | "TexelFormat" => {
             let name = |item: &Item| {
                 let variant = item.line.split([' ', ',']).next().unwrap();
-                item.renamed.clone().unwrap_or_else(|| kebab(variant))
+                let number = variant.split_once('(');
+                let name = number.map_or_else(|| kebab(variant), |(name, _)| kebab(name) + "-N");
+                item.renamed.clone().unwrap_or(name)
             };
             let items = items(sources, type_name);
             items.iter().map(|i| (name(i), i.about.clone())).collect()
@@ -234,7 +236,7 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
         };
         let values = values(sources, kind);
         for (value, _) in &values {
-            let read = with(&key, Value::String(value.clone()));
+            let read = with(&key, Value::String(value.replace("-N", "-50")));
             assert!(read.is_ok(), "{key} = {value}: {read:?}");
         }
         let range = range(&key).map_or_else(String::new, |r| format!(" Accepted: {r}."));
@@ -250,6 +252,7 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
 fn page() -> String {
     let sources: String = [
         "replay/src/config.rs",
+        "replay/src/config/between_frames.rs",
         "replay/src/config/caches.rs",
         "replay/src/config/lower_levels.rs",
         "replay/src/config/prefetch.rs",

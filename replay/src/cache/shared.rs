@@ -9,6 +9,7 @@ use super::{Cache, EMPTY};
 use crate::config::{ConfigError, PrefetchConfig, RunConfig};
 use crate::result::{MshrResult, PrefetchResult, Timeline};
 use std::collections::HashSet;
+use std::ops::Range;
 
 /// What a configuration has beside and below the L2.
 pub struct MissPath {
@@ -286,6 +287,15 @@ impl<D: DelayedFill> SharedLevel<D> {
         self.cache.clear();
         self.clear_path();
     }
+
+    /// Other work fetches lines of its own, which are there `now`.
+    pub fn fill_with(&mut self, lines: Range<u32>, now: u64) {
+        for line in lines {
+            if !self.cache.holds(line, now) {
+                self.cache.enter(line, now, now);
+            }
+        }
+    }
 }
 
 /// Where time does not pass: what is fetched is there at once.
@@ -334,6 +344,13 @@ impl<C: Cache> SharedLevel<C> {
     pub fn empty(&mut self) {
         self.cache.clear();
         self.clear_path();
+    }
+
+    /// Other work fetches lines of its own.
+    pub fn fill_with_at_once(&mut self, lines: Range<u32>) {
+        for line in lines {
+            self.cache.access(line);
+        }
     }
 }
 

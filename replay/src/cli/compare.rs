@@ -1,7 +1,7 @@
 //! `replay compare`: how two captures of the same views differ, and what that does to the caches.
 
 use super::ConfigArgs;
-use super::experiment_args::parse_orders;
+use super::order_arg::parse_orders;
 use super::subjects::Traces;
 use crate::compare::compare;
 use crate::config::Order;

@@ -1,5 +1,6 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
+use super::order_arg::OrderParser;
 use crate::config::{
     Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, CountBy, FilterOverride, Hsr,
     LodFormula, Mode, Order, Prefetching, Replacement, RunConfig, TextureOrder,
@@ -30,8 +31,8 @@ pub struct ConfigArgs {
     /// Machine by name in place of the defaults; flags win over it
     #[arg(long, conflicts_with = "config")]
     preset: Option<Preset>,
-    /// Tile order
-    #[arg(long)]
+    /// Tile order by name, or its parts as in zig-zag+sta+offset+boustro (docs/orders.md)
+    #[arg(long, value_parser = OrderParser)]
     order: Option<Order>,
     /// Cycle model, or footprints without latencies
     #[arg(long)]
@@ -79,8 +80,9 @@ pub struct ConfigArgs {
     /// Hidden-surface removal
     #[arg(long)]
     hsr: Option<Hsr>,
-    /// The caches between the frames of a trace
-    #[arg(long)]
+    /// The caches between the frames of a trace: keep, flush, or lose-N, where other work empties the L1 caches and
+    /// takes N percent of the L2
+    #[arg(long, value_name = "CACHES", value_parser = str::parse::<BetweenFrames>)]
     between_frames: Option<BetweenFrames>,
 
     /// Prefetcher of the L2, of its usual number of lines unless `[prefetch]` of --config says otherwise

@@ -1,8 +1,9 @@
 //! Arguments that `replay paper` and `replay report` share: what to vary, and what to write.
 
 use super::ConfigArgs;
+use super::order_arg::parse_orders;
 use super::subjects::Traces;
-use crate::config::{Mode, Order, RunConfig};
+use crate::config::{Mode, RunConfig};
 use crate::experiment::{self, Plan, Subject};
 use crate::files::{self, write_atomically};
 use crate::paper::{self, z2};
@@ -193,31 +194,6 @@ pub fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> 
     write_atomically(path, page.as_bytes())
 }
 
-/// Orders by name, comma-separated, or `all`.
-///
-/// # Errors
-/// A name that no order has.
-pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
-    if text == "all" {
-        let others = Order::all().filter(|o| !z2::ORDERS.contains(o));
-        return Ok(z2::ORDERS.into_iter().chain(others).collect());
-    }
-    let mut orders = Vec::new();
-    for name in text.split(',').map(str::trim) {
-        let Some(order) = Order::find(name) else {
-            let known: Vec<&str> = Order::all().map(|o| o.name()).collect();
-            bail!(
-                "--orders: expected `all` or some of {}, found `{name}`",
-                known.join(", ")
-            );
-        };
-        if !orders.contains(&order) {
-            orders.push(order);
-        }
-    }
-    Ok(orders)
-}
-
 /// L1 and L2 sizes in bytes, from KiB as in `8/128,16/256`.
 ///
 /// # Errors
@@ -248,25 +224,6 @@ pub fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn all_orders_begin_with_the_papers() {
-        let orders = parse_orders("all").unwrap();
-        assert_eq!(orders[..3], z2::ORDERS);
-        assert_eq!(orders.len(), Order::all().len());
-    }
-
-    #[test]
-    fn an_unknown_order_is_named_with_the_known_ones() {
-        let known: Vec<&str> = Order::all().map(Order::name).collect();
-        assert_eq!(
-            parse_orders("morton,spiral").unwrap_err().to_string(),
-            format!(
-                "--orders: expected `all` or some of {}, found `spiral`",
-                known.join(", ")
-            )
-        );
-    }
 
     #[test]
     fn cache_sizes_are_in_kib() {

@@ -11,6 +11,7 @@ pub mod dump;
 mod experiment_args;
 pub mod info;
 mod locality;
+mod order_arg;
 mod paper;
 mod parquet_arg;
 mod report;

@@ -290,8 +290,17 @@ fn stream_key(config: &RunConfig) -> RunConfig {
 fn pass_key(config: &RunConfig) -> RunConfig {
     const ANY: CacheConfig = CacheConfig::lru(0);
     RunConfig {
+        // Where the L2's size decides the order, its number stands in the name.
+        order: config.order.resolved(config.l2.size_bytes),
         l1: ANY,
-        l2: ANY,
+        // Caches of several associativities share stacks, which other work that fills part of each would fill differently.
+        l2: CacheConfig {
+            ways: match config.between_frames.lost_percent() {
+                Some(_) => config.l2.ways,
+                None => ANY.ways,
+            },
+            ..ANY
+        },
         tmu: TmuConfig::default(),
         tile_maps: false,
         frame: None,

@@ -1,8 +1,8 @@
 //! Caches without latencies, of any policy: a miss fills at once.
 
-use super::Machine;
 use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
+use super::{Machine, OtherWork};
 use crate::cache::{Cache, Levels, MissPath, SharedLevel};
 use crate::config::{Assign, RunConfig};
 use crate::order::Phase;
@@ -91,6 +91,11 @@ impl<C: Cache> Machine for Functional<C> {
     fn flush(&mut self) {
         self.l1.iter_mut().for_each(Cache::clear);
         self.l2.empty();
+    }
+
+    fn lose(&mut self, other: OtherWork, l2_lines: u64) {
+        self.l1.iter_mut().for_each(Cache::clear);
+        self.l2.fill_with_at_once(other.lines(l2_lines));
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {

@@ -20,6 +20,7 @@ use crate::config::{Assign, ConfigError, RunConfig};
 use crate::order::Phase;
 use crate::result::{FirstLookups, RunResult};
 use crate::stream::{Cores, LineMemory, StreamError, TileSource};
+use std::ops::Range;
 use std::sync::Mutex;
 use thiserror::Error;
 
@@ -50,6 +51,44 @@ pub fn replay(trace: &dyn TileSource, config: &RunConfig) -> Result<RunResult, R
     Ok(answer.into_inner().unwrap_or_default())
 }
 
+/// Work between two frames that is not the trace's.
+#[derive(Clone, Copy, Debug)]
+struct OtherWork {
+    /// Percent of the L2's lines that it takes.
+    percent: u8,
+    /// Its first line.
+    first: u32,
+}
+
+impl OtherWork {
+    /// Lines from here on are no texture's.
+    const FIRST: u32 = 0xe000_0000;
+
+    /// Refuses address spaces that reach its lines.
+    fn check(lines: u64) -> Result<(), StreamError> {
+        if lines <= u64::from(Self::FIRST) {
+            return Ok(());
+        }
+        Err(StreamError::Tables(format!(
+            "expected at most {} lines of textures where part of the L2 is lost between frames, found {lines}",
+            Self::FIRST
+        )))
+    }
+
+    /// The work after a frame, with other lines than after the frames before.
+    fn after(frame: usize, percent: u8) -> Self {
+        // No cache has more than 2^24 lines.
+        let first = Self::FIRST + ((frame as u32 % 16) << 24);
+        Self { percent, first }
+    }
+
+    /// The lines that it puts into a cache of so many.
+    fn lines(self, all: u64) -> Range<u32> {
+        let count = all * u64::from(self.percent) / 100;
+        self.first..self.first + (count as u32).min(1 << 24)
+    }
+}
+
 /// What runs the work of the cores: caches, with or without clocks, for one or more
 /// configurations.
 trait Machine: Send {
@@ -63,6 +102,9 @@ trait Machine: Send {
 
     /// Empties the caches, between frames.
     fn flush(&mut self);
+
+    /// Between frames, other work empties the L1 caches and takes part of the L2, which has so many lines.
+    fn lose(&mut self, other: OtherWork, l2_lines: u64);
 
     /// What was counted for one of its configurations.
     fn outcome(&self, config: &RunConfig) -> batch::Outcome;

@@ -3,11 +3,11 @@
 //! lines are there. A miss takes its way when it is requested. A line that is evicted in flight still arrives, and look-ups until then
 //! are merged with its fetch.
 
-use super::Machine;
 use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
 use super::first_miss::Thread;
 use super::items::{Items, prefetch_upcoming};
+use super::{Machine, OtherWork};
 use crate::cache::{Answer, Delay, DelayedFill, Levels, MissPath, NOT_IN_FLIGHT, SharedLevel};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
@@ -179,6 +179,11 @@ impl<D: DelayedFill> Machine for PrefetchFifo<D> {
     fn flush(&mut self) {
         self.l1.iter_mut().for_each(D::clear);
         self.l2.clear();
+    }
+
+    fn lose(&mut self, other: OtherWork, l2_lines: u64) {
+        self.l1.iter_mut().for_each(D::clear);
+        self.l2.fill_with(other.lines(l2_lines), self.cycles);
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {

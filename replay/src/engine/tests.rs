@@ -4,9 +4,10 @@ use super::summary::summary;
 use super::*;
 use crate::cache::{AnyCache, Levels, MissPath};
 use crate::config::{BetweenFrames, CacheConfig, CountBy, Mode, Order, Replacement};
-use crate::order::{self, WorkItem};
+use crate::order::{self, Known, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
+use crate::stream::testing::repeated;
 use crate::stream::{
     Bins, Consumer, Expander, LineSet, MemoryTrace, QuadLines, TraceCounts, interleave, testing,
 };
@@ -33,6 +34,18 @@ fn functional(order: Order) -> RunConfig {
         l2: CacheConfig::lru(8 << 10),
         ..RunConfig::default()
     }
+}
+
+/// Orders of parts, for machines at random.
+fn composed() -> impl Iterator<Item = Order> {
+    let names = [
+        "strip2+sta+offset",
+        "band2+halves+boustro",
+        "gilbert+merge+affinity",
+        "zig-zag+halves+infinity",
+        "scanline+lrta+quads",
+    ];
+    names.into_iter().map(|name| Order::find(name).unwrap())
 }
 
 /// LRU sets as plain lists, most recent last.
@@ -62,8 +75,9 @@ fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounter
     let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
     let mut seen = HashSet::new();
     let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
-    let order = config.order.build(config.seed);
-    for item in order::plan(&*order, &trace.tables.passes).iter().flatten() {
+    let known = Known::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &known, &trace.tables.passes);
+    for item in phases.iter().flatten() {
         let WorkItem::Tile(at) = item else {
             panic!("single-view orders only")
         };
@@ -365,9 +379,10 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let memory = LineMemory::new(1 << 30);
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
-    let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
+    let known = Known::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &known, &trace.tables.passes);
     let mut cores = Cores::new(&frame, config.cores as usize);
-    machine.run(&mut cores, &phases, config.assign).unwrap();
+    machine.run(&mut cores, &phases, config.dispatch()).unwrap();
     let outcome = machine.outcome(config);
     let (tmu, cycles) = (outcome.tmu, outcome.cycles);
     RunResult {
@@ -462,10 +477,11 @@ fn sent(trace: &MemoryTrace, config: &RunConfig) -> Vec<Sent> {
     );
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
-    let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
+    let known = Known::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &known, &trace.tables.passes);
     let mut recorder = Recorder::default();
     let mut cores = Cores::new(&frame, config.cores as usize);
-    interleave(&mut cores, &phases, config.assign, &mut recorder).unwrap();
+    interleave(&mut cores, &phases, config.dispatch(), &mut recorder).unwrap();
     recorder.sent
 }
 
@@ -549,18 +565,6 @@ mod plain_timed;
 mod prefetch_fifo;
 mod timeline;
 
-/// The same frame several times over.
-fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
-    let mut long = trace.clone();
-    for frame in 1..frames {
-        long.tiles.extend_from_slice(&trace.tiles);
-        let passes = trace.tables.passes.iter().cloned();
-        let passes = passes.map(|pass| formats::textrace::Pass { frame, ..pass });
-        long.tables.passes.extend(passes);
-    }
-    long
-}
-
 #[test]
 fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
     let (one, three) = (small(), repeated(&small(), 3));
@@ -601,6 +605,97 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             }
         }
     }
+}
+
+/// Part of the L2 is lost between frames, against plain lists: in a shared pass, alone, and with caches of other types.
+#[test]
+fn other_work_between_frames_takes_its_share_of_the_l2() {
+    let (one, three) = (small(), repeated(&small(), 3));
+    let mut of_size = Vec::new();
+    for (percent, l2_bytes, ways) in [
+        (1, 8, 4),
+        (30, 2, 4),
+        (50, 8, 2),
+        (75, 8, 4),
+        (100, 16, 4),
+        (50, 16, 8),
+    ] {
+        let mut config = RunConfig {
+            between_frames: BetweenFrames::Lose(percent),
+            ..functional(Order::Z2_STA)
+        };
+        config.l2.size_bytes = l2_bytes << 10;
+        config.l2.ways = ways;
+        let sent = sent(&one, &config);
+        let mut l2 = one_pass::Twin::new(&config.l2);
+        let mut misses = 0;
+        for frame in 0..3_u32 {
+            let mut l1 = [0, 1].map(|_| one_pass::Twin::new(&config.l1));
+            for (core, _, lines) in &sent {
+                let missing = lines.iter().filter(|line| !l1[*core].access(**line));
+                misses += missing.filter(|line| !l2.access(**line)).count() as u64;
+            }
+            let other = (l2_bytes << 10) / 16 * u64::from(percent) / 100;
+            (0..other as u32).for_each(|line| {
+                l2.access(0xf000_0000 + (frame << 20) + line);
+            });
+        }
+        of_size.push((config, misses));
+    }
+    let configs: Vec<RunConfig> = of_size.iter().map(|(config, _)| *config).collect();
+    let results = all(&three, &configs, 1 << 30);
+    for ((config, misses), result) in of_size.iter().zip(&results) {
+        assert_eq!(result.l2.counters.line_misses, *misses, "{config:?}");
+        assert_eq!(*result, replay(&three, config).unwrap());
+    }
+    // All of the L2 is what a flush takes; less of it is less, but for what time changes.
+    for mode in [
+        Mode::Functional,
+        Mode::Timed,
+        Mode::FirstMiss,
+        Mode::PrefetchFifo,
+    ] {
+        let misses = |between_frames, replacement| {
+            let mut config = RunConfig {
+                mode,
+                between_frames,
+                ..functional(Order::Z2_STA)
+            };
+            config.l2.replacement = replacement;
+            replay(&three, &config).unwrap().l2.counters.line_misses
+        };
+        for replacement in [Replacement::LRU, Replacement::FIFO] {
+            let shares = [
+                BetweenFrames::Keep,
+                BetweenFrames::Lose(25),
+                BetweenFrames::Lose(75),
+                BetweenFrames::Lose(100),
+            ];
+            let found = shares.map(|share| misses(share, replacement));
+            let is_sorted = mode != Mode::Functional || found.is_sorted();
+            assert!(is_sorted, "{replacement:?}: {found:?}");
+            let is_less = mode == Mode::FirstMiss || found[0] < found[3];
+            assert!(is_less, "{mode:?} {replacement:?}: {found:?}");
+            assert_eq!(
+                found[3],
+                misses(BetweenFrames::Flush, replacement),
+                "{mode:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_part_of_the_l2_is_not_lost_beside_further_levels() {
+    let mut config = functional(Order::MORTON);
+    config.between_frames = BetweenFrames::Lose(50);
+    config.validate().unwrap();
+    config.level.l3(1 << 20);
+    let error = config.validate().unwrap_err().to_string();
+    assert!(
+        error.starts_with("between_frames: expected keep or flush"),
+        "{error}"
+    );
 }
 
 /// Counts by draw add up to those by texture: each material of the trace has textures of its own.

@@ -3,13 +3,15 @@
 use super::batch::{Job, Pass};
 use super::scheduler::Stage;
 use super::summary::summary;
-use super::{Machine, ReplayError};
+use super::{Machine, OtherWork, ReplayError};
 use crate::cache::MissPathResult;
 use crate::config::{BetweenFrames, Mode, Order, RunConfig};
-use crate::order::{self, Phase};
+use crate::order::parts::Eyes;
+use crate::order::{self, Counters, Interleave, Known, Phase};
 use crate::result::RunResult;
 use crate::stream::{Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, rendered};
 use crate::whole_frame::traffic;
+use formats::textrace::TraceMeta;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -29,11 +31,17 @@ impl Wave<'_> {
         let rendered = rendered(self.job.trace, passes[0].config())?;
         let trace_passes = &rendered.tables().passes;
         let expander = expander_for(Expander::new(&rendered, passes[0].config())?, &passes);
+        let lost = |pass: &Pass<'_>| pass.config().between_frames.lost_percent();
+        if passes.iter().filter_map(lost).next().is_some() {
+            OtherWork::check(expander.lines())?;
+        }
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
         frames.sort_unstable();
         frames.dedup();
         let orders = Orders::of(&passes);
+        let meta = &rendered.tables().meta;
+        let mut counters = None;
         let mut ahead = None;
         for (index, &number) in frames.iter().enumerate() {
             let frame = match ahead.take() {
@@ -41,7 +49,11 @@ impl Wave<'_> {
                 None => expander.frame(number, self.memory, &mut counts)?,
             };
             (self.report_stage)(Stage::Loaded);
-            let plans = orders.plans(trace_passes, number);
+            let plans = orders.plans(trace_passes, number, meta, counters.as_ref());
+            if orders.need_counters() && index + 1 < frames.len() {
+                let known = Known::new(passes[0].config(), meta);
+                counters = Some(frame.counters(trace_passes, number, &known)?);
+            }
             let waiting = AtomicUsize::new(passes.len());
             let is_last = index + 1 == frames.len();
             let replay = |pass: &mut Pass<'_>, frame: &Frame<'_>| {
@@ -51,15 +63,22 @@ impl Wave<'_> {
                 let config = *pass.config();
                 let mut machine = match pass.machine.take() {
                     Some(mut machine) => {
-                        if config.between_frames == BetweenFrames::Flush {
-                            machine.flush();
+                        match config.between_frames {
+                            BetweenFrames::Keep => {}
+                            BetweenFrames::Flush => machine.flush(),
+                            BetweenFrames::Lose(percent) => {
+                                let bytes = config.l2.size_bytes;
+                                let lines = bytes / u64::from(config.line_bytes);
+                                machine.lose(OtherWork::after(index, percent), lines);
+                            }
                         }
                         machine
                     }
                     None => pass.build(&expander)?,
                 };
                 let mut cores = Cores::new(frame, config.cores as usize);
-                machine.run(&mut cores, orders.plan(&plans, &config), config.assign)?;
+                let plan = orders.plan(&plans, &config);
+                machine.run(&mut cores, plan, config.dispatch())?;
                 Ok::<_, ReplayError>(machine)
             };
             // The last pass frees the frame's memory, also while this thread is busy.
@@ -152,6 +171,9 @@ impl Wave<'_> {
 /// Lists what the passes read.
 fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a> {
     let at_once = |pass: &Pass<'_>| pass.config().tmu.misses_change_caches_at_once();
+    let in_halves =
+        |pass: &Pass<'_>| pass.config().order.parts().eyes == Eyes::OneCore(Interleave::Halves);
+    let expander = expander.in_halves(passes.iter().any(in_halves));
     match passes[0].config().mode {
         Mode::Functional => match passes.iter().map(Pass::least_sets).min() {
             Some(Some(sets)) => expander.without_idle_accesses(sets),
@@ -164,32 +186,53 @@ fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a>
     }
 }
 
-/// The orders of some passes, each once.
-struct Orders(Vec<(Order, u64)>);
+/// The orders of some passes, each once, with the configuration of the first pass that has it.
+struct Orders(Vec<RunConfig>);
 
 impl Orders {
+    /// What of a configuration a plan depends on.
+    fn key(config: &RunConfig) -> (Order, u64, u32) {
+        let order = config.order.resolved(config.l2.size_bytes);
+        (order, config.seed, config.cores)
+    }
+
     fn of(passes: &[Pass<'_>]) -> Self {
-        let mut orders = Vec::new();
+        let mut orders: Vec<RunConfig> = Vec::new();
         for pass in passes {
-            let order = (pass.config().order, pass.config().seed);
-            if !orders.contains(&order) {
-                orders.push(order);
+            let key = Self::key(pass.config());
+            if !orders.iter().any(|other| Self::key(other) == key) {
+                orders.push(*pass.config());
             }
         }
         Self(orders)
     }
 
+    fn need_counters(&self) -> bool {
+        let mut orders = self.0.iter();
+        orders.any(|config| config.order.parts().needs_counters())
+    }
+
     /// What each does with a frame.
-    fn plans(&self, trace_passes: &[formats::textrace::Pass], frame: u32) -> Vec<Vec<Phase>> {
-        let plan = |&(order, seed): &(Order, u64)| {
-            order::plan_frame(&*order.build(seed), trace_passes, frame)
+    fn plans(
+        &self,
+        trace_passes: &[formats::textrace::Pass],
+        frame: u32,
+        meta: &TraceMeta,
+        last: Option<&Counters>,
+    ) -> Vec<Vec<Phase>> {
+        let plan = |config: &RunConfig| {
+            let known = Known {
+                last,
+                ..Known::new(config, meta)
+            };
+            order::plan_frame(config.order, &known, trace_passes, frame)
         };
         self.0.par_iter().map(plan).collect()
     }
 
     fn plan<'p>(&self, plans: &'p [Vec<Phase>], config: &RunConfig) -> &'p [Phase] {
-        let order = (config.order, config.seed);
-        let index = self.0.iter().position(|other| *other == order);
+        let key = Self::key(config);
+        let index = self.0.iter().position(|other| Self::key(other) == key);
         index.map_or(&[], |index| &plans[index])
     }
 }

@@ -1,5 +1,8 @@
 //! Units of work: tiles, pairs of tiles, and the views that they belong to.
 
+use formats::textrace::{Pass, PassKind};
+use formats::view::TILE_SIZE_PX;
+
 /// A tile of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TileRef {
@@ -16,6 +19,8 @@ pub enum Interleave {
     Alternate,
     /// By primitive number, left first, so that the same triangle is adjacent.
     Merge,
+    /// The upper halves of both tiles in turn, then the lower halves: as much is in work as of one tile.
+    Halves,
 }
 
 /// What a core is given at a time.
@@ -45,9 +50,39 @@ pub struct View {
     pub pass: u32,
     /// Tile columns and rows.
     pub tiles: [u32; 2],
+    /// Width and height in pixels.
+    pub size_px: [u32; 2],
+    /// What it shows.
+    pub kind: PassKind,
+    /// Number of the layer.
+    pub layer: u16,
 }
 
 impl View {
+    /// The view of a pass.
+    #[must_use]
+    pub const fn of(index: u32, pass: &Pass) -> Self {
+        Self {
+            pass: index,
+            tiles: pass.tiles,
+            size_px: pass.size_px,
+            kind: pass.kind,
+            layer: pass.layer,
+        }
+    }
+
+    /// An eye's picture of so many whole tiles.
+    #[must_use]
+    pub const fn grid(pass: u32, tiles: [u32; 2]) -> Self {
+        Self {
+            pass,
+            tiles,
+            size_px: [tiles[0] * TILE_SIZE_PX, tiles[1] * TILE_SIZE_PX],
+            kind: PassKind::Main,
+            layer: 0,
+        }
+    }
+
     /// The tile at a column and row, if the grid has it.
     #[must_use]
     pub fn tile(&self, [x, y]: [u32; 2]) -> Option<TileRef> {

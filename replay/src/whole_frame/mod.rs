@@ -14,7 +14,7 @@ mod tests;
 
 use crate::config::RunConfig;
 use crate::memory::clients::{Client, ClientTraffic, FrameConfig, FrameMachine, GeometryCounts};
-use crate::order;
+use crate::order::{self, Known};
 use crate::stream::{StreamError, TileSource, shaded};
 use formats::textrace::PassKind;
 use formats::textrace::geometry::{Geometry, ViewTarget};
@@ -64,7 +64,8 @@ pub fn traffic(
     frames.dedup();
     for frame in frames {
         let views = shade(source, geometry, machine, frame, &mut traffic, &mut counts)?;
-        let phases = order::plan_frame(&*config.order.build(config.seed), passes, frame);
+        let known = Known::new(config, &source.tables().meta);
+        let phases = order::plan_frame(config.order, &known, passes, frame);
         let shaded = shaded(source, config.hsr)?;
         if machine.machine == FrameMachine::Immediate {
             pixels::render(&shaded, config, machine, frame, &phases, &mut traffic)?;

@@ -7,7 +7,7 @@ use crate::cache::{Lru, WaysOf};
 use crate::config::RunConfig;
 use crate::memory::clients::{Client, FrameConfig};
 use crate::order::{Interleave, Phase, TileRef, WorkItem};
-use crate::stream::{StreamError, TileSource, interleaved};
+use crate::stream::{ListEntry, Listed, StreamError, TileSource, interleaved};
 use formats::textrace::Tile;
 use formats::textrace::geometry::ViewTarget;
 
@@ -100,10 +100,12 @@ struct Tiles<'a> {
 impl Tiles<'_> {
     /// A core's work item of one tile or two.
     fn render(&mut self, core: usize, lists: [&List; 2], interleave: Option<Interleave>) {
+        // Lists are those of whole tiles: they are read for each half.
+        let times = 1 + u64::from(interleave == Some(Interleave::Halves));
         for list in lists {
             let bytes = list.primitives.len() as u64 * u64::from(self.machine.list_entry_bytes);
-            self.traffic
-                .read(Client::PrimitiveList, lines(bytes, self.machine));
+            let bytes = times * lines(bytes, self.machine);
+            self.traffic.read(Client::PrimitiveList, bytes);
         }
         let Some(interleave) = interleave else {
             for list in lists {
@@ -114,11 +116,17 @@ impl Tiles<'_> {
             return;
         };
         let mut order = Vec::new();
-        let [mut left, mut right] = lists.map(|list| list.primitives.iter().map(|entry| entry.0));
+        let [mut left, mut right] = lists.map(|list| {
+            let primitives = list.primitives.iter();
+            primitives.map(|&(primitive, _)| ListEntry {
+                primitive,
+                in_half: [true; 2],
+            })
+        });
         interleaved(interleave, [&mut left, &mut right], &mut order);
-        for (of, entry) in order {
-            let list = lists[usize::from(of)];
-            self.primitive(core, list.view, list.primitives[entry as usize]);
+        for Listed { tile, run, .. } in order {
+            let list = lists[usize::from(tile)];
+            self.primitive(core, list.view, list.primitives[run as usize]);
         }
     }
 

@@ -8,6 +8,7 @@ use crate::cache::{
 };
 use crate::config::TmuConfig;
 use crate::result::FirstLookups;
+use std::ops::Range;
 
 /// What a footprint finds in its core's own cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +83,12 @@ impl<D: DelayedFill> Memory<D> {
     pub fn flush(&mut self) {
         self.l1.iter_mut().for_each(D::clear);
         self.l2.clear();
+    }
+
+    /// Empties the L1 caches, and other work puts lines into the L2.
+    pub fn lose(&mut self, lines: Range<u32>, now: u64) {
+        self.l1.iter_mut().for_each(D::clear);
+        self.l2.fill_with(lines, now);
     }
 
     /// Looks up all lines of a footprint in the core's own cache. Doing so once more at the same

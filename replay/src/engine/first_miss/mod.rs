@@ -9,10 +9,10 @@
 mod memory;
 mod thread;
 
-use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
 use super::items::{Items, prefetch_upcoming};
+use super::{Machine, OtherWork};
 use crate::cache::{Delay, DelayedFill, Levels, MissPath};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
@@ -204,6 +204,10 @@ impl<D: DelayedFill> Machine for FirstMiss<D> {
 
     fn flush(&mut self) {
         self.memory.flush();
+    }
+
+    fn lose(&mut self, other: OtherWork, l2_lines: u64) {
+        self.memory.lose(other.lines(l2_lines), self.cycles);
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {

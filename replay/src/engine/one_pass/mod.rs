@@ -12,9 +12,9 @@ mod tally;
 
 use self::pending::{Pending, Under};
 use self::tally::{Access, ByTile, Level};
-use super::Machine;
 use super::batch::Outcome;
 use super::counts::{CacheCounts, CellMisses, TileMisses};
+use super::{Machine, OtherWork};
 use crate::cache::Forest;
 use crate::config::{Assign, CacheConfig, RunConfig};
 use crate::order::Phase;
@@ -181,6 +181,16 @@ impl Machine for OnePass {
     fn flush(&mut self) {
         self.forests.iter_mut().for_each(Forest::clear);
         self.under.iter_mut().for_each(|under| under.forest.clear());
+    }
+
+    fn lose(&mut self, other: OtherWork, _l2_lines: u64) {
+        self.forests.iter_mut().for_each(Forest::clear);
+        for under in &mut self.under {
+            for (tree, tally) in under.level.tallies.iter().enumerate() {
+                let lines = other.lines(u64::from(tally.sets) * u64::from(tally.depth()));
+                under.forest.access_tree(tree, lines, &mut Vec::new());
+            }
+        }
     }
 
     fn outcome(&self, config: &RunConfig) -> Outcome {

@@ -5,6 +5,7 @@
 use super::*;
 use crate::cache::{Cache, MissPathResult};
 use crate::config::{Allocation, Replacement, TmuConfig};
+use crate::engine::OtherWork;
 use crate::engine::counts::FootprintMisses;
 use crate::engine::timed::Timed;
 use crate::result::{MshrResult, TmuResult};
@@ -285,6 +286,10 @@ impl Machine for PlainTimed {
         Ok(())
     }
 
+    fn lose(&mut self, _other: OtherWork, _l2_lines: u64) {
+        unreachable!("not drawn");
+    }
+
     fn flush(&mut self) {
         self.mshrs.fill(0);
         for level in self.l1.iter_mut().chain([&mut self.l2]) {
@@ -333,7 +338,7 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
         .generate()
     });
     let mut random = Random(2);
-    let orders: Vec<Order> = Order::all().collect();
+    let orders: Vec<Order> = Order::all().chain(composed()).collect();
     let policies: Vec<Replacement> = Replacement::all().collect();
     let mut loops = 0;
     for step in 0..machines(200) {

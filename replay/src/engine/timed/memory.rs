@@ -101,6 +101,12 @@ impl<D: DelayedFill> Memory<D> {
         self.l2.clear();
     }
 
+    /// Empties the L1 caches, and other work puts lines into the L2.
+    pub fn lose(&mut self, lines: Range<u32>, now: u64) {
+        self.l1.iter_mut().for_each(|first| first.cache.clear());
+        self.l2.fill_with(lines, now);
+    }
+
     /// Looks up all lines of a thread that enters `now`, in its core's own cache. If some are
     /// neither there nor in flight, the caller must call [`Self::ask`].
     #[inline(always)]

@@ -5,10 +5,10 @@ mod asking;
 mod memory;
 mod timeline;
 
-use super::Machine;
 use super::batch::Outcome;
 use super::counts::CacheCounts;
 use super::items::{Items, prefetch_upcoming};
+use super::{Machine, OtherWork};
 use crate::cache::{Delay, DelayedFill, Levels, MissPath};
 use crate::config::{Assign, RunConfig, TmuConfig};
 use crate::order::{Phase, WorkItem};
@@ -138,6 +138,10 @@ impl<D: DelayedFill> Machine for Timed<D> {
 
     fn flush(&mut self) {
         self.memory.flush();
+    }
+
+    fn lose(&mut self, other: OtherWork, l2_lines: u64) {
+        self.memory.lose(other.lines(l2_lines), self.cycles);
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {

@@ -1,19 +1,29 @@
 //! Hilbert order: like Morton hierarchical, but every step goes to a neighbour.
 
-use super::TileOrder;
+use super::{Ground, Path};
+use crate::order::cost::Cost;
 
 /// Hilbert order. On a grid that is no power of two the curve of the next larger square is
 /// followed and what lies outside is skipped.
+#[derive(Debug)]
 pub struct Hilbert;
 
-impl TileOrder for Hilbert {
-    fn curve(&self, [columns, rows]: [u32; 2]) -> Vec<[u32; 2]> {
+impl Path for Hilbert {
+    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+        let [columns, rows] = ground.grid;
         let side = columns.max(rows).max(1).next_power_of_two();
-        let mut tiles: Vec<[u32; 2]> = (0..rows)
+        let mut cells: Vec<[u32; 2]> = (0..rows)
             .flat_map(|y| (0..columns).map(move |x| [x, y]))
             .collect();
-        tiles.sort_unstable_by_key(|&at| distance(side, at));
-        tiles
+        cells.sort_unstable_by_key(|&at| distance(side, at));
+        cells
+    }
+
+    /// A counter, whose bits are turned to column and row a level after another, and the cells outside are stepped
+    /// over as on the Morton curve.
+    fn cost(&self, grid: [u32; 2]) -> Cost {
+        let side = grid[0].max(grid[1]).max(1).next_power_of_two();
+        Cost::state(4).deciding_in(1 + 2 * side.ilog2())
     }
 }
 

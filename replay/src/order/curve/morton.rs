@@ -1,19 +1,29 @@
 //! Morton order (Z-order curve), the Z2 paper's baseline.
 
-use super::TileOrder;
+use super::{Ground, Path};
+use crate::order::cost::Cost;
 
 /// Morton order. On a grid that is no power of two the curve of the next larger square is
 /// followed and what lies outside is skipped.
+#[derive(Debug)]
 pub struct Morton;
 
-impl TileOrder for Morton {
-    fn curve(&self, [columns, rows]: [u32; 2]) -> Vec<[u32; 2]> {
-        let mut tiles: Vec<[u32; 2]> = (0..rows)
+impl Path for Morton {
+    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+        let [columns, rows] = ground.grid;
+        let mut cells: Vec<[u32; 2]> = (0..rows)
             .flat_map(|y| (0..columns).map(move |x| [x, y]))
             .collect();
         // Sorting by the code is the curve with the outside skipped, at no cost for long grids.
-        tiles.sort_unstable_by_key(|&[x, y]| spread(x) | spread(y) << 1);
-        tiles
+        cells.sort_unstable_by_key(|&[x, y]| spread(x) | spread(y) << 1);
+        cells
+    }
+
+    /// A counter whose even and odd bits are column and row. It steps over the cells outside of the grid, at worst
+    /// a quadrant with a step for each level.
+    fn cost(&self, grid: [u32; 2]) -> Cost {
+        let side = grid[0].max(grid[1]).max(1).next_power_of_two();
+        Cost::state(4).deciding_in(1 + side.ilog2())
     }
 }
 

@@ -1,0 +1,170 @@
+//! Which core takes which item.
+//!
+//! Two rules stand in the configuration: the core that becomes idle first takes the next item, or items go round. The
+//! others deal the items of a round, as many as there are cores, to the cores where each is best off.
+
+use super::cost::Cost;
+use super::{TileRef, WorkItem};
+use crate::config::Assign;
+
+/// A rule that an order may bring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Assignment {
+    /// The next item goes to the core that becomes idle first.
+    FirstIdle,
+    /// Round robin.
+    Static,
+    /// Of each round, an item goes to the core whose last tile lies nearest.
+    Affinity,
+    /// Cores have places on the screen, which are mirrored from group to group of tiles, so that tiles on both sides of a
+    /// group's edge are the same core's (as DTexL places quads, Joseph et al., MICRO 2022).
+    Quads,
+}
+
+impl Assignment {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::FirstIdle, Self::Static, Self::Affinity, Self::Quads];
+
+    /// Name in an order's name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::FirstIdle => "first-idle",
+            Self::Static => "static",
+            Self::Affinity => "affinity",
+            Self::Quads => "quads",
+        }
+    }
+
+    /// How the items, once dealt, are handed out.
+    #[must_use]
+    pub const fn dispatch(self) -> Assign {
+        match self {
+            Self::FirstIdle => Assign::FirstIdle,
+            Self::Static | Self::Affinity | Self::Quads => Assign::Static,
+        }
+    }
+
+    /// What hardware needs for it.
+    pub(super) fn cost(self, cores: u32) -> Cost {
+        match self {
+            Self::FirstIdle | Self::Static => Cost::state(0),
+            // Each core's last tile, and a comparison with each item of the round.
+            Self::Affinity => Cost::state(4 * cores)
+                .looking_ahead(cores)
+                .deciding_in(cores),
+            Self::Quads => Cost::state(0).looking_ahead(cores).deciding_in(1),
+        }
+    }
+
+    /// The items with those of each round in the order of their cores. `column_counts` has the tile columns of each pass.
+    pub(super) fn deal(
+        self,
+        items: Vec<WorkItem>,
+        cores: u32,
+        column_counts: &dyn Fn(u32) -> u32,
+    ) -> Vec<WorkItem> {
+        let cores = cores.max(1) as usize;
+        if cores == 1 || matches!(self, Self::FirstIdle | Self::Static) {
+            return items;
+        }
+        let place = |item: &WorkItem| {
+            let TileRef { pass, tile } = first_tile(item);
+            let columns = column_counts(pass).max(1);
+            [tile % columns, tile / columns]
+        };
+        let mut last: Vec<Option<[u32; 2]>> = vec![None; cores];
+        let mut dealt = Vec::with_capacity(items.len());
+        for round in items.chunks(cores) {
+            let places: Vec<[u32; 2]> = round.iter().map(place).collect();
+            let wish = |core: usize, [x, y]: [u32; 2]| -> u32 {
+                if self == Self::Quads {
+                    return u32::from(core_at([x, y], cores) != core);
+                }
+                last[core].map_or(u32::MAX / 2, |at| at[0].abs_diff(x) + at[1].abs_diff(y))
+            };
+            let mut choices: Vec<(u32, usize, usize)> = Vec::with_capacity(cores * cores);
+            for (item, &at) in places.iter().enumerate() {
+                choices.extend((0..round.len()).map(|core| (wish(core, at), item, core)));
+            }
+            choices.sort_unstable();
+            let mut item_of: Vec<Option<usize>> = vec![None; round.len()];
+            let mut is_dealt = vec![false; round.len()];
+            for (_, item, core) in choices {
+                if item_of[core].is_none() && !is_dealt[item] {
+                    (item_of[core], is_dealt[item]) = (Some(item), true);
+                }
+            }
+            for (core, item) in item_of.into_iter().enumerate() {
+                let Some(item) = item else { continue };
+                last[core] = Some(places[item]);
+                dealt.push(round[item]);
+            }
+        }
+        dealt
+    }
+}
+
+fn first_tile(item: &WorkItem) -> TileRef {
+    match *item {
+        WorkItem::Tile(tile) | WorkItem::Pair(tile, ..) => tile,
+    }
+}
+
+/// The core whose place on the screen has the tile: cores form a rectangle of nearly equal sides, mirrored at its edges.
+fn core_at([x, y]: [u32; 2], cores: usize) -> usize {
+    let rows = (1..=cores)
+        .rev()
+        .find(|rows| cores.is_multiple_of(*rows) && rows * rows <= cores)
+        .unwrap_or(1);
+    let columns = cores / rows;
+    let mirrored = |at: u32, count: usize| {
+        let at = at as usize % (2 * count);
+        at.min(2 * count - 1 - at)
+    };
+    mirrored(y, rows) * columns + mirrored(x, columns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COLUMNS: u32 = 8;
+
+    fn row(tiles: impl IntoIterator<Item = u32>) -> Vec<WorkItem> {
+        let tile = |tile| WorkItem::Tile(TileRef { pass: 0, tile });
+        tiles.into_iter().map(tile).collect()
+    }
+
+    fn dealt(assignment: Assignment, cores: u32, tiles: impl IntoIterator<Item = u32>) -> Vec<u32> {
+        let items = assignment.deal(row(tiles), cores, &|_| COLUMNS);
+        items.iter().map(|item| first_tile(item).tile).collect()
+    }
+
+    #[test]
+    fn both_sides_of_a_groups_edge_are_one_cores() {
+        // Cores 0 and 1 have columns 0, 3, 4, 7 and 1, 2, 5, 6.
+        assert_eq!(dealt(Assignment::Quads, 2, 0..8), [0, 1, 3, 2, 4, 5, 7, 6]);
+        let cores: Vec<usize> = (0..4).map(|x| core_at([x, 1], 4)).collect();
+        assert_eq!(cores, [2, 3, 3, 2]);
+        assert_eq!(core_at([0, 2], 4), 2);
+    }
+
+    #[test]
+    fn an_item_goes_to_the_core_whose_last_tile_is_nearest() {
+        // Core 0 had column 0, core 1 column 7.
+        assert_eq!(
+            dealt(Assignment::Affinity, 2, [0, 7, 6, 1, 5]),
+            [0, 7, 1, 6, 5]
+        );
+    }
+
+    #[test]
+    fn the_last_round_may_have_fewer_items_than_cores() {
+        for assignment in Assignment::ALL {
+            let mut dealt = dealt(assignment, 16, 0..37);
+            dealt.sort_unstable();
+            assert!(dealt.into_iter().eq(0..37), "{assignment:?}");
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Curves, one a file: in which order the cells of a grid are visited.
+//!
+//! A curve knows a grid of cells and nothing of eyes. A new one is a file with a `Path` and a row of the table.
+
+mod adaptive;
+mod band;
+mod generalised_hilbert;
+mod hilbert;
+mod morton;
+mod random;
+mod scanline;
+mod strip;
+mod zig_zag;
+
+pub(super) use random::shuffle;
+
+use super::cost::Cost;
+use crate::palette::{BLUE, GREEN, GREY, ORANGE, PURPLE, Rgb, SKY_BLUE, VERMILION, YELLOW};
+use crate::registry::{Named, registry};
+use adaptive::Adaptive;
+use band::Band;
+use generalised_hilbert::GeneralisedHilbert;
+use hilbert::Hilbert;
+use morton::Morton;
+use random::Random;
+use scanline::Scanline;
+use strip::Strip;
+use zig_zag::ZigZag;
+
+registry! { CurveRow:
+    // constant            name         colour     number that may follow the name           help                                                                     the path
+    SCANLINE =   row("scanline",  VERMILION, Size::NONE,                                 "Rows from left to right",                                               &Scanline);
+    ZIG_ZAG =    row("zig-zag",   PURPLE,    Size::NONE,                                 "Rows, every other one from right to left",                              &ZigZag);
+    MORTON =     row("morton",    ORANGE,    Size::NONE,                                 "Z-order curve of the next power of two",                                &Morton);
+    HILBERT =    row("hilbert",   YELLOW,    Size::NONE,                                 "Hilbert curve of the next power of two",                                &Hilbert);
+    GILBERT =    row("gilbert",   GREEN,     Size::NONE,                                 "Hilbert curve generalised to any grid",                                 &GeneralisedHilbert);
+    STRIP =      row("strip",     BLUE,      Size::new("columns", strip::columns),       "Vertical strips of N columns, rows to and fro; without N as wide as the L2 allows", &Strip);
+    BAND =       row("band",      SKY_BLUE,  Size::new("rows", |_| band::USUAL_ROWS),    "Horizontal bands of N rows, columns up and down; without N of 4",       &Band);
+    ADAPTIVE =   row("adaptive",  GREEN,     Size::new("KiB of L2", adaptive::l2_kib),   "Rows where the L2 holds one, else bands, by the lines that the last frame's rows had", &Adaptive);
+    RANDOM =     row("random",    GREY,      Size::NONE,                                 "Shuffled cells: the control",                                           &Random);
+    #[cfg(test)]
+    COLUMNS =    row("test-columns", GREY,   Size::NONE,                                 "Columns from the top",                                                  &super::tests::columns::Columns);
+}
+
+/// A curve by name.
+pub type Curve = Named<CurveRow>;
+
+/// A row of the table of curves.
+#[derive(Debug)]
+pub struct CurveRow {
+    name: &'static str,
+    color: Rgb,
+    size: Size,
+    help: &'static str,
+    path: &'static (dyn Path + Sync),
+}
+
+/// The number that may follow a curve's name.
+#[derive(Debug)]
+pub struct Size {
+    /// What it counts; empty for none.
+    unit: &'static str,
+    /// What it is where it is left out, by the size of the L2 in bytes.
+    usual: fn(u64) -> u32,
+}
+
+impl Size {
+    const NONE: Self = Self::new("", |_| 0);
+
+    const fn new(unit: &'static str, usual: fn(u64) -> u32) -> Self {
+        Self { unit, usual }
+    }
+}
+
+const fn row(
+    name: &'static str,
+    color: Rgb,
+    size: Size,
+    help: &'static str,
+    path: &'static (dyn Path + Sync),
+) -> CurveRow {
+    CurveRow {
+        name,
+        color,
+        size,
+        help,
+        path,
+    }
+}
+
+impl Curve {
+    /// Colour, the same in every plot.
+    #[must_use]
+    pub fn color(self) -> Rgb {
+        self.row().color
+    }
+
+    /// What the number behind the name counts; none for a curve without one.
+    #[must_use]
+    pub fn size_unit(self) -> Option<&'static str> {
+        Some(self.row().size.unit).filter(|unit| !unit.is_empty())
+    }
+
+    /// The number that is meant where it is left out.
+    #[must_use]
+    pub fn usual_size(self, l2_bytes: u64) -> u32 {
+        (self.row().size.usual)(l2_bytes)
+    }
+
+    /// The path itself.
+    #[must_use]
+    pub fn path(self) -> &'static dyn Path {
+        self.row().path
+    }
+}
+
+/// What a path is laid through.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ground<'a> {
+    /// Columns and rows of cells.
+    pub grid: [u32; 2],
+    /// The number behind the curve's name.
+    pub size: u32,
+    /// Seed of the random curve.
+    pub seed: u64,
+    /// Bytes of the lines of each row of cells in the last frame; none where nothing is known of it.
+    pub row_bytes: Option<&'a [u64]>,
+}
+
+/// A path through all cells of a grid.
+pub trait Path: std::fmt::Debug {
+    /// Columns and rows of the cells in the order of traversal: each exactly once.
+    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]>;
+
+    /// What hardware needs for it.
+    fn cost(&self, grid: [u32; 2]) -> Cost;
+}

@@ -1,0 +1,157 @@
+//! What a GPU can count by tile in a frame, for the orders of the next one.
+
+use super::expand::Work;
+use super::{Frame, StreamError, TileLines};
+use crate::order::{Counters, Known, PairCounters, TileRef, View, Views, views};
+use formats::textrace::Pass;
+
+/// Columns around the shift of infinity at which a row may be found to agree best.
+const SHIFTS: i32 = 8;
+
+/// What a tile has: its distinct lines and its primitives, both ascending.
+#[derive(Default)]
+struct Own {
+    lines: Vec<u32>,
+    primitives: Vec<u32>,
+}
+
+impl Own {
+    fn of(tile: &TileLines) -> Self {
+        // Where only distinct lines are listed, quad by quad.
+        let mut lines = match tile.lines.is_empty() {
+            true => tile.distinct.clone(),
+            false => tile.lines.clone(),
+        };
+        lines.sort_unstable();
+        lines.dedup();
+        let mut primitives: Vec<u32> = tile.list().map(|of| of.primitive).collect();
+        primitives.sort_unstable();
+        primitives.dedup();
+        Self { lines, primitives }
+    }
+}
+
+/// Members of two ascending lists without repeats that are in both.
+fn common(a: &[u32], b: &[u32]) -> u32 {
+    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
+    let mut count = 0;
+    while let (Some(x), Some(y)) = (a.peek(), b.peek()) {
+        let order = x.cmp(y);
+        count += u32::from(order.is_eq());
+        if order.is_le() {
+            a.next();
+        }
+        if order.is_ge() {
+            b.next();
+        }
+    }
+    count
+}
+
+impl Frame<'_> {
+    /// Counts the pairs of views of a frame.
+    ///
+    /// # Errors
+    /// A tile that cannot be read.
+    pub fn counters(
+        &self,
+        passes: &[Pass],
+        number: u32,
+        known: &Known<'_>,
+    ) -> Result<Counters, StreamError> {
+        let mut work = self.expander().work();
+        let mut pairs = Vec::new();
+        for phase in views(passes, number) {
+            if let Views::Pair(left, right) = phase {
+                pairs.push(self.count_pair([left, right], known, &mut work)?);
+            }
+        }
+        Ok(Counters { pairs })
+    }
+
+    fn count_pair(
+        &self,
+        eyes: [View; 2],
+        known: &Known<'_>,
+        work: &mut Work,
+    ) -> Result<PairCounters, StreamError> {
+        let offset = known.offset(eyes);
+        let rows = eyes[0].tiles[1];
+        let mut counted = PairCounters {
+            kind: eyes[0].kind,
+            layer: eyes[0].layer,
+            row_bytes: Vec::new(),
+            primitive_shift: Vec::new(),
+            line_shift: Vec::new(),
+        };
+        for y in 0..rows {
+            let other = y.checked_add_signed(-offset[1]);
+            let left = self.row(eyes[0], Some(y), work)?;
+            let right = self.row(eyes[1], other, work)?;
+            let at = |x: usize, shift: i32| right.get(x.checked_add_signed(-shift as isize)?);
+            let agreement = |shift: i32, of: fn(&Own) -> &[u32]| -> u32 {
+                let tiles = left.iter().enumerate();
+                let pairs = tiles.filter_map(|(x, own)| Some((own, at(x, shift)?)));
+                pairs.map(|(l, r)| common(of(l), of(r))).sum()
+            };
+            let best = |of: fn(&Own) -> &[u32]| {
+                let shifts = offset[0] - SHIFTS..=offset[0] + SHIFTS;
+                // Of equals the nearest to infinity, of two such the one of what is near.
+                shifts
+                    .max_by_key(|&shift| {
+                        let far = (shift - offset[0]).abs();
+                        (agreement(shift, of), -far, shift)
+                    })
+                    .unwrap_or(offset[0])
+            };
+            let sum = |row: &[Own]| row.iter().map(|own| own.lines.len() as u32).sum::<u32>();
+            let both = sum(&left) + sum(&right);
+            let lines = both - agreement(offset[0], |own| &own.lines);
+            let bytes = u64::from(lines) * u64::from(known.line_bytes);
+            counted.row_bytes.push(bytes);
+            counted.line_shift.push(best(|own| &own.lines));
+            counted.primitive_shift.push(best(|own| &own.primitives));
+        }
+        Ok(counted)
+    }
+
+    /// The tiles of a row, if there is one.
+    fn row(&self, view: View, y: Option<u32>, work: &mut Work) -> Result<Vec<Own>, StreamError> {
+        let Some(y) = y.filter(|&y| y < view.tiles[1]) else {
+            return Ok(Vec::new());
+        };
+        let mut row = Vec::with_capacity(view.tiles[0] as usize);
+        for x in 0..view.tiles[0] {
+            let at = TileRef {
+                pass: view.pass,
+                tile: y * view.tiles[0] + x,
+            };
+            row.push(match self.kept(at) {
+                Some(tile) => Own::of(tile),
+                None => {
+                    self.expander().expand(at, work)?;
+                    Own::of(&work.lines)
+                }
+            });
+        }
+        Ok(row)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::common;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    proptest! {
+        #[test]
+        fn members_of_both_lists_are_counted(
+            a in prop::collection::btree_set(0_u32..40, 0..30),
+            b in prop::collection::btree_set(0_u32..40, 0..30),
+        ) {
+            let list = |set: &BTreeSet<u32>| set.iter().copied().collect::<Vec<u32>>();
+            prop_assert_eq!(common(&list(&a), &list(&b)) as usize, a.intersection(&b).count());
+        }
+    }
+}
