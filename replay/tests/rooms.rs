@@ -22,7 +22,7 @@ const FLOORS: [&[&str]; 12] = [
     &["compare", "locality"],
     &["sgrt"],
     &["experiment"],
-    &["accuracy", "techniques"],
+    &["accuracy", "orders_study", "techniques"],
     &["report"],
     &["cli"],
 ];

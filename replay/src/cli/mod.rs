@@ -12,6 +12,7 @@ mod experiment_args;
 pub mod info;
 mod locality;
 mod order_arg;
+mod orders;
 mod paper;
 mod parquet_arg;
 mod report;
@@ -87,6 +88,8 @@ enum Command {
     Report(Box<report::Args>),
     /// Hold techniques of stereo rendering against each other: time, image error, caches.
     Techniques(Box<techniques::Args>),
+    /// Hold tile orders against each other and against bounds: bytes, hardware, how much is left.
+    Orders(Box<orders::Args>),
     /// Reuse distances, working sets, miss-ratio curves, OPT and the 3C split, order by order.
     Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
@@ -114,6 +117,7 @@ pub fn main() -> ExitCode {
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),
             Command::Techniques(args) => techniques::run(&args),
+            Command::Orders(args) => orders::run(&args),
             Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
             Command::Documents(documents) => documents.run::<Cli>(),

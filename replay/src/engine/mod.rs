@@ -53,7 +53,7 @@ pub fn replay(trace: &dyn TileSource, config: &RunConfig) -> Result<RunResult, R
 
 /// Work between two frames that is not the trace's.
 #[derive(Clone, Copy, Debug)]
-struct OtherWork {
+pub(crate) struct OtherWork {
     /// Percent of the L2's lines that it takes.
     percent: u8,
     /// Its first line.
@@ -65,7 +65,7 @@ impl OtherWork {
     const FIRST: u32 = 0xe000_0000;
 
     /// Refuses address spaces that reach its lines.
-    fn check(lines: u64) -> Result<(), StreamError> {
+    pub(crate) fn check(lines: u64) -> Result<(), StreamError> {
         if lines <= u64::from(Self::FIRST) {
             return Ok(());
         }
@@ -76,14 +76,14 @@ impl OtherWork {
     }
 
     /// The work after a frame, with other lines than after the frames before.
-    fn after(frame: usize, percent: u8) -> Self {
+    pub(crate) fn after(frame: usize, percent: u8) -> Self {
         // No cache has more than 2^24 lines.
         let first = Self::FIRST + ((frame as u32 % 16) << 24);
         Self { percent, first }
     }
 
     /// The lines that it puts into a cache of so many.
-    fn lines(self, all: u64) -> Range<u32> {
+    pub(crate) fn lines(self, all: u64) -> Range<u32> {
         let count = all * u64::from(self.percent) / 100;
         self.first..self.first + (count as u32).min(1 << 24)
     }

@@ -24,6 +24,7 @@ pub(super) fn order(parts: Parts) -> Order {
         color: parts.curve.color(),
         help: "",
         parts,
+        listed: None,
     }));
     named.push(row);
     Order::new(row)

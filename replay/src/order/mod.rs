@@ -11,12 +11,14 @@ pub mod cost;
 pub mod curve;
 mod directions;
 mod known;
+mod listed;
 pub mod pairing;
 pub mod parts;
 mod plan;
 mod work;
 
 pub use known::{Counters, Known, PairCounters};
+pub use listed::Listed;
 pub use plan::{Phase, Views, plan, plan_frame, views};
 pub use work::{Interleave, TileRef, View, WorkItem};
 
@@ -53,6 +55,8 @@ pub struct OrderRow {
     color: Rgb,
     help: &'static str,
     parts: Parts,
+    /// Where items of pairs of views do not follow from the parts.
+    listed: Option<&'static Listed>,
 }
 
 const fn row(
@@ -68,6 +72,7 @@ const fn row(
         color,
         help,
         parts,
+        listed: None,
     }
 }
 
@@ -130,7 +135,10 @@ impl Order {
     /// What hardware needs for views of `tiles`.
     #[must_use]
     pub fn cost(self, tiles: [u32; 2], cores: u32) -> Cost {
-        self.parts().cost(tiles, cores)
+        match self.row().listed {
+            Some(listed) => listed.cost(),
+            None => self.parts().cost(tiles, cores),
+        }
     }
 }
 

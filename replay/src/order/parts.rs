@@ -240,7 +240,8 @@ impl Parts {
     }
 
     /// Work of a stereo pair. A tile without a partner is an item of its own.
-    pub(super) fn stereo(&self, left: View, right: View, known: &Known<'_>) -> Vec<WorkItem> {
+    #[must_use]
+    pub fn stereo(&self, left: View, right: View, known: &Known<'_>) -> Vec<WorkItem> {
         if self.eyes == Eyes::ViewByView {
             return self.view_by_view(left, right, known);
         }

@@ -30,7 +30,10 @@ pub fn plan_frame(order: Order, known: &Known<'_>, passes: &[Pass], frame: u32) 
     let mut phases: Vec<Phase> = (views(passes, frame).into_iter())
         .map(|phase| match phase {
             Views::One(view) => parts.mono(view, known),
-            Views::Pair(left, right) => parts.stereo(left, right, known),
+            Views::Pair(left, right) => match order.listed_items(left) {
+                Some(items) => items.to_vec(),
+                None => parts.stereo(left, right, known),
+            },
         })
         .collect();
     if parts.direction == Direction::Boustro && !frame.is_multiple_of(2) {

@@ -1,0 +1,135 @@
+//! Better orders of one frame, found with its own accesses in hand.
+
+use super::anneal::anneal;
+use super::greedy::greedy;
+use super::items::Lru;
+use super::stream::lines_of_items;
+use super::{Items, OrderFile};
+use crate::config::{Order, RunConfig};
+use crate::engine::ReplayError;
+use crate::order::{self, Known, Phase, Views, WorkItem, views};
+use crate::stream::{Expander, LineMemory, TileSource, TraceCounts, rendered};
+use std::collections::HashMap;
+
+pub use super::anneal::Schedule;
+
+/// How to search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// Always what the cache holds the largest share of.
+    Greedy,
+    /// Annealing from the order that the search starts from.
+    Anneal(Schedule),
+}
+
+impl Method {
+    /// Name of what is found.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Greedy => "greedy",
+            Self::Anneal(_) => "anneal",
+        }
+    }
+}
+
+/// The items of one frame's pair of views, in the order of a search's start, and their lines.
+pub struct Ground {
+    items: Vec<WorkItem>,
+    lines: Items,
+    /// Items that lie next to each: right, left, below, above.
+    beside: Vec<[Option<u32>; 4]>,
+    config: RunConfig,
+}
+
+impl Ground {
+    /// Reads the items of an order's first pair of views of a frame; none where it has no such pair.
+    ///
+    /// # Errors
+    /// An impossible configuration, a trace that cannot be read.
+    pub fn new(
+        trace: &dyn TileSource,
+        start: Order,
+        frame: u32,
+        config: &RunConfig,
+    ) -> Result<Option<Self>, ReplayError> {
+        config.validate()?;
+        let rendered = rendered(trace, config)?;
+        let passes = &TileSource::tables(&rendered).passes;
+        let phases = views(passes, frame);
+        let Some(pair) = phases
+            .iter()
+            .position(|phase| matches!(phase, Views::Pair(..)))
+        else {
+            return Ok(None);
+        };
+        let known = Known::new(config, &trace.tables().meta);
+        let items: Phase = order::plan_frame(start, &known, passes, frame).swap_remove(pair);
+        let expander = Expander::new(&rendered, config)?;
+        let mut counts = TraceCounts::new(expander.bins());
+        let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+        let expanded = expander.frame(frame, &memory, &mut counts)?;
+        let lines = Items::new(&lines_of_items(&expanded, &items, config)?);
+        let place = |item: &WorkItem| {
+            let at = item.tiles().next()?;
+            let columns = passes.get(at.pass as usize)?.tiles[0];
+            Some((at.pass, at.tile % columns, at.tile / columns))
+        };
+        let places: Vec<_> = items.iter().map(place).collect();
+        let at: HashMap<_, u32> = places.iter().copied().zip(0..).collect();
+        let beside = |place: &Option<(u32, u32, u32)>| {
+            let (pass, x, y) = place.unwrap_or_default();
+            let neighbours = [(1, 0), (-1, 0), (0, 1), (0, -1)];
+            neighbours.map(|(dx, dy)| {
+                let to = (pass, x.checked_add_signed(dx)?, y.checked_add_signed(dy)?);
+                at.get(&Some(to)).copied()
+            })
+        };
+        let beside = places.iter().map(beside).collect();
+        Ok(Some(Self {
+            items,
+            lines,
+            beside,
+            config: *config,
+        }))
+    }
+
+    /// The items' lines.
+    #[must_use]
+    pub fn lines(&self) -> &Items {
+        &self.lines
+    }
+
+    /// Searches for an L2 of the configuration's ways and this size.
+    ///
+    /// # Errors
+    /// A size that no L2 can have.
+    pub fn search(
+        &self,
+        method: Method,
+        l2_bytes: u64,
+        trace: &str,
+    ) -> Result<OrderFile, ReplayError> {
+        let mut l2 = self.config.l2;
+        l2.size_bytes = l2_bytes;
+        let sets = l2.sets("L2", self.config.line_bytes)?;
+        let cache = Lru::new(&self.lines, sets, l2.ways);
+        let start: Vec<u32> = (0..self.items.len() as u32).collect();
+        let order = match method {
+            Method::Greedy => greedy(&self.lines, &cache, &start),
+            Method::Anneal(schedule) => {
+                let beside = |item: u32, side: usize| self.beside[item as usize][side % 4];
+                anneal(&self.lines, &cache, start, &schedule, &beside)
+            }
+        };
+        Ok(OrderFile {
+            trace: trace.to_owned(),
+            name: method.name().to_owned(),
+            l2_bytes,
+            items: order
+                .iter()
+                .map(|&item| self.items[item as usize])
+                .collect(),
+        })
+    }
+}
