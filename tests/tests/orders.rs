@@ -303,7 +303,9 @@ fn what_makes_no_sense_is_refused() {
     );
     refused(
         &["--search", "best"],
-        &["--search: expected greedy or anneal, found `best`"],
+        &[
+            "--search: expected greedy, greedy-N with a look-ahead of N items, or anneal, found `best`",
+        ],
     );
     refused(
         &["--between", "lose-50", "--l3", "4MiB"],

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Orders that a learner chooses from unless others are named.
-const LEARNER: &str = "zig-zag+sta+offset+boustro,strip+sta+offset+boustro,band4+sta+offset+boustro,band8+sta+offset+boustro";
+const LEARNER: &str = "adaptive+sta+offset+boustro,zig-zag+sta+offset+boustro,band4+sta+offset+boustro,band8+sta+offset+boustro";
 
 /// Arguments of `replay orders`.
 #[derive(Debug, clap::Args)]
@@ -49,7 +49,7 @@ pub struct Args {
     /// The caches between the frames of a trace, comma-separated: keep, flush, lose-N
     #[arg(long, value_name = "CACHES,...", default_value = "keep")]
     between: String,
-    /// Also search for orders of traces of one frame: greedy, anneal
+    /// Also search for orders of traces of one frame: greedy, greedy-N (with a look-ahead of N items), anneal
     #[arg(long, value_name = "METHODS")]
     search: Option<String>,
     /// Moves that annealing tries
@@ -170,11 +170,11 @@ fn study(args: &Args) -> Result<Study> {
         bounds: args.bounds,
     };
     for name in args.search.iter().flat_map(|names| names.split(',')) {
-        study.methods.push(match name.trim() {
-            "greedy" => Method::Greedy,
-            "anneal" => Method::Anneal(Schedule::new(args.moves, base.seed)),
-            other => bail!("--search: expected greedy or anneal, found `{other}`"),
-        });
+        let schedule = Schedule::new(args.moves, base.seed);
+        let method = Method::find(name.trim(), &schedule);
+        study.methods.push(method.with_context(|| {
+            format!("--search: expected greedy, greedy-N with a look-ahead of N items, or anneal, found `{name}`")
+        })?);
     }
     for &(l1_bytes, l2_bytes) in &study.caches_bytes {
         let mut config = base;

@@ -49,11 +49,16 @@ impl Wave<'_> {
                 None => expander.frame(number, self.memory, &mut counts)?,
             };
             (self.report_stage)(Stage::Loaded);
-            let plans = orders.plans(trace_passes, number, meta, counters.as_ref());
-            if orders.need_counters() && index + 1 < frames.len() {
-                let known = Known::new(passes[0].config(), meta);
-                counters = Some(frame.counters(trace_passes, number, &known)?);
-            }
+            let counted = match orders.need_counters() {
+                true => {
+                    let known = Known::new(passes[0].config(), meta);
+                    Some(frame.counters(trace_passes, number, &known)?)
+                }
+                false => None,
+            };
+            let last = counters.take().or_else(|| counted.clone());
+            let plans = orders.plans(trace_passes, number, meta, last.as_ref());
+            counters = counted;
             let waiting = AtomicUsize::new(passes.len());
             let is_last = index + 1 == frames.len();
             let replay = |pass: &mut Pass<'_>, frame: &Frame<'_>| {

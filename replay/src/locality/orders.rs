@@ -136,10 +136,18 @@ pub fn analyse(
         let mut analyses = analyses?;
         let mut finished: Vec<Option<OrderFigures>> = orders.iter().map(|_| None).collect();
         let need_counters = orders.iter().any(|order| order.parts().needs_counters());
-        let mut counters: Option<Counters> = None;
+        let mut last_counters: Option<Counters> = None;
         for &number in &frames {
             let frame = expander.frame(number, &memory, &mut counts)?;
             let last = frames.last() == Some(&number);
+            let counted = match need_counters {
+                true => {
+                    let known = Known::new(config, &trace.tables().meta);
+                    Some(frame.counters(passes, number, &known)?)
+                }
+                false => None,
+            };
+            let counters = last_counters.take().or_else(|| counted.clone());
             let run = |((&order, kept), finished): (
                 (&Order, &mut Option<Analysis>),
                 &mut Option<OrderFigures>,
@@ -175,10 +183,7 @@ pub fn analyse(
             };
             let orders = orders.par_iter().zip(&mut analyses).zip(&mut finished);
             orders.with_max_len(1).try_for_each(run)?;
-            if need_counters && !last {
-                let known = Known::new(config, &trace.tables().meta);
-                counters = Some(frame.counters(passes, number, &known)?);
-            }
+            last_counters = counted;
         }
         let empty = orders.iter().zip(analyses);
         for ((order, analysis), finished) in empty.zip(finished) {

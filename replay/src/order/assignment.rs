@@ -19,11 +19,22 @@ pub enum Assignment {
     /// Cores have places on the screen, which are mirrored from group to group of tiles, so that tiles on both sides of a
     /// group's edge are the same core's (as DTexL places quads, Joseph et al., MICRO 2022).
     Quads,
+    /// Each core takes four consecutive items, so that neighbours along the curve are mostly the same core's.
+    Runs,
 }
+
+/// Consecutive items of a core under [`Assignment::Runs`].
+const RUN: usize = 4;
 
 impl Assignment {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::FirstIdle, Self::Static, Self::Affinity, Self::Quads];
+    pub const ALL: [Self; 5] = [
+        Self::FirstIdle,
+        Self::Static,
+        Self::Affinity,
+        Self::Quads,
+        Self::Runs,
+    ];
 
     /// Name in an order's name.
     #[must_use]
@@ -33,6 +44,7 @@ impl Assignment {
             Self::Static => "static",
             Self::Affinity => "affinity",
             Self::Quads => "quads",
+            Self::Runs => "runs",
         }
     }
 
@@ -41,7 +53,7 @@ impl Assignment {
     pub const fn dispatch(self) -> Assign {
         match self {
             Self::FirstIdle => Assign::FirstIdle,
-            Self::Static | Self::Affinity | Self::Quads => Assign::Static,
+            Self::Static | Self::Affinity | Self::Quads | Self::Runs => Assign::Static,
         }
     }
 
@@ -54,6 +66,10 @@ impl Assignment {
                 .looking_ahead(cores)
                 .deciding_in(cores),
             Self::Quads => Cost::state(0).looking_ahead(cores).deciding_in(1),
+            // A place for each core.
+            Self::Runs => Cost::state(4 * cores)
+                .looking_ahead(cores * RUN as u32)
+                .deciding_in(1),
         }
     }
 
@@ -67,6 +83,9 @@ impl Assignment {
         let cores = cores.max(1) as usize;
         if cores == 1 || matches!(self, Self::FirstIdle | Self::Static) {
             return items;
+        }
+        if self == Self::Runs {
+            return runs(&items, cores);
         }
         let place = |item: &WorkItem| {
             let TileRef { pass, tile } = first_tile(item);
@@ -103,6 +122,22 @@ impl Assignment {
         }
         dealt
     }
+}
+
+/// Stretches of items, a run for each core in each: the first item of every run, then the second ones.
+fn runs(items: &[WorkItem], cores: usize) -> Vec<WorkItem> {
+    let mut dealt = Vec::with_capacity(items.len());
+    for stretch in items.chunks(cores * RUN) {
+        // The last stretch has shorter runs: every round but the last one is full.
+        let rounds = stretch.len().div_ceil(cores);
+        let longer = stretch.len() - (rounds - 1) * cores;
+        let first = |core: usize| core * (rounds - 1) + core.min(longer);
+        for round in 0..rounds {
+            let cores = if round + 1 < rounds { cores } else { longer };
+            dealt.extend((0..cores).map(|core| stretch[first(core) + round]));
+        }
+    }
+    dealt
 }
 
 fn first_tile(item: &WorkItem) -> TileRef {
@@ -156,6 +191,14 @@ mod tests {
         assert_eq!(
             dealt(Assignment::Affinity, 2, [0, 7, 6, 1, 5]),
             [0, 7, 1, 6, 5]
+        );
+    }
+
+    #[test]
+    fn cores_take_runs_of_consecutive_items() {
+        assert_eq!(
+            dealt(Assignment::Runs, 2, 0..13),
+            [0, 4, 1, 5, 2, 6, 3, 7, 8, 11, 9, 12, 10]
         );
     }
 

@@ -20,7 +20,8 @@ pub struct Known<'a> {
     pub line_bytes: u32,
     /// The display: its eyes' matrices.
     pub meta: Option<&'a TraceMeta>,
-    /// What was counted in the last frame; none in the first one.
+    /// What was counted in the last frame. The first frame of a trace stands for one of a head that does not move: its last
+    /// frame was the same. None where nothing is counted.
     pub last: Option<&'a Counters>,
 }
 
@@ -59,7 +60,7 @@ impl<'a> Known<'a> {
     pub(super) fn counted(&self, eyes: [View; 2]) -> Option<&'a PairCounters> {
         let same = |of: &&PairCounters| {
             let view = eyes[0];
-            let rows = of.row_bytes.len() == view.tiles[1] as usize;
+            let rows = of.line_shift.len() == view.tiles[1] as usize;
             rows && (of.kind, of.layer) == (view.kind, view.layer)
         };
         self.last?.pairs.iter().find(same)
@@ -73,16 +74,16 @@ pub struct Counters {
     pub pairs: Vec<PairCounters>,
 }
 
-/// What was counted in the views of two eyes, by row of the left eye's tiles.
+/// What was counted in the views of two eyes; shifts by row of the left eye's tiles.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PairCounters {
     /// What the views show.
     pub kind: PassKind,
     /// Layer.
     pub layer: u16,
-    /// Bytes of the lines that the row's tiles ask for: of each tile, and of the other eye's tile that shows the same at
-    /// infinity, each line once.
-    pub row_bytes: Vec<u64>,
+    /// Bytes of the lines that the tiles ask for: of each tile, and of the other eye's tile that shows the same at
+    /// infinity, each line once. Misses of the L1 caches count them, a little from above.
+    pub bytes: u64,
     /// Columns by which the right eye's tiles lie left of the left eye's tiles with the same primitives.
     pub primitive_shift: Vec<i32>,
     /// Likewise with the same lines.

@@ -221,14 +221,14 @@ impl Parts {
         parts.into_iter().fold(curve, Cost::and)
     }
 
-    fn ground<'a>(&self, grid: [u32; 2], known: &Known<'a>) -> Ground<'a> {
+    fn ground(&self, grid: [u32; 2], known: &Known<'_>) -> Ground {
         Ground {
             grid,
             size: self
                 .size
                 .unwrap_or_else(|| self.curve.usual_size(known.l2_bytes)),
             seed: known.seed,
-            row_bytes: None,
+            frame_bytes: None,
         }
     }
 
@@ -248,7 +248,7 @@ impl Parts {
         let placement = self.pairing.rule().place([left, right], known);
         let counted = known.counted([left, right]);
         let ground = Ground {
-            row_bytes: counted.map(|of| &*of.row_bytes),
+            frame_bytes: counted.map(|of| of.bytes),
             ..self.ground(placement.grid, known)
         };
         let cells = self.curve.path().cells(&ground);

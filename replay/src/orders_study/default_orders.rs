@@ -7,7 +7,7 @@ use crate::order::curve::Curve;
 use crate::order::parts::{Eyes, Parts};
 
 /// The other parts, one at a time, with the curves that do best.
-const FURTHER: [&str; 28] = [
+const FURTHER: [&str; 29] = [
     "strip16+sta",
     "strip32+sta",
     "band2+sta",
@@ -36,6 +36,7 @@ const FURTHER: [&str; 28] = [
     "zig-zag+sta+offset+static",
     "zig-zag+sta+offset+affinity",
     "zig-zag+sta+offset+quads",
+    "zig-zag+sta+offset+runs",
 ];
 
 /// The table's orders, the baseline first; every curve with both tiles of a cell on one core; then the other parts.

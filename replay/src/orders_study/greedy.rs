@@ -1,4 +1,5 @@
-//! The offline greedy order: always the item of which the cache holds the largest share.
+//! The offline greedy order: always the item of which the cache holds the largest share; and what is left of it with a
+//! short look-ahead.
 
 use super::items::{Items, Lru, NONE};
 
@@ -6,9 +7,9 @@ use super::items::{Items, Lru, NONE};
 const LINES_MORE: u64 = 8;
 
 /// The order that takes next what has the largest share of its lines in the cache; of equals, what comes first in `start`,
-/// which also says where it begins.
+/// which also says where it begins. Of the items that are left only the first `ahead` are looked at.
 #[must_use]
-pub fn greedy(items: &Items, cache: &Lru, start: &[u32]) -> Vec<u32> {
+pub fn greedy(items: &Items, cache: &Lru, start: &[u32], ahead: usize) -> Vec<u32> {
     let mut state = cache.empty();
     // Lines of each item that the cache holds.
     let mut held = vec![0_u32; items.len()];
@@ -17,7 +18,7 @@ pub fn greedy(items: &Items, cache: &Lru, start: &[u32]) -> Vec<u32> {
     while !left.is_empty() {
         // The largest share without division: a/b < c/d if a*d < c*b.
         let mut best = 0;
-        for at in 1..left.len() {
+        for at in 1..left.len().min(ahead) {
             let share = |at: usize| {
                 let item = left[at] as usize;
                 let lines = items.lines[item].len() as u64;
@@ -63,18 +64,21 @@ mod tests {
         let set = |first: u32| (first..first + 4).collect::<Vec<u32>>();
         let items = Items::new(&[set(0), set(8), set(8), set(0), vec![]]);
         let cache = Lru::new(&items, 1, 4);
-        let order = greedy(&items, &cache, &[0, 1, 2, 3, 4]);
+        let order = greedy(&items, &cache, &[0, 1, 2, 3, 4], usize::MAX);
         // What has no lines costs nothing.
         assert_eq!(order, [4, 0, 3, 1, 2]);
         assert_eq!(items.misses(&order, &cache), items.distinct_lines());
+        // Without a look-ahead it is the start, with one of two items what is in the cache is too far away.
+        assert_eq!(greedy(&items, &cache, &[0, 1, 2, 3, 4], 1), [0, 1, 2, 3, 4]);
+        assert_eq!(greedy(&items, &cache, &[0, 1, 2, 3, 4], 2), [0, 1, 2, 4, 3]);
     }
 
     proptest! {
         #[test]
-        fn greedy_orders_are_permutations(accesses in accesses()) {
+        fn greedy_orders_are_permutations(accesses in accesses(), ahead in 1_usize..30) {
             let items = Items::new(&accesses);
             let start: Vec<u32> = (0..items.len() as u32).collect();
-            let mut order = greedy(&items, &Lru::new(&items, 2, 2), &start);
+            let mut order = greedy(&items, &Lru::new(&items, 2, 2), &start, ahead);
             order.sort_unstable();
             prop_assert_eq!(order, start);
         }

@@ -184,8 +184,16 @@ pub fn learn(
     let need_counters = orders.iter().any(|order| order.parts().needs_counters());
     for &number in &frames {
         let frame = expander.frame(number, &memory, &mut counts)?;
+        let counted = match need_counters {
+            true => {
+                let known = Known::new(config, &tables.meta);
+                Some(frame.counters(&tables.passes, number, &known)?)
+            }
+            false => None,
+        };
+        let of_last = last.take().or_else(|| counted.clone());
         let known = Known {
-            last: last.as_ref(),
+            last: of_last.as_ref(),
             ..Known::new(config, &tables.meta)
         };
         let render = |run: &mut Run| {
@@ -195,9 +203,7 @@ pub fn learn(
             run.frame(&frame, orders, &known, &tables.passes, number, config)
         };
         runs.par_iter_mut().try_for_each(render)?;
-        if need_counters {
-            last = Some(frame.counters(&tables.passes, number, &known)?);
-        }
+        last = counted;
         done(1);
     }
     let learner = runs.pop();

@@ -16,8 +16,11 @@ pub use super::anneal::Schedule;
 /// How to search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
-    /// Always what the cache holds the largest share of.
-    Greedy,
+    /// Always what the cache holds the largest share of, among so many of the items that are left.
+    Greedy {
+        /// The look-ahead; none for all items.
+        ahead: Option<u32>,
+    },
     /// Annealing from the order that the search starts from.
     Anneal(Schedule),
 }
@@ -25,10 +28,26 @@ pub enum Method {
 impl Method {
     /// Name of what is found.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> String {
         match self {
-            Self::Greedy => "greedy",
-            Self::Anneal(_) => "anneal",
+            Self::Greedy { ahead: None } => "greedy".to_owned(),
+            Self::Greedy { ahead: Some(ahead) } => format!("greedy-{ahead}"),
+            Self::Anneal(_) => "anneal".to_owned(),
+        }
+    }
+
+    /// The method of that name.
+    #[must_use]
+    pub fn find(name: &str, schedule: &Schedule) -> Option<Self> {
+        match name {
+            "greedy" => Some(Self::Greedy { ahead: None }),
+            "anneal" => Some(Self::Anneal(*schedule)),
+            _ => {
+                let ahead = name.strip_prefix("greedy-")?.parse().ok();
+                ahead
+                    .filter(|ahead| *ahead > 0)
+                    .map(|ahead| Self::Greedy { ahead: Some(ahead) })
+            }
         }
     }
 }
@@ -116,7 +135,10 @@ impl Ground {
         let cache = Lru::new(&self.lines, sets, l2.ways);
         let start: Vec<u32> = (0..self.items.len() as u32).collect();
         let order = match method {
-            Method::Greedy => greedy(&self.lines, &cache, &start),
+            Method::Greedy { ahead } => {
+                let ahead = ahead.map_or(usize::MAX, |ahead| ahead as usize);
+                greedy(&self.lines, &cache, &start, ahead)
+            }
             Method::Anneal(schedule) => {
                 let beside = |item: u32, side: usize| self.beside[item as usize][side % 4];
                 anneal(&self.lines, &cache, start, &schedule, &beside)
@@ -124,7 +146,7 @@ impl Ground {
         };
         Ok(OrderFile {
             trace: trace.to_owned(),
-            name: method.name().to_owned(),
+            name: method.name(),
             l2_bytes,
             items: order
                 .iter()

@@ -80,7 +80,7 @@ impl Frame<'_> {
         let mut counted = PairCounters {
             kind: eyes[0].kind,
             layer: eyes[0].layer,
-            row_bytes: Vec::new(),
+            bytes: 0,
             primitive_shift: Vec::new(),
             line_shift: Vec::new(),
         };
@@ -107,8 +107,7 @@ impl Frame<'_> {
             let sum = |row: &[Own]| row.iter().map(|own| own.lines.len() as u32).sum::<u32>();
             let both = sum(&left) + sum(&right);
             let lines = both - agreement(offset[0], |own| &own.lines);
-            let bytes = u64::from(lines) * u64::from(known.line_bytes);
-            counted.row_bytes.push(bytes);
+            counted.bytes += u64::from(lines) * u64::from(known.line_bytes);
             counted.line_shift.push(best(|own| &own.lines));
             counted.primitive_shift.push(best(|own| &own.primitives));
         }

@@ -1,33 +1,31 @@
-//! Rows to and fro where the L2 holds the lines of one, bands where it does not, as the last frame's rows had them.
+//! Rows to and fro where the L2 holds the lines of a row, else bands, the lower the more lines there are: by the lines that the
+//! last frame asked for.
 
 use super::band::lay;
 use super::{Ground, Path};
 use crate::order::cost::{Cost, Knows};
 
-/// A row's lines may take so many eighths of the L2, so that rows are worth more than bands. Chosen on the design
-/// cameras of docs/orders.md, like the bands' height.
-const EIGHTHS: u64 = 10;
-const ROWS_OF_A_BAND: u32 = 4;
+/// The fewest and the most rows of a band, and how many columns of a band the L2 is to hold beside one another. Chosen on the
+/// design cameras of docs/orders.md, with four texel formats, three line sizes and shadow maps.
+const ROWS: [u64; 2] = [3, 8];
+const COLUMNS: u64 = 6;
 
 /// Size of the L2.
 pub(super) fn l2_kib(l2_bytes: u64) -> u32 {
     u32::try_from(l2_bytes / 1024).unwrap_or(u32::MAX).max(1)
 }
 
-/// Rows and bands by the lines of rows; rows where nothing is known of a last frame.
+/// Rows or bands; rows where nothing is known of a last frame.
 #[derive(Debug)]
 pub struct Adaptive;
 
 impl Path for Adaptive {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid;
-        let most = u64::from(ground.size) * 1024 * EIGHTHS / 8;
-        let known = ground.row_bytes.unwrap_or_default();
-        let fits = |row: u32| known.get(row as usize).is_none_or(|&bytes| bytes <= most);
+        let height = ground.frame_bytes.map_or(1, |bytes| height(ground, bytes));
         let mut cells = Vec::with_capacity(columns as usize * rows as usize);
         let (mut first, mut leftwards) = (0, false);
         while first < rows {
-            let height = if fits(first) { 1 } else { ROWS_OF_A_BAND };
             let end = (first + height).min(rows);
             lay([first, end], leftwards, columns, &mut cells);
             (first, leftwards) = (end, !leftwards);
@@ -35,11 +33,21 @@ impl Path for Adaptive {
         cells
     }
 
-    /// A band's counters and bounds and a sum; of each row of the last frame, whether it fits: a bit.
-    fn cost(&self, [_, rows]: [u32; 2]) -> Cost {
-        Cost::state(12)
-            .with_table(rows.div_ceil(8).into())
-            .deciding_in(2)
-            .knowing(Knows::LastFrame)
+    /// A band's counters and bounds, its height and a sum.
+    fn cost(&self, _grid: [u32; 2]) -> Cost {
+        Cost::state(14).deciding_in(1).knowing(Knows::LastFrame)
     }
+}
+
+/// Rows of a band.
+fn height(ground: &Ground, frame_bytes: u64) -> u32 {
+    let [columns, rows] = ground.grid.map(u64::from);
+    let l2_bytes = u64::from(ground.size) * 1024;
+    let row_bytes = frame_bytes / rows.max(1);
+    if row_bytes <= l2_bytes {
+        return 1;
+    }
+    let held = columns * l2_bytes / row_bytes;
+    let [least, most] = ROWS;
+    (held / COLUMNS).clamp(least, most) as u32
 }

@@ -12,7 +12,7 @@ pub(super) const USUAL_ROWS: u32 = 4;
 pub struct Band;
 
 impl Path for Band {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid;
         let height = ground.size.max(1);
         let mut cells = Vec::with_capacity(columns as usize * rows as usize);

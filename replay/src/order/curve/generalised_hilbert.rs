@@ -10,7 +10,7 @@ use crate::order::cost::Cost;
 pub struct GeneralisedHilbert;
 
 impl Path for GeneralisedHilbert {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid.map(|n| n as i32);
         let mut cells = Vec::with_capacity(columns as usize * rows as usize);
         if columns > 0 && rows > 0 {

@@ -9,7 +9,7 @@ use crate::order::cost::Cost;
 pub struct Hilbert;
 
 impl Path for Hilbert {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid;
         let side = columns.max(rows).max(1).next_power_of_two();
         let mut cells: Vec<[u32; 2]> = (0..rows)

@@ -36,7 +36,7 @@ registry! { CurveRow:
     GILBERT =    row("gilbert",   GREEN,     Size::NONE,                                 "Hilbert curve generalised to any grid",                                 &GeneralisedHilbert);
     STRIP =      row("strip",     BLUE,      Size::new("columns", strip::columns),       "Vertical strips of N columns, rows to and fro; without N as wide as the L2 allows", &Strip);
     BAND =       row("band",      SKY_BLUE,  Size::new("rows", |_| band::USUAL_ROWS),    "Horizontal bands of N rows, columns up and down; without N of 4",       &Band);
-    ADAPTIVE =   row("adaptive",  GREEN,     Size::new("KiB of L2", adaptive::l2_kib),   "Rows where the L2 holds one, else bands, by the lines that the last frame's rows had", &Adaptive);
+    ADAPTIVE =   row("adaptive",  GREEN,     Size::new("KiB of L2", adaptive::l2_kib),   "Rows where the L2 holds one, else bands, by the lines that the last frame had", &Adaptive);
     RANDOM =     row("random",    GREY,      Size::NONE,                                 "Shuffled cells: the control",                                           &Random);
     #[cfg(test)]
     COLUMNS =    row("test-columns", GREY,   Size::NONE,                                 "Columns from the top",                                                  &super::tests::columns::Columns);
@@ -116,21 +116,21 @@ impl Curve {
 
 /// What a path is laid through.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Ground<'a> {
+pub struct Ground {
     /// Columns and rows of cells.
     pub grid: [u32; 2],
     /// The number behind the curve's name.
     pub size: u32,
     /// Seed of the random curve.
     pub seed: u64,
-    /// Bytes of the lines of each row of cells in the last frame; none where nothing is known of it.
-    pub row_bytes: Option<&'a [u64]>,
+    /// Bytes of the lines that the cells of the last frame asked for; none where nothing is known of it.
+    pub frame_bytes: Option<u64>,
 }
 
 /// A path through all cells of a grid.
 pub trait Path: std::fmt::Debug {
     /// Columns and rows of the cells in the order of traversal: each exactly once.
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]>;
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]>;
 
     /// What hardware needs for it.
     fn cost(&self, grid: [u32; 2]) -> Cost;

@@ -9,7 +9,7 @@ use crate::order::cost::Cost;
 pub struct Morton;
 
 impl Path for Morton {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid;
         let mut cells: Vec<[u32; 2]> = (0..rows)
             .flat_map(|y| (0..columns).map(move |x| [x, y]))

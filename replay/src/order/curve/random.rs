@@ -23,7 +23,7 @@ pub fn shuffle<T>(seed: u64, items: &mut [T]) {
 }
 
 impl Path for Random {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let mut cells = Scanline.cells(ground);
         shuffle(ground.seed, &mut cells);
         cells

@@ -8,7 +8,7 @@ use crate::order::cost::Cost;
 pub struct Scanline;
 
 impl Path for Scanline {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid;
         (0..rows)
             .flat_map(|y| (0..columns).map(move |x| [x, y]))

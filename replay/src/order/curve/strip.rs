@@ -21,7 +21,7 @@ pub(super) fn columns(l2_bytes: u64) -> u32 {
 pub struct Strip;
 
 impl Path for Strip {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid;
         let strips = columns.div_ceil(ground.size.max(1)) | 1;
         let bound = |strip: u32| (u64::from(columns) * u64::from(strip) / u64::from(strips)) as u32;

@@ -9,7 +9,7 @@ use crate::order::cost::Cost;
 pub struct ZigZag;
 
 impl Path for ZigZag {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid;
         (0..rows)
             .flat_map(|y| {

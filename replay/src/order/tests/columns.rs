@@ -7,7 +7,7 @@ use crate::order::curve::{Ground, Path};
 pub struct Columns;
 
 impl Path for Columns {
-    fn cells(&self, ground: &Ground<'_>) -> Vec<[u32; 2]> {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
         let [columns, rows] = ground.grid;
         (0..columns)
             .flat_map(|x| (0..rows).map(move |y| [x, y]))

@@ -45,7 +45,7 @@ fn cells_of(curve: Curve, grid: [u32; 2], size: u32) -> Vec<[u32; 2]> {
         grid,
         size,
         seed: 3,
-        row_bytes: None,
+        frame_bytes: None,
     })
 }
 
@@ -132,21 +132,29 @@ fn bands_run_column_by_column_to_and_fro() {
 }
 
 #[test]
-fn rows_that_the_l2_does_not_hold_become_bands() {
-    let ground = |row_bytes| Ground {
-        grid: [2, 6],
-        size: 8,
-        seed: 0,
-        row_bytes,
-    };
+fn rows_that_the_l2_does_not_hold_become_bands_the_lower_the_more_lines_there_are() {
     let path = Curve::ADAPTIVE.path();
-    let unknown = path.cells(&ground(None));
-    assert_eq!(unknown, cells_of(Curve::ZIG_ZAG, [2, 6], 0));
-    // A row may take ten eighths of 8 KiB.
-    let rows = [10 << 10, (10 << 10) + 1, 0, 0, 0, 0];
-    let cells = path.cells(&ground(Some(&rows)));
-    let row_of: Vec<u32> = cells.iter().map(|cell| cell[1]).collect();
-    assert_eq!(row_of, [0, 0, 1, 2, 3, 4, 4, 3, 2, 1, 5, 5]);
+    let rows_of_first_columns = |frame_kib: Option<u64>| -> Vec<u32> {
+        let cells = path.cells(&Ground {
+            grid: [60, 10],
+            size: 100,
+            seed: 0,
+            frame_bytes: frame_kib.map(|kib| kib << 10),
+        });
+        cells
+            .iter()
+            .take_while(|cell| cell[0] == 0)
+            .map(|cell| cell[1])
+            .collect()
+    };
+    assert_eq!(rows_of_first_columns(None), [0]);
+    // A row of 100 KiB fits into the L2.
+    assert_eq!(rows_of_first_columns(Some(1000)), [0]);
+    // The L2 holds 40 columns of a row, 20, and 6.
+    assert_eq!(rows_of_first_columns(Some(1500)), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(rows_of_first_columns(Some(3000)), [0, 1, 2]);
+    assert_eq!(rows_of_first_columns(Some(10_000)), [0, 1, 2]);
+    assert_eq!(rows_of_first_columns(Some(1001)), [0, 1, 2, 3, 4, 5, 6, 7]);
 }
 
 fn pair_of(tiles: [u32; 2]) -> [Pass; 2] {
@@ -214,7 +222,7 @@ fn rows_pair_at_the_shifts_that_the_last_frame_had() {
         pairs: vec![PairCounters {
             kind: PassKind::Main,
             layer: 0,
-            row_bytes: vec![0; 2],
+            bytes: 0,
             primitive_shift: vec![0, 1],
             line_shift: vec![1, 0],
         }],
