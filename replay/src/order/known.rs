@@ -56,31 +56,26 @@ impl<'a> Known<'a> {
         directions.map_or([0, 0], |directions| directions.offset())
     }
 
-    /// What was counted of the same views in the last frame.
-    pub(super) fn counted(&self, eyes: [View; 2]) -> Option<&'a PairCounters> {
-        let same = |of: &&PairCounters| {
-            let view = eyes[0];
-            let rows = of.line_shift.len() == view.tiles[1] as usize;
-            rows && (of.kind, of.layer) == (view.kind, view.layer)
-        };
-        self.last?.pairs.iter().find(same)
+    /// What was counted of the same view, or of a left view and its partner, in the last frame.
+    pub(super) fn counted(&self, view: View) -> Option<&'a ViewCounters> {
+        let key = |of: View| (of.number, of.kind, of.tiles);
+        let mut views = self.last?.views.iter();
+        views.find(|of| key(of.view) == key(view))
     }
 }
 
 /// What was counted in a frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// By pair of views.
-    pub pairs: Vec<PairCounters>,
+    /// By view, two eyes' views together.
+    pub views: Vec<ViewCounters>,
 }
 
-/// What was counted in the views of two eyes; shifts by row of the left eye's tiles.
+/// What was counted in a view, or in the views of two eyes; shifts by row of the left eye's tiles.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PairCounters {
-    /// What the views show.
-    pub kind: PassKind,
-    /// Layer.
-    pub layer: u16,
+pub struct ViewCounters {
+    /// The view; of two eyes the left one.
+    pub view: View,
     /// Bytes of the lines that the tiles ask for: of each tile, and of the other eye's tile that shows the same at
     /// infinity, each line once. Misses of the L1 caches count them, a little from above.
     pub bytes: u64,

@@ -17,7 +17,7 @@ pub mod parts;
 mod plan;
 mod work;
 
-pub use known::{Counters, Known, PairCounters};
+pub use known::{Counters, Known, ViewCounters};
 pub use listed::Listed;
 pub use plan::{Phase, Views, plan, plan_frame, views};
 pub use work::{Interleave, TileRef, View, WorkItem};

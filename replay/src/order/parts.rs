@@ -221,20 +221,24 @@ impl Parts {
         parts.into_iter().fold(curve, Cost::and)
     }
 
-    fn ground(&self, grid: [u32; 2], known: &Known<'_>) -> Ground {
+    /// A grid of cells for a view, or for a left view and its partner.
+    fn ground(&self, grid: [u32; 2], view: View, known: &Known<'_>) -> Ground {
         Ground {
             grid,
             size: self
                 .size
                 .unwrap_or_else(|| self.curve.usual_size(known.l2_bytes)),
             seed: known.seed,
-            frame_bytes: None,
+            frame_bytes: known.counted(view).map(|of| of.bytes),
         }
     }
 
     /// Work of one view alone.
     pub(super) fn mono(&self, view: View, known: &Known<'_>) -> Vec<WorkItem> {
-        let cells = self.curve.path().cells(&self.ground(view.tiles, known));
+        let cells = self
+            .curve
+            .path()
+            .cells(&self.ground(view.tiles, view, known));
         let tile = |at| view.tile(at).map(WorkItem::Tile);
         cells.into_iter().filter_map(tile).collect()
     }
@@ -246,11 +250,7 @@ impl Parts {
             return self.view_by_view(left, right, known);
         }
         let placement = self.pairing.rule().place([left, right], known);
-        let counted = known.counted([left, right]);
-        let ground = Ground {
-            frame_bytes: counted.map(|of| of.bytes),
-            ..self.ground(placement.grid, known)
-        };
+        let ground = self.ground(placement.grid, left, known);
         let cells = self.curve.path().cells(&ground);
         let mut items = Vec::with_capacity(cells.len());
         for [left, right] in by_cell(&placement, &cells, [left, right]) {

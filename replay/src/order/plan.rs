@@ -59,8 +59,9 @@ pub enum Views {
 /// The views of a frame, phase by phase.
 #[must_use]
 pub fn views(passes: &[Pass], frame: u32) -> Vec<Views> {
-    let view = |(index, pass): (usize, &Pass)| View::of(index as u32, pass);
     let of_frame = passes.iter().enumerate().filter(|(_, p)| p.frame == frame);
+    let first = of_frame.clone().next().map_or(0, |(index, _)| index);
+    let view = |(index, pass): (usize, &Pass)| View::of(index as u32, (index - first) as u32, pass);
     let (seen, before): (Vec<_>, Vec<_>) =
         of_frame.partition(|(_, p)| p.kind == PassKind::Layer || (p.is_seen() && p.eye.is_some()));
     let mut phases: Vec<Views> = before.into_iter().map(view).map(Views::One).collect();

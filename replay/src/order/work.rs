@@ -54,20 +54,20 @@ pub struct View {
     pub size_px: [u32; 2],
     /// What it shows.
     pub kind: PassKind,
-    /// Number of the layer.
-    pub layer: u16,
+    /// Number among the frame's passes.
+    pub number: u32,
 }
 
 impl View {
-    /// The view of a pass.
+    /// The view of a pass, the `number`-th of its frame.
     #[must_use]
-    pub const fn of(index: u32, pass: &Pass) -> Self {
+    pub const fn of(index: u32, number: u32, pass: &Pass) -> Self {
         Self {
             pass: index,
             tiles: pass.tiles,
             size_px: pass.size_px,
             kind: pass.kind,
-            layer: pass.layer,
+            number,
         }
     }
 
@@ -79,7 +79,7 @@ impl View {
             tiles,
             size_px: [tiles[0] * TILE_SIZE_PX, tiles[1] * TILE_SIZE_PX],
             kind: PassKind::Main,
-            layer: 0,
+            number: pass,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::expand::Work;
 use super::{Frame, StreamError, TileLines};
-use crate::order::{Counters, Known, PairCounters, TileRef, View, Views, views};
+use crate::order::{Counters, Known, TileRef, View, ViewCounters, Views, views};
 use formats::textrace::Pass;
 
 /// Columns around the shift of infinity at which a row may be found to agree best.
@@ -48,8 +48,22 @@ fn common(a: &[u32], b: &[u32]) -> u32 {
     count
 }
 
+/// Lines of the tiles of a row, each once a tile.
+fn lines_of(row: &[Own]) -> u32 {
+    row.iter().map(|own| own.lines.len() as u32).sum()
+}
+
+fn nothing(view: View) -> ViewCounters {
+    ViewCounters {
+        view,
+        bytes: 0,
+        primitive_shift: Vec::new(),
+        line_shift: Vec::new(),
+    }
+}
+
 impl Frame<'_> {
-    /// Counts the pairs of views of a frame.
+    /// Counts the views of a frame.
     ///
     /// # Errors
     /// A tile that cannot be read.
@@ -60,13 +74,28 @@ impl Frame<'_> {
         known: &Known<'_>,
     ) -> Result<Counters, StreamError> {
         let mut work = self.expander().work();
-        let mut pairs = Vec::new();
+        let mut counted = Vec::new();
         for phase in views(passes, number) {
-            if let Views::Pair(left, right) = phase {
-                pairs.push(self.count_pair([left, right], known, &mut work)?);
-            }
+            counted.push(match phase {
+                Views::One(view) => self.count_view(view, known, &mut work)?,
+                Views::Pair(left, right) => self.count_pair([left, right], known, &mut work)?,
+            });
         }
-        Ok(Counters { pairs })
+        Ok(Counters { views: counted })
+    }
+
+    fn count_view(
+        &self,
+        view: View,
+        known: &Known<'_>,
+        work: &mut Work,
+    ) -> Result<ViewCounters, StreamError> {
+        let mut counted = nothing(view);
+        for y in 0..view.tiles[1] {
+            let lines = lines_of(&self.row(view, Some(y), work)?);
+            counted.bytes += u64::from(lines) * u64::from(known.line_bytes);
+        }
+        Ok(counted)
     }
 
     fn count_pair(
@@ -74,16 +103,10 @@ impl Frame<'_> {
         eyes: [View; 2],
         known: &Known<'_>,
         work: &mut Work,
-    ) -> Result<PairCounters, StreamError> {
+    ) -> Result<ViewCounters, StreamError> {
         let offset = known.offset(eyes);
         let rows = eyes[0].tiles[1];
-        let mut counted = PairCounters {
-            kind: eyes[0].kind,
-            layer: eyes[0].layer,
-            bytes: 0,
-            primitive_shift: Vec::new(),
-            line_shift: Vec::new(),
-        };
+        let mut counted = nothing(eyes[0]);
         for y in 0..rows {
             let other = y.checked_add_signed(-offset[1]);
             let left = self.row(eyes[0], Some(y), work)?;
@@ -104,8 +127,7 @@ impl Frame<'_> {
                     })
                     .unwrap_or(offset[0])
             };
-            let sum = |row: &[Own]| row.iter().map(|own| own.lines.len() as u32).sum::<u32>();
-            let both = sum(&left) + sum(&right);
+            let both = lines_of(&left) + lines_of(&right);
             let lines = both - agreement(offset[0], |own| &own.lines);
             counted.bytes += u64::from(lines) * u64::from(known.line_bytes);
             counted.line_shift.push(best(|own| &own.lines));

@@ -4,13 +4,13 @@
 use super::offset::Offset;
 use super::{Placement, Rule, tiles};
 use crate::order::cost::{Cost, Knows};
-use crate::order::known::PairCounters;
+use crate::order::known::ViewCounters;
 use crate::order::{Known, View};
 
 /// Pairs at a shift a row.
 #[derive(Debug)]
 pub struct Row {
-    shifts: fn(&PairCounters) -> &[i32],
+    shifts: fn(&ViewCounters) -> &[i32],
 }
 
 /// By primitives.
@@ -25,7 +25,7 @@ pub const LINES: Row = Row {
 
 impl Rule for Row {
     fn place(&self, eyes: [View; 2], known: &Known<'_>) -> Placement {
-        let Some(counted) = known.counted(eyes) else {
+        let Some(counted) = known.counted(eyes[0]) else {
             return Offset.place(eyes, known);
         };
         let shifts = (self.shifts)(counted);

@@ -124,9 +124,8 @@ proptest! {
         expected.sort_unstable();
         let rows = rows as usize;
         let last = Counters {
-            pairs: vec![PairCounters {
-                kind: PassKind::Main,
-                layer: 0,
+            views: vec![ViewCounters {
+                view: View { number: 1, ..View::grid(6, [columns, rows as u32]) },
                 bytes,
                 primitive_shift: shifts[..rows].to_vec(),
                 line_shift: shifts.iter().rev().take(rows).copied().collect(),

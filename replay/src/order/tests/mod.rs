@@ -219,9 +219,8 @@ fn tiles_pair_where_infinity_falls_and_those_without_a_partner_keep_their_place(
 #[test]
 fn rows_pair_at_the_shifts_that_the_last_frame_had() {
     let last = Counters {
-        pairs: vec![PairCounters {
-            kind: PassKind::Main,
-            layer: 0,
+        views: vec![ViewCounters {
+            view: View::grid(0, [2, 2]),
             bytes: 0,
             primitive_shift: vec![0, 1],
             line_shift: vec![1, 0],
