@@ -1,14 +1,20 @@
 #!/usr/bin/env python3
-"""Tables of docs/orders.md from what scripts/orders.sh measured: orders.py PART RESULTS, in the folder with the JSON files."""
+"""Makes the tables of docs/results/orders.md from the measurements of scripts/orders.sh.
+
+orders.py PART RESULTS reads the JSON files in the current folder. orders.py speed RESULTS REPLAY TRACE... measures.
+"""
 import csv
 import glob
 import json
 import math
 import os
+import resource
+import subprocess
 import sys
+import time
 
 BASE = "z2-sta"
-part, results = sys.argv[1:]
+part, results, *measured = sys.argv[1:]
 
 
 def rows_of(path):
@@ -19,7 +25,7 @@ def rows_of(path):
 
 
 def change(rows):
-    """Geometric mean of bytes over those of z2-sta, percent more; rows in which nothing can change are left out."""
+    """Change of the bytes relative to z2-sta, percent: geometric mean over the rows in which an order can change the bytes."""
     ratios = [1 + row["change_pct"] / 100 for row in rows if row["change_pct"] is not None and can_change(row)]
     return 100 * (math.exp(sum(map(math.log, ratios)) / len(ratios)) - 1) if ratios else None
 
@@ -29,7 +35,7 @@ def can_change(row):
 
 
 def worst(rows):
-    """The camera of which the mean over its caches is worst."""
+    """The camera with the worst mean over its caches."""
     labels = sorted({row["label"] for row in rows})
     changes = [(change([row for row in rows if row["label"] == label]), label) for label in labels]
     return max(pair for pair in changes if pair[0] is not None)
@@ -52,7 +58,7 @@ def ranks(values):
 
 
 def rank_correlation(a, b):
-    """Spearman's, of orders that both have."""
+    """Spearman's rank correlation of two tables with the same orders."""
     a, b = ranks(a), ranks(b)
     n = len(a)
     return 1 - 6 * sum((a[name] - b[name]) ** 2 for name in a) / (n * (n * n - 1))
@@ -170,7 +176,7 @@ def frames():
             if l1 == 8:
                 table.append([learner["trace"].replace(",", ": "), f"8/{l2:.0f}", best["order"], one(100 * (learner["external_bytes"] / usual - 1)), one(learner["regret_pct"]), one(learner["frame_best_pct"])])
     table.append(["mean of all caches", "", "", one(100 * (math.exp(sum(saved) / len(saved)) - 1)), one(sum(regrets) / len(regrets)), ""])
-    heading = ["camera", "caches, KiB", "best order throughout", "learned, against adaptive+sta+offset+boustro, %", "regret, %", "best order of each frame saves, %"]
+    heading = ["camera", "caches, KiB", "best fixed order", "learned, against adaptive+sta+offset+boustro, %", "regret, %", "best order of each frame saves, %"]
     write("orders-learned", "replay orders TRACE --learn --json: learned", heading, table)
 
 
@@ -213,16 +219,31 @@ def axes():
         least, label = worst(of[best])
         line.append(f"{label}: {one(least)}")
         line += [one(change(of[order])) for order in fixed + ["adaptive+halves+offset+runs", "adaptive+lrta+offset+runs"]]
-        # Of each camera and caches the best of four orders: what a learner comes to while the head is still.
+        # The best of four orders for each camera and pair of caches, which a learner finds while the head is still.
         settled = [min(rows, key=lambda row: row["external_bytes"]) for rows in zip(*(of[order] for order in [best] + fixed))]
         line.append(one(change(settled)))
         whole = [(own["whole_frame_bytes"], base["whole_frame_bytes"]) for own, base in zip(of[best], of[BASE])]
         ratios = [own / base for own, base in whole if base]
         line.append(one(100 * (math.exp(sum(map(math.log, ratios)) / len(ratios)) - 1)) if ratios else "")
         table.append(line)
-    heading = ["what is other than usual", "z2-sta, MB per frame", f"{best}, %", "design, %", "held out, %", "worst camera, %"] + [f"{order}, %" for order in fixed]
+    heading = ["changed setting", "z2-sta, MB per frame", f"{best}, %", "design, %", "held out, %", "worst camera, %"] + [f"{order}, %" for order in fixed]
     heading += ["adaptive+halves+offset+runs, %", "adaptive+lrta+offset+runs, %", "best of the first four curves, %", f"all clients: {best}, %"]
     write("orders-axes", "replay orders TRACES with the flag that the row names, --json: rows, change_pct", heading, table)
 
 
-{"displays": displays, "cameras": cameras, "frames": frames, "timed": timed, "axes": axes}[part]()
+def speed():
+    """Time of one run over all traces, with the first 40 default orders and the paper's four pairs of caches."""
+    replay, *traces = measured
+    command = [replay, "orders", *traces, "--json", "--quiet"]
+    listed = subprocess.run([replay, "orders", traces[0], "--caches", "8/128", "--json", "--quiet"], check=True, capture_output=True)
+    orders = orders_in(json.loads(listed.stdout)["rows"])[:40]
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    output = subprocess.run([*command, "--orders", ",".join(orders)], check=True, capture_output=True).stdout
+    wall_s, after = time.monotonic() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    heading = ["cameras", "orders", "pairs of caches", "replays", "processors", "wall time, s", "user time, s", "system time, s"]
+    line = [len(traces), len(orders), 4, len(json.loads(output)["rows"]), os.cpu_count(), one(wall_s)]
+    line += [one(after.ru_utime - before.ru_utime), one(after.ru_stime - before.ru_stime)]
+    write("orders-speed", "replay orders TRACES --json, timed by scripts/orders.py", heading, [line])
+
+
+{"displays": displays, "cameras": cameras, "frames": frames, "timed": timed, "axes": axes, "speed": speed}[part]()

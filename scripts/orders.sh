@@ -1,14 +1,14 @@
 #!/bin/sh
-# What tile orders do to texture traffic: `scripts/orders.sh SCENES [PART...]` writes results/orders-*.csv, the tables of docs/orders.md.
-# Parts: displays, cameras, frames, timed, axes; all of them unless some are named. Cameras and displays of the design, and those held
-# out, are those of docs/orders.md.
+# Measures what tile orders save: `scripts/orders.sh SCENES [PART...]` writes results/orders-*.csv, the tables of docs/results/orders.md.
+# Parts: displays, cameras, frames, timed, axes, speed; by default all of them. docs/results/orders.md explains which cameras and displays
+# were used for the design and which were held out.
 set -eu
 . "$(dirname "$0")/captures.sh"
 here=$(dirname "$results")/scripts
 shift
-parts=${*:-displays cameras frames timed axes}
+parts=${*:-displays cameras frames timed axes speed}
 
-# Camera by camera: label, file, camera's name.
+# One line per camera: set, label, file, name of the camera.
 cameras() {
     cat <<'LIST'
 design crytek-atrium crytek-sponza/sponza.gltf cam_atrium_eye
@@ -28,7 +28,7 @@ held-out chess-low chess-openchessset/chess_42k.gltf cam_low
 LIST
 }
 
-# capture FOLDER FLAGS...: every camera as SET,LABEL.textrace.
+# capture FOLDER FLAGS...: captures every camera as FOLDER/SET,LABEL.textrace.
 capture() {
     folder=$1
     shift
@@ -38,7 +38,7 @@ capture() {
     done
 }
 
-# BMW has no more lines than a cache holds, and the teapot has no textures: built-in scenes are the other scenes that are held out.
+# The built-in scenes are held-out scenes. BMW's textures fit into the caches and the teapot has none, so orders cannot change their traffic.
 capture_built_in() {
     mkdir -p "$1"
     for scene in atrium jungle meadow plant car lab music-box; do
@@ -46,7 +46,7 @@ capture_built_in() {
     done
 }
 
-# study OUTPUT TRACE... -- FLAGS...: JSON of replay orders.
+# study OUTPUT TRACE... FLAGS...: writes the JSON of replay orders.
 study() {
     output=$1
     shift
@@ -81,7 +81,7 @@ for part in $parts; do
             write cameras
             ;;
         frames)
-            # KEEP=FOLDER keeps these traces, 9 GB, for another run.
+            # KEEP=FOLDER keeps these traces (9 GB) for another run.
             head=${KEEP:-$work}/head
             mkdir -p "$head"
             cameras | grep -E 'crytek-atrium|dabrovic-gallery|cocoa-jungle|chess-player|crytek-gallery|cocoa-pond|forest-brook' |
@@ -131,8 +131,12 @@ for part in $parts; do
             rm -r whole
             write axes
             ;;
+        speed)
+            [ -d symmetric-100 ] || capture symmetric-100 --hmd symmetric-100
+            python3 "$here/orders.py" speed "$results" "$bin/replay" symmetric-100/*.textrace
+            ;;
         *)
-            echo "expected displays, cameras, frames, timed or axes, found $part" >&2
+            echo "expected displays, cameras, frames, timed, axes or speed, found $part" >&2
             exit 2
             ;;
     esac

@@ -1,4 +1,5 @@
-//! `replay orders` against plain caches fed with what `replay convert` writes, searched orders as files, and refusals.
+//! Compares `replay orders` with plain caches that replay the output of `replay convert`, and tests searched
+//! orders in files and refusals.
 
 use parallax_tests::{program, refuse, root, run_ok};
 use serde_json::Value;
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 const LINE_BYTES: u64 = 16;
 
-/// One frame.
+/// A trace of one frame.
 fn trace() -> PathBuf {
     root().join("traces/atrium.textrace")
 }
@@ -30,7 +31,7 @@ fn row<'a>(json: &'a Value, order: &str) -> &'a Value {
     found.unwrap_or_else(|| panic!("no row of {order}"))
 }
 
-/// An LRU cache of four ways: a list a set, most recent first.
+/// An LRU cache of four ways: one list per set, most recently used first.
 struct Lru(Vec<Vec<u64>>);
 
 impl Lru {
@@ -53,7 +54,7 @@ impl Lru {
     }
 }
 
-/// One core; orders of which each part is another one.
+/// Uses one core, and orders that differ in every part.
 #[test]
 fn bytes_are_those_of_plain_caches_fed_with_din() {
     let names = [
@@ -128,7 +129,7 @@ fn rows_say_what_an_order_is_and_what_it_needs() {
     ]));
     let run: Value = serde_json::from_slice(&run.stdout).expect("one JSON object");
     assert_eq!(own["external_bytes"], run["result"]["external_bytes"]);
-    // Bounds: nobody is below the infinite cache, OPT is below LRU.
+    // No row is below the infinite cache, and OPT is below LRU.
     let bytes = |order: &str| row(&json, order)["external_bytes"].as_u64().expect("bytes");
     let infinite = bytes("bound: infinite cache");
     let opt = bytes("bound: OPT of z2-sta");
@@ -198,7 +199,7 @@ fn searched_orders_come_from_files_and_replay_to_the_same_bytes() {
     );
 }
 
-/// Two frames: what is kept between them, and what a learner makes of them.
+/// Two frames: caches between them, and the learner.
 #[test]
 fn caches_between_frames_are_an_axis_and_a_learner_is_held_against_fixed_orders() {
     let trace = root().join("traces/jungle.textrace");
@@ -230,7 +231,8 @@ fn caches_between_frames_are_an_axis_and_a_learner_is_held_against_fixed_orders(
         boustro[0] < boustro[1] && boustro[1] < boustro[2],
         "{boustro:?}"
     );
-    // Where the L2 keeps its lines, turning round pays; where it is emptied, a frame backwards is another order.
+    // Reversing every other frame saves bytes if the L2 keeps its lines. If the L2 is emptied, it is just
+    // another order.
     assert!(boustro[0] < plain[0], "{boustro:?} {plain:?}");
     let learned = json["learned"].as_array().expect("what was learned");
     let kept: Vec<&Value> = learned

@@ -1,4 +1,4 @@
-//! Tile orders at the command line: a row of the table or parts, alone or in a list.
+//! Tile orders as arguments: names or lists of parts, one order or several.
 
 use crate::config::Order;
 use crate::paper::z2;
@@ -8,7 +8,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command, Error, ValueEnum};
 use std::ffi::OsStr;
 
-/// Reads an order; help and completions show the table.
+/// Parses an order. Help and completions show the table.
 #[derive(Clone, Debug)]
 pub struct OrderParser;
 
@@ -50,10 +50,10 @@ impl TypedValueParser for OrderParser {
     }
 }
 
-/// Orders by name, comma-separated, or `all`: those of the table.
+/// Parses comma-separated orders. `all` stands for all orders of the table.
 ///
 /// # Errors
-/// A name that no order has.
+/// An unknown order.
 pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
     if text == "all" {
         let others = Order::all().filter(|o| !z2::ORDERS.contains(o));

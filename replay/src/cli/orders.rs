@@ -1,4 +1,4 @@
-//! `replay orders`: tile orders against each other and against bounds.
+//! `replay orders`: compares tile orders with each other and with bounds.
 
 use super::ConfigArgs;
 use super::experiment_args::{page_outputs, parse_caches, write_page};
@@ -16,7 +16,7 @@ use shell::{Output, Progress, is_stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Orders that a learner chooses from unless others are named.
+/// The default orders of the learner.
 const LEARNER: &str = "adaptive+sta+offset+boustro,zig-zag+sta+offset+boustro,band4+sta+offset+boustro,band8+sta+offset+boustro";
 
 /// Arguments of `replay orders`.
@@ -29,14 +29,15 @@ const LEARNER: &str = "adaptive+sta+offset+boustro,zig-zag+sta+offset+boustro,ba
   replay orders head.textrace --learn
   replay orders a.textrace --search anneal --moves 1000000 --save-orders searched
   replay orders a.textrace --mode timed --dram lpddr4 --orders z2-sta,zig-zag+sta+offset
-docs/orders.md says what an order is made of and what was found.")]
+docs/models/orders.md explains the parts of an order, docs/results/orders.md has results.")]
 pub struct Args {
     /// Texture traces
     #[arg(required = true, value_name = "TRACE")]
     traces: Vec<PathBuf>,
     #[command(flatten)]
     machine: ConfigArgs,
-    /// Orders to compare, comma-separated: names, parts as in strip8+sta+offset, or `all`; z2-sta is always among them [default: every part of an order]
+    /// Orders to compare, comma-separated: names, parts as in strip8+sta+offset, or `all`. z2-sta is always
+    /// included [default: every curve and part]
     #[arg(long, value_name = "ORDERS")]
     orders: Option<String>,
     /// L1/L2 sizes in KiB, comma-separated
@@ -46,34 +47,36 @@ pub struct Args {
         default_value = "8/128,16/128,8/256,16/256"
     )]
     caches: String,
-    /// The caches between the frames of a trace, comma-separated: keep, flush, lose-N
+    /// What happens to caches between frames, comma-separated: keep, flush, lose-N
     #[arg(long, value_name = "CACHES,...", default_value = "keep")]
     between: String,
-    /// Also search for orders of traces of one frame: greedy, greedy-N (with a look-ahead of N items), anneal
+    /// Also search orders for traces of one frame, comma-separated: greedy, greedy-N (with a look-ahead of N
+    /// items), anneal
     #[arg(long, value_name = "METHODS")]
     search: Option<String>,
-    /// Moves that annealing tries
+    /// Number of moves that annealing tries
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     moves: u64,
-    /// Write the orders that were searched into this folder
+    /// Write the searched orders into this folder
     #[arg(long, value_name = "DIR", requires = "search")]
     save_orders: Option<PathBuf>,
-    /// Also replay a searched order from a file, with the L2 that it was searched for
+    /// Also replay a searched order from a file, with the L2 for which it was searched
     #[arg(long = "order-file", value_name = "FILE")]
     order_files: Vec<PathBuf>,
-    /// Also print lower bounds: infinite cache, OPT replacement, stretches of uses
+    /// Also print lower bounds: infinite cache, OPT replacement, windows of uses
     #[arg(long)]
     bounds: bool,
-    /// Also let a learner choose among orders from frame to frame, comma-separated [default with no value: four curves with STA, offset and boustro]
+    /// Also let a learner choose one of these orders per frame, comma-separated [default with no value: four
+    /// curves with sta, offset and boustro]
     #[arg(long, value_name = "ORDERS", num_args = 0..=1, default_missing_value = LEARNER)]
     learn: Option<String>,
     /// Print one JSON object (schema replay.orders/1)
     #[arg(long)]
     json: bool,
-    /// Also write the rows as CSV; - writes them to standard output in place of the table
+    /// Also write the rows as CSV; - writes them to standard output instead of the table
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Also write a page with tables and paths, with JSON and CSV beside it
+    /// Also write an HTML page with tables and paths, and JSON and CSV files beside it
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     #[command(flatten)]
@@ -83,7 +86,7 @@ pub struct Args {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// Wrong arguments, an unreadable trace or order, an output that cannot be written.
+/// Invalid arguments, an unreadable trace or order, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.threads.start()?;
     let study = study(args)?;
@@ -137,7 +140,7 @@ fn write(args: &Args, report: &OrdersReport<'_>, prints: bool) -> Result<()> {
     Ok(())
 }
 
-/// What the arguments ask for.
+/// Builds the study from the arguments.
 fn study(args: &Args) -> Result<Study> {
     let usual = RunConfig {
         mode: Mode::Functional,
@@ -149,7 +152,8 @@ fn study(args: &Args) -> Result<Study> {
         "--order is varied here; use --orders"
     );
     ensure!(
-        (base.l1.size_bytes, base.l2.size_bytes) == (usual.l1.size_bytes, usual.l2.size_bytes),
+        (base.level.l1.size_bytes, base.level.l2.size_bytes)
+            == (usual.level.l1.size_bytes, usual.level.l2.size_bytes),
         "--l1 and --l2 are varied here; use --caches"
     );
     ensure!(
@@ -178,7 +182,7 @@ fn study(args: &Args) -> Result<Study> {
     }
     for &(l1_bytes, l2_bytes) in &study.caches_bytes {
         let mut config = base;
-        (config.l1.size_bytes, config.l2.size_bytes) = (l1_bytes, l2_bytes);
+        (config.level.l1.size_bytes, config.level.l2.size_bytes) = (l1_bytes, l2_bytes);
         for &between_frames in &study.between {
             RunConfig {
                 between_frames,
@@ -202,7 +206,7 @@ fn parse_between(text: &str) -> Result<Vec<BetweenFrames>> {
     Ok(between)
 }
 
-/// Reads orders, each of one of the traces.
+/// Reads searched orders. Each must belong to one of the traces.
 fn order_files(paths: &[PathBuf], checksums: &[&str]) -> Result<Vec<Searched>> {
     let read = |path: &PathBuf| {
         let text = shell::read_settings(path)?;
@@ -222,7 +226,7 @@ fn order_files(paths: &[PathBuf], checksums: &[&str]) -> Result<Vec<Searched>> {
     paths.iter().map(read).collect()
 }
 
-/// Lets a learner choose, on traces of several frames.
+/// Runs the learner, if requested.
 fn learned<'a>(
     args: &Args,
     study: &Study,
@@ -241,7 +245,7 @@ fn learned<'a>(
                     between_frames,
                     ..study.base
                 };
-                (config.l1.size_bytes, config.l2.size_bytes) = (l1_bytes, l2_bytes);
+                (config.level.l1.size_bytes, config.level.l2.size_bytes) = (l1_bytes, l2_bytes);
                 let progress = Progress::new("learning", frames, "frames");
                 let found = learn(subject.source, &config, &orders, &|done| {
                     progress.advance(done)
@@ -261,7 +265,7 @@ fn learned<'a>(
     Ok(learned)
 }
 
-/// Checks the outputs; true where standard output is left for the result.
+/// Checks the outputs. Returns true if the table or JSON goes to standard output.
 fn check_outputs(args: &Args) -> Result<bool> {
     if let Some(folder) = &args.save_orders {
         shell::check_folder("--save-orders", folder)?;

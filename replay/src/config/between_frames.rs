@@ -1,4 +1,4 @@
-//! What becomes of the caches between the frames of a trace.
+//! What happens to cache contents between the frames of a trace.
 
 use super::ConfigError;
 use serde::de::Error as _;
@@ -6,15 +6,16 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::str::FromStr;
 
-/// What becomes of the caches between the frames of a trace.
+/// What happens to cache contents between the frames of a trace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum BetweenFrames {
-    /// They keep their lines, so that a frame finds what the one before has left.
+    /// Caches keep their lines, so that a frame can hit lines of the frame before.
     #[default]
     Keep,
-    /// They are emptied, as where other work runs between two frames.
+    /// Caches are emptied, as if other work ran between the frames.
     Flush,
-    /// Other work empties the L1 caches and fills so many percent of the L2, 1 to 100, with lines of its own.
+    /// Other work empties the L1 caches and fills this percentage (1 to 100) of each lower level with its own
+    /// lines.
     Lose(u8),
 }
 
@@ -23,23 +24,23 @@ impl BetweenFrames {
         *self == Self::default()
     }
 
-    /// Whether all caches are emptied, for what does not simulate other work.
+    /// True if all caches are emptied, for callers that do not simulate other work.
     ///
     /// # Errors
-    /// Other work takes part of the L2.
+    /// Other work fills part of the caches.
     pub fn empties(self) -> Result<bool, ConfigError> {
         match self {
             Self::Keep => Ok(false),
             Self::Flush => Ok(true),
-            Self::Lose(_) => Err(ConfigError::Range {
+            Self::Lose(_) => Err(ConfigError::Value {
                 key: "between_frames",
-                expected: "keep or flush, since other work is not simulated here",
+                expected: "keep or flush, because this command does not simulate other work".into(),
                 found: self.to_string(),
             }),
         }
     }
 
-    /// The share of the L2 that other work takes, percent; none where it takes all caches or none.
+    /// The percentage of each cache that other work fills, if it fills a part.
     #[must_use]
     pub const fn lost_percent(self) -> Option<u8> {
         match self {

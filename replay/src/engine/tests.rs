@@ -2,8 +2,10 @@ use super::counts::CacheCounts;
 use super::functional::Functional;
 use super::summary::summary;
 use super::*;
-use crate::cache::{AnyCache, Levels, MissPath};
-use crate::config::{BetweenFrames, CacheConfig, CountBy, Mode, Order, Replacement};
+use crate::config::{
+    BetweenFrames, CountBy, Inclusion, LevelConfig, Levels, Mode, Order, Replacement, TmuModel,
+};
+use crate::memory::Hierarchy;
 use crate::order::{self, Known, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
@@ -30,13 +32,12 @@ fn functional(order: Order) -> RunConfig {
     RunConfig {
         mode: Mode::Functional,
         order,
-        l1: CacheConfig::lru(1 << 10),
-        l2: CacheConfig::lru(8 << 10),
+        level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(8 << 10)),
         ..RunConfig::default()
     }
 }
 
-/// Orders of parts, for machines at random.
+/// Orders of parts for random machines.
 fn composed() -> impl Iterator<Item = Order> {
     let names = [
         "strip2+sta+offset",
@@ -48,11 +49,23 @@ fn composed() -> impl Iterator<Item = Order> {
     names.into_iter().map(|name| Order::find(name).unwrap())
 }
 
-/// LRU sets as plain lists, most recent last.
+/// Mode, and model of the texture unit.
+type Time = (Mode, TmuModel);
+
+const AT_ONCE: Time = (Mode::Functional, TmuModel::Looping);
+const LOOPING: Time = (Mode::Timed, TmuModel::Looping);
+const FIRST_MISS: Time = (Mode::Timed, TmuModel::FirstMiss);
+
+fn in_time((mode, model): Time, mut config: RunConfig) -> RunConfig {
+    (config.mode, config.tmu.model) = (mode, model);
+    config
+}
+
+/// LRU sets as plain lists, most recently used last.
 struct TwinCache(Vec<Vec<u64>>);
 
 impl TwinCache {
-    fn new(config: &CacheConfig) -> Self {
+    fn new(config: &LevelConfig) -> Self {
         Self(vec![Vec::new(); config.sets("", 16).unwrap() as usize])
     }
 
@@ -69,10 +82,13 @@ impl TwinCache {
     }
 }
 
-/// A straightforward single-core replay: no tables, no shortcuts.
+/// A straightforward single-core replay without tables and shortcuts.
 fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounters, usize) {
     let (mut c1, mut c2) = (LevelCounters::default(), LevelCounters::default());
-    let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
+    let (mut l1, mut l2) = (
+        TwinCache::new(&config.level.l1),
+        TwinCache::new(&config.level.l2),
+    );
     let mut seen = HashSet::new();
     let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
     let known = Known::new(config, &trace.tables.meta);
@@ -221,7 +237,7 @@ fn without_penalties_timed_equals_functional_on_one_core() {
             mode: Mode::Timed,
             ..functional
         };
-        (timed.tmu.l1_penalty_cycles, timed.tmu.l2_penalty_cycles) = (0, 0);
+        (timed.level.l2.hit_cycles, timed.memory_cycles) = (0, 0);
         let expected = replay(&trace, &functional).unwrap();
         let mut found = replay(&trace, &timed).unwrap();
         assert_eq!(found.tmu.take().unwrap().utilization, 1.0);
@@ -236,8 +252,7 @@ fn an_infinite_cache_misses_each_line_once() {
     for mode in [Mode::Functional, Mode::Timed] {
         let config = RunConfig {
             mode,
-            l1: CacheConfig::lru(1 << 10),
-            l2: CacheConfig::lru(64 << 20),
+            level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(64 << 20)),
             ..RunConfig::default()
         };
         let result = replay(&trace, &config).unwrap();
@@ -290,7 +305,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
     let result = replay(&trace, &config).unwrap();
     let left = &result.tile_maps[0];
     assert_eq!(left.tiles, [3, 3]);
-    // One layer of patches covers the left eye's image, and the cut tiles beyond it.
+    // One layer of patches covers the left eye's image and the parts of cut tiles beyond it.
     assert!(
         left.overdraw[..2].iter().all(|&o| o == 1.0),
         "{:?}",
@@ -300,7 +315,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
 
 #[test]
 fn misses_in_flight_are_merged_and_counted_apart() {
-    // Two quads at the same place: the second wants the lines that the first has in flight.
+    // Two quads at the same place: the second needs the lines that the first has in flight.
     let trace = MemoryTrace {
         tables: testing::tables(&[[64, 64]]),
         tiles: vec![
@@ -316,7 +331,7 @@ fn misses_in_flight_are_merged_and_counted_apart() {
 
 #[test]
 fn static_lrta_gives_each_core_its_own_view() {
-    // With one view a core, each L1 behaves as if it were alone.
+    // With one view per core, each L1 behaves as if it were the only one.
     let trace = small();
     let config = RunConfig {
         assign: Assign::Static,
@@ -362,7 +377,7 @@ fn a_trace_without_textures_has_no_footprints() {
     }
 }
 
-/// Results of all configurations in one batch that may keep so many bytes of lines.
+/// Results of all configurations in one batch, with a limit for the bytes of lines kept.
 fn all(trace: &MemoryTrace, configs: &[RunConfig], bytes: u64) -> Vec<RunResult> {
     let results = Mutex::new(vec![None; configs.len()]);
     let keep = |index: usize, result| results.lock().unwrap()[index] = Some(result);
@@ -372,7 +387,7 @@ fn all(trace: &MemoryTrace, configs: &[RunConfig], bytes: u64) -> Vec<RunResult>
     results.into_iter().map(Option::unwrap).collect()
 }
 
-/// One configuration on a machine of its own.
+/// Replays one configuration on the given machine.
 fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> RunResult {
     let expander = Expander::new(trace, config).unwrap();
     let expander = expander.with_distinct_lines(config.mode == Mode::Timed);
@@ -382,13 +397,15 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let known = Known::new(config, &trace.tables.meta);
     let phases = order::plan(config.order, &known, &trace.tables.passes);
     let mut cores = Cores::new(&frame, config.cores as usize);
-    machine.run(&mut cores, &phases, config.dispatch()).unwrap();
+    machine
+        .run(&mut cores, &phases, config.dispatch(), None)
+        .unwrap();
     let outcome = machine.outcome(config);
     let (tmu, cycles) = (outcome.tmu, outcome.cycles);
     RunResult {
         tmu,
         cycles,
-        l2_mshrs: outcome.path.mshrs,
+        memory: outcome.memory,
         ..summary(
             &trace.tables,
             expander.bins(),
@@ -399,23 +416,15 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     }
 }
 
-/// One functional configuration in caches of its own, behind pointers as any policy's are.
+/// Replays one functional configuration in caches of its own, boxed like those of any policy.
 fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
-    let Levels { l1, l2 } = Levels::build(config).unwrap();
-    let levels = Levels {
-        l1: l1.into_iter().map(AnyCache::into_box).collect(),
-        l2: l2.into_box(),
-    };
     let bins = Bins::new(&trace.tables, CountBy::Texture).unwrap();
     let counts = CacheCounts::new(&bins, config.tile_maps);
-    alone(
-        trace,
-        config,
-        &mut Functional::new(levels, counts, MissPath::build(config).unwrap()),
-    )
+    let caches = Hierarchy::build(config).unwrap();
+    alone(trace, config, &mut Functional::new(caches, counts))
 }
 
-/// Random machines that a twin is held against: `MACHINES=1000` for many.
+/// Number of random machines to compare with a twin; `MACHINES=1000` runs many.
 fn machines(usual: u32) -> u32 {
     let many = std::env::var("MACHINES").ok();
     many.map_or(usual, |many| many.parse().expect("MACHINES: a number"))
@@ -437,21 +446,21 @@ impl Random {
         values[self.below(values.len() as u64) as usize]
     }
 
-    /// An LRU cache of up to `most_sets` sets and any small number of ways.
-    fn cache(&mut self, most_sets: u64) -> CacheConfig {
+    /// A random LRU cache of up to `most_sets` sets and any small number of ways.
+    fn cache(&mut self, most_sets: u64) -> LevelConfig {
         let ways = self.of(&[1, 2, 3, 4, 4, 4, 5, 8, 12, 16]);
         let sets = 1 << self.below(u64::from(most_sets.ilog2()) + 1);
-        CacheConfig {
+        LevelConfig {
             ways,
-            ..CacheConfig::lru(sets * u64::from(ways) * 16)
+            ..LevelConfig::lru(sets * u64::from(ways) * 16)
         }
     }
 }
 
-/// A footprint as it was sent: core, cell and lines, repeats written out.
+/// A footprint in the stream: core, cell and lines, with repeats written out.
 type Sent = (usize, usize, Vec<u32>);
 
-/// Keeps the stream as it comes.
+/// Records the stream.
 #[derive(Default)]
 struct Recorder {
     sent: Vec<Sent>,
@@ -496,8 +505,8 @@ fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
                 ..functional(order)
             };
             let sent = sent(&trace, &config);
-            let mut l1: Vec<TwinCache> = (0..3).map(|_| TwinCache::new(&config.l1)).collect();
-            let mut l2 = TwinCache::new(&config.l2);
+            let mut l1: Vec<TwinCache> = (0..3).map(|_| TwinCache::new(&config.level.l1)).collect();
+            let mut l2 = TwinCache::new(&config.level.l2);
             let (mut l1_lines, mut l2_lines) = (0, 0);
             for (core, _, lines) in &sent {
                 for &line in lines {
@@ -526,7 +535,7 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
         for l1 in [64, 1 << 10, 1 << 20] {
             let config = RunConfig {
                 mode,
-                l1: CacheConfig::lru(l1),
+                level: Levels::two(LevelConfig::lru(l1), LevelConfig::lru(8 << 10)),
                 ..functional(Order::Z2_STA)
             };
             let result = replay(&trace, &config).unwrap();
@@ -539,10 +548,12 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
 fn caches_take_lines_that_no_trace_sent() {
     let config = functional(Order::MORTON);
     let bins = Bins::new(&testing::tables(&[[64, 64]]), CountBy::Texture).unwrap();
-    let levels = Levels::build(&config).unwrap().all_four_way().ok().unwrap();
-    let path = MissPath::build(&config).unwrap();
-    let mut caches = Functional::new(levels, CacheCounts::new(&bins, false), path);
-    let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
+    let hierarchy = Hierarchy::build(&config).unwrap();
+    let mut caches = Functional::new(hierarchy, CacheCounts::new(&bins, false));
+    let (mut l1, mut l2) = (
+        TwinCache::new(&config.level.l1),
+        TwinCache::new(&config.level.l2),
+    );
     let (mut l1_lines, mut l2_lines) = (0, 0);
     for step in 0..10_000_u64 {
         let line = step * step % 1009 + step % 7;
@@ -553,7 +564,7 @@ fn caches_take_lines_that_no_trace_sent() {
             l2_lines += u64::from(!l2.access(line));
         }
     }
-    let counted = &caches.counts.cells[0];
+    let counted = caches.outcome(&config).counts.cells[0];
     assert_eq!((counted.l1.lines, counted.l2.lines), (l1_lines, l2_lines));
     assert!(l1_lines > l2_lines && l2_lines > 1009);
 }
@@ -574,9 +585,9 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
                 mode,
                 ..functional(Order::Z2_STA)
             };
-            // A slot that is not full is carried over, a full one is not.
+            // A partly filled slot is carried over between frames. One footprint per slot leaves none partly filled.
             config.tmu.retry_footprints = 1;
-            (config.l1.replacement, config.l2.replacement) = (policy, policy);
+            (config.level.l1.replacement, config.level.l2.replacement) = (policy, policy);
             let flush = RunConfig {
                 between_frames: BetweenFrames::Flush,
                 ..config
@@ -584,10 +595,11 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             let single = replay(&one, &config).unwrap();
             let [kept, flushed] = [config, flush].map(|c| replay(&three, &c).unwrap());
             assert_eq!(flushed.footprints, 3 * single.footprints);
-            // Whom random replacement hits differs from frame to frame.
+            // Random victims differ from frame to frame.
             if policy != Replacement::RANDOM {
                 assert_ne!(kept.l2.misses, flushed.l2.misses, "{policy:?} {mode:?}");
-                // Predictions of the frame before may mislead; lines of the frame before are hit.
+                // Predictions trained by the previous frame can be wrong; without them, the previous
+                // frame's lines only add hits.
                 if [Replacement::LRU, Replacement::FIFO, Replacement::TREE_PLRU].contains(&policy) {
                     assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
                 }
@@ -607,7 +619,7 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
     }
 }
 
-/// Part of the L2 is lost between frames, against plain lists: in a shared pass, alone, and with caches of other types.
+/// Part of the L2 is lost between frames, compared with plain lists: in a shared pass, alone, and with caches of other types.
 #[test]
 fn other_work_between_frames_takes_its_share_of_the_l2() {
     let (one, three) = (small(), repeated(&small(), 3));
@@ -624,13 +636,13 @@ fn other_work_between_frames_takes_its_share_of_the_l2() {
             between_frames: BetweenFrames::Lose(percent),
             ..functional(Order::Z2_STA)
         };
-        config.l2.size_bytes = l2_bytes << 10;
-        config.l2.ways = ways;
+        config.level.l2.size_bytes = l2_bytes << 10;
+        config.level.l2.ways = ways;
         let sent = sent(&one, &config);
-        let mut l2 = one_pass::Twin::new(&config.l2);
+        let mut l2 = one_pass::Twin::new(&config.level.l2);
         let mut misses = 0;
         for frame in 0..3_u32 {
-            let mut l1 = [0, 1].map(|_| one_pass::Twin::new(&config.l1));
+            let mut l1 = [0, 1].map(|_| one_pass::Twin::new(&config.level.l1));
             for (core, _, lines) in &sent {
                 let missing = lines.iter().filter(|line| !l1[*core].access(**line));
                 misses += missing.filter(|line| !l2.access(**line)).count() as u64;
@@ -648,20 +660,15 @@ fn other_work_between_frames_takes_its_share_of_the_l2() {
         assert_eq!(result.l2.counters.line_misses, *misses, "{config:?}");
         assert_eq!(*result, replay(&three, config).unwrap());
     }
-    // All of the L2 is what a flush takes; less of it is less, but for what time changes.
-    for mode in [
-        Mode::Functional,
-        Mode::Timed,
-        Mode::FirstMiss,
-        Mode::PrefetchFifo,
-    ] {
+    // Losing all of the L2 equals a flush. Without time, losing less costs less.
+    let fifo = (Mode::Timed, TmuModel::PrefetchFifo);
+    for time in [AT_ONCE, LOOPING, FIRST_MISS, fifo] {
         let misses = |between_frames, replacement| {
             let mut config = RunConfig {
-                mode,
                 between_frames,
-                ..functional(Order::Z2_STA)
+                ..in_time(time, functional(Order::Z2_STA))
             };
-            config.l2.replacement = replacement;
+            config.level.l2.replacement = replacement;
             replay(&three, &config).unwrap().l2.counters.line_misses
         };
         for replacement in [Replacement::LRU, Replacement::FIFO] {
@@ -672,41 +679,102 @@ fn other_work_between_frames_takes_its_share_of_the_l2() {
                 BetweenFrames::Lose(100),
             ];
             let found = shares.map(|share| misses(share, replacement));
-            let is_sorted = mode != Mode::Functional || found.is_sorted();
+            let is_sorted = time != AT_ONCE || found.is_sorted();
             assert!(is_sorted, "{replacement:?}: {found:?}");
-            let is_less = mode == Mode::FirstMiss || found[0] < found[3];
-            assert!(is_less, "{mode:?} {replacement:?}: {found:?}");
+            let is_less = time == FIRST_MISS || found[0] < found[3];
+            assert!(is_less, "{time:?} {replacement:?}: {found:?}");
             assert_eq!(
                 found[3],
                 misses(BetweenFrames::Flush, replacement),
-                "{mode:?}"
+                "{time:?}"
             );
         }
     }
 }
 
+/// A machine with DRAM is simulated line by line, others in a shared pass. Misses are the same.
 #[test]
-fn a_part_of_the_l2_is_not_lost_beside_further_levels() {
+fn an_l2_per_core_misses_as_often_with_and_without_dram() {
+    let trace = small();
+    let misses = |shared, dram| {
+        let mut config = functional(Order::Z2_LRTA);
+        config.level.l2.shared = shared;
+        config.level.l2.size_bytes = 4 << 10;
+        config.dram = dram;
+        replay(&trace, &config).unwrap().l2.counters.line_misses
+    };
+    let dram = Some(crate::memory::dram::DramConfig::default());
+    let [of_all, of_each] = [true, false].map(|shared| misses(shared, None));
+    assert_eq!([of_all, of_each], [misses(true, dram), misses(false, dram)]);
+    assert_ne!(of_all, of_each);
+}
+
+/// Other work takes its share of each lower level too, whatever the inclusion, the sharing and the time.
+#[test]
+fn other_work_between_frames_takes_its_share_of_lower_levels() {
+    let three = repeated(&small(), 3);
+    for time in [AT_ONCE, LOOPING] {
+        for (inclusion, shared) in [
+            (Inclusion::None, true),
+            (Inclusion::None, false),
+            (Inclusion::Inclusive, true),
+            (Inclusion::Exclusive, true),
+        ] {
+            let misses = |between_frames| {
+                let mut config = RunConfig {
+                    between_frames,
+                    ..in_time(time, functional(Order::Z2_STA))
+                };
+                let l3 = LevelConfig {
+                    inclusion,
+                    ways: 16,
+                    ..LevelConfig::lru(64 << 10)
+                };
+                config.level = config.level.over(&[l3]).unwrap();
+                config.level.l2.size_bytes = 4 << 10;
+                config.level.l2.shared = shared;
+                let result = replay(&three, &config).unwrap();
+                result.memory.lower_levels[0].line_misses
+            };
+            let found = [
+                BetweenFrames::Keep,
+                BetweenFrames::Lose(50),
+                BetweenFrames::Lose(100),
+            ]
+            .map(misses);
+            let place = format!("{time:?} {inclusion:?} {shared}: {found:?}");
+            assert!(found.is_sorted() && found[0] < found[2], "{place}");
+            assert_eq!(found[2], misses(BetweenFrames::Flush), "{place}");
+        }
+    }
+}
+
+#[test]
+fn a_part_is_not_lost_of_levels_with_more_lines_than_other_work_has() {
     let mut config = functional(Order::MORTON);
     config.between_frames = BetweenFrames::Lose(50);
     config.validate().unwrap();
-    config.level.l3(1 << 20);
+    let l3 = LevelConfig {
+        ways: 16,
+        line_bytes: Some(64),
+        ..LevelConfig::lru(512 << 20)
+    };
+    config.level = config.level.over(&[l3]).unwrap();
     let error = config.validate().unwrap_err().to_string();
     assert!(
         error.starts_with("between_frames: expected keep or flush"),
         "{error}"
     );
+    config.between_frames = BetweenFrames::Flush;
+    config.validate().unwrap();
 }
 
-/// Counts by draw add up to those by texture: each material of the trace has textures of its own.
+/// Each material of the trace has its own textures, so counts by draw are sums of counts by texture.
 #[test]
 fn counts_by_draw_are_those_of_its_textures() {
     let trace = small();
-    for mode in [Mode::Functional, Mode::Timed, Mode::FirstMiss] {
-        let config = RunConfig {
-            mode,
-            ..functional(Order::Z2_STA)
-        };
+    for time in [AT_ONCE, LOOPING, FIRST_MISS] {
+        let config = in_time(time, functional(Order::Z2_STA));
         let by_texture = replay(&trace, &config).unwrap();
         let by_draw = RunConfig {
             count_by: CountBy::Draw,
@@ -718,7 +786,7 @@ fn counts_by_draw_are_those_of_its_textures() {
         assert!(by_draw.by_texture.is_empty() && by_draw.by_level.is_empty());
         by_draw.by_texture.clone_from(&by_texture.by_texture);
         by_draw.by_level.clone_from(&by_texture.by_level);
-        assert_eq!(by_draw, by_texture, "{mode:?}");
+        assert_eq!(by_draw, by_texture, "{time:?}");
         let textures_of = |draw: &formats::textrace::Draw| {
             let samples = draw.groups.iter().flat_map(|group| &group.samples);
             samples
@@ -741,8 +809,8 @@ fn counts_by_draw_are_those_of_its_textures() {
                 expected[0].add(&part.l1);
                 expected[1].add(&part.l2);
             }
-            // A footprint counts once, and so does a look-up of a line that several of its textures have.
-            assert_eq!(levels, expected, "{mode:?}");
+            // A footprint counts once per draw, and so does a look-up of a line shared by several of its textures.
+            assert_eq!(levels, expected, "{time:?}");
         }
     }
 }

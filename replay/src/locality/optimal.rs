@@ -1,25 +1,26 @@
 //! Belady's OPT for one cache over a recorded stream.
 
 use super::opt::{FullyAssociative, SetAssociative};
-use crate::config::{CacheConfig, ConfigError};
+use crate::config::{ConfigError, LevelConfig};
 use std::collections::HashMap;
 
-/// Misses of a cache under OPT.
+/// Misses of a cache with OPT replacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OptMisses {
-    /// With the cache's lines, fully associative: no cache of the size that every miss fills misses less.
+    /// Fully associative with the same number of lines: the fewest misses of any cache of this size that fills
+    /// on every miss.
     pub fully_associative: u64,
     /// With the cache's sets and ways.
     pub set_associative: u64,
 }
 
-/// What a cache of the size misses of a stream under OPT; its replacement policy does not matter.
+/// The misses of a cache of this size for a stream with OPT replacement. Ignores the configured policy.
 ///
 /// # Errors
-/// A geometry that no cache can have.
+/// An impossible geometry.
 pub fn opt_misses(
     stream: &[u32],
-    cache: &CacheConfig,
+    cache: &LevelConfig,
     line_bytes: u32,
 ) -> Result<OptMisses, ConfigError> {
     let sets = cache.sets("L2", line_bytes)?;
@@ -45,7 +46,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Belady's rule as it is told: evict what is used again last.
+    /// Belady's rule directly: evicts the line whose next use is latest.
     fn plain(stream: &[u32], sets: u32, ways: usize) -> u64 {
         let mut misses = 0;
         let mut held: Vec<Vec<u32>> = vec![Vec::new(); sets as usize];
@@ -74,7 +75,7 @@ mod tests {
             stream in prop::collection::vec(0_u32..40, 0..200), sets in 0_u32..3, ways in 1_u32..5,
         ) {
             let sets = 1 << sets;
-            let cache = CacheConfig { ways, ..CacheConfig::lru(u64::from(sets * ways) * 16) };
+            let cache = LevelConfig { ways, ..LevelConfig::lru(u64::from(sets * ways) * 16) };
             let found = opt_misses(&stream, &cache, 16).unwrap();
             prop_assert_eq!(found.set_associative, plain(&stream, sets, ways as usize));
             prop_assert_eq!(found.fully_associative, plain(&stream, 1, (sets * ways) as usize));

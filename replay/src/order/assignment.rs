@@ -1,25 +1,25 @@
-//! Which core takes which item.
+//! The assignment of items to cores.
 //!
-//! Two rules stand in the configuration: the core that becomes idle first takes the next item, or items go round. The
-//! others deal the items of a round, as many as there are cores, to the cores where each is best off.
+//! The configuration has two rules: first idle and round robin. The other rules permute the items of each
+//! round, which has one item per core, so that items go to the cores with the best locality.
 
 use super::cost::Cost;
 use super::{TileRef, WorkItem};
 use crate::config::Assign;
 
-/// A rule that an order may bring.
+/// A rule that may be part of an order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Assignment {
     /// The next item goes to the core that becomes idle first.
     FirstIdle,
     /// Round robin.
     Static,
-    /// Of each round, an item goes to the core whose last tile lies nearest.
+    /// In each round, an item goes to the core whose last tile is nearest.
     Affinity,
-    /// Cores have places on the screen, which are mirrored from group to group of tiles, so that tiles on both sides of a
-    /// group's edge are the same core's (as DTexL places quads, Joseph et al., MICRO 2022).
+    /// Cores have fixed places in groups of tiles. Adjacent groups are mirrored, so that the tiles on both
+    /// sides of their common edge belong to one core (as DTexL does for quads, Joseph et al., MICRO 2022).
     Quads,
-    /// Each core takes four consecutive items, so that neighbours along the curve are mostly the same core's.
+    /// Each core takes four consecutive items, so that most neighbours along the curve belong to one core.
     Runs,
 }
 
@@ -27,7 +27,7 @@ pub enum Assignment {
 const RUN: usize = 4;
 
 impl Assignment {
-    /// All of them.
+    /// All values.
     pub const ALL: [Self; 5] = [
         Self::FirstIdle,
         Self::Static,
@@ -48,7 +48,7 @@ impl Assignment {
         }
     }
 
-    /// How the items, once dealt, are handed out.
+    /// The rule of the configuration that distributes the permuted items.
     #[must_use]
     pub const fn dispatch(self) -> Assign {
         match self {
@@ -57,23 +57,24 @@ impl Assignment {
         }
     }
 
-    /// What hardware needs for it.
+    /// Its hardware cost.
     pub(super) fn cost(self, cores: u32) -> Cost {
         match self {
             Self::FirstIdle | Self::Static => Cost::state(0),
-            // Each core's last tile, and a comparison with each item of the round.
+            // The last tile of each core, which is compared with each item of the round.
             Self::Affinity => Cost::state(4 * cores)
                 .looking_ahead(cores)
                 .deciding_in(cores),
             Self::Quads => Cost::state(0).looking_ahead(cores).deciding_in(1),
-            // A place for each core.
+            // A position per core.
             Self::Runs => Cost::state(4 * cores)
                 .looking_ahead(cores * RUN as u32)
                 .deciding_in(1),
         }
     }
 
-    /// The items with those of each round in the order of their cores. `column_counts` has the tile columns of each pass.
+    /// Permutes the items of each round into the order of their cores. `column_counts` returns the tile columns
+    /// of a pass.
     pub(super) fn deal(
         self,
         items: Vec<WorkItem>,
@@ -124,11 +125,12 @@ impl Assignment {
     }
 }
 
-/// Stretches of items, a run for each core in each: the first item of every run, then the second ones.
+/// Divides the items into groups with one run per core. A group lists the first item of every run, then the
+/// second items, and so on.
 fn runs(items: &[WorkItem], cores: usize) -> Vec<WorkItem> {
     let mut dealt = Vec::with_capacity(items.len());
     for stretch in items.chunks(cores * RUN) {
-        // The last stretch has shorter runs: every round but the last one is full.
+        // The last group has shorter runs: all rounds except the last are full.
         let rounds = stretch.len().div_ceil(cores);
         let longer = stretch.len() - (rounds - 1) * cores;
         let first = |core: usize| core * (rounds - 1) + core.min(longer);
@@ -146,7 +148,7 @@ fn first_tile(item: &WorkItem) -> TileRef {
     }
 }
 
-/// The core whose place on the screen has the tile: cores form a rectangle of nearly equal sides, mirrored at its edges.
+/// The core at a tile. The cores form a rectangle with nearly equal sides, which is mirrored at its edges.
 fn core_at([x, y]: [u32; 2], cores: usize) -> usize {
     let rows = (1..=cores)
         .rev()
@@ -178,7 +180,7 @@ mod tests {
 
     #[test]
     fn both_sides_of_a_groups_edge_are_one_cores() {
-        // Cores 0 and 1 have columns 0, 3, 4, 7 and 1, 2, 5, 6.
+        // Core 0 has columns 0, 3, 4 and 7. Core 1 has columns 1, 2, 5 and 6.
         assert_eq!(dealt(Assignment::Quads, 2, 0..8), [0, 1, 3, 2, 4, 5, 7, 6]);
         let cores: Vec<usize> = (0..4).map(|x| core_at([x, 1], 4)).collect();
         assert_eq!(cores, [2, 3, 3, 2]);

@@ -1,14 +1,14 @@
-//! Orders of parts that no row of the table has: made when they are first named, and kept.
+//! Orders whose parts have no row in the table. They are created when first named, and kept.
 
 use super::parts::Parts;
 use super::{Order, OrderRow};
 use std::sync::{Mutex, PoisonError};
 
-/// Those that were named so far. An order is copied with every configuration, so its name lives as long as the program;
-/// a name is kept once.
+/// The orders created so far. An order is copied with every configuration, so its name must live until the
+/// program ends. Each name is stored once.
 static NAMED: Mutex<Vec<&'static OrderRow>> = Mutex::new(Vec::new());
 
-/// The order with these parts: the table's row of the same parts, else one with a name of its parts.
+/// The order with these parts: the table's row with the same parts, otherwise an order whose name lists them.
 pub(super) fn order(parts: Parts) -> Order {
     if let Some(order) = Order::all().find(|order| order.parts() == parts) {
         return order;

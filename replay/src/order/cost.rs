@@ -1,12 +1,12 @@
-//! What an order needs of hardware.
+//! The hardware cost of an order.
 //!
-//! Figures are those of a plain implementation with 16-bit tile coordinates: bytes that change while a frame is
-//! traversed (*state*), bytes of tables in memory or on the chip, work items that must be known ahead, and cycles until
-//! the next item is known.
+//! The figures describe a plain implementation with 16-bit tile coordinates: bytes that change during a frame
+//! (*state*), bytes of tables in memory or on the chip, work items that must be known in advance
+//! (*look-ahead*), and cycles until the next item is known (*decision*).
 
 use serde::Serialize;
 
-/// What an order knows when it decides.
+/// The information that an order uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Knows {
@@ -15,9 +15,9 @@ pub enum Knows {
     Grid,
     /// Constants of the display: its projections.
     Display,
-    /// What was counted in the last frame.
+    /// Counters of the last frame.
     LastFrame,
-    /// The frame's own accesses, which nobody knows before they are made: a bound, not an order.
+    /// Accesses of the current frame. They are not known in advance, so this is a bound, not an order.
     Future,
 }
 
@@ -34,25 +34,25 @@ impl Knows {
     }
 }
 
-/// What an order needs.
+/// The cost of an order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// Registers.
     pub state_bytes: u32,
-    /// Tables, constant in a frame.
+    /// Tables that are constant during a frame.
     pub table_bytes: u64,
-    /// Work items that must be known ahead.
+    /// Work items that must be known in advance.
     pub look_ahead_items: u32,
-    /// Tile buffers a core needs at a time.
+    /// Tile buffers per core.
     pub tile_buffers: u32,
     /// Cycles until the next item is known.
     pub decision_cycles: u32,
-    /// What it knows.
+    /// The information that it uses.
     pub knows: Knows,
 }
 
 impl Cost {
-    /// So many registers, one tile buffer, and nothing else.
+    /// Registers of this size and one tile buffer.
     #[must_use]
     pub fn state(state_bytes: u32) -> Self {
         Self {
@@ -94,7 +94,7 @@ impl Cost {
         }
     }
 
-    /// Both together, one deciding after the other.
+    /// The sum of two costs. Decisions take place one after the other.
     #[must_use]
     pub(super) fn and(self, other: Self) -> Self {
         Self {
@@ -107,7 +107,7 @@ impl Cost {
         }
     }
 
-    /// True for what hardware can have: nothing of it lies in the future.
+    /// True if hardware can implement the order, because it does not use accesses of the current frame.
     #[must_use]
     pub fn is_buildable(&self) -> bool {
         self.knows < Knows::Future

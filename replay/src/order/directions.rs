@@ -1,4 +1,4 @@
-//! Where directions fall in the pictures of two eyes: what is far away lies in the same direction for both.
+//! Maps directions to the pictures of two eyes. Distant points lie in the same direction for both.
 
 use super::View;
 use formats::view::EyeView;
@@ -14,17 +14,17 @@ fn unit(a: Vector) -> Option<Vector> {
     (length > 1e-6).then(|| a.map(|x| x / length))
 }
 
-/// Directions nearly at a right angle to straight ahead, and beyond, are taken for this tangent.
+/// Directions at nearly a right angle to straight ahead, or further, are clamped to this tangent.
 const MOST_TANGENT: f64 = 8.0;
 
 /// One eye: its axes in the world, and its projection.
 #[derive(Clone, Copy, Debug)]
 struct Eye {
     axes: [Vector; 3],
-    /// Scale and shift from tangents to the picture, which goes from -1 to 1.
+    /// Scale and shift from tangents to the picture, whose coordinates range from -1 to 1.
     scale: [f64; 2],
     shift: [f64; 2],
-    /// Tiles of half the picture.
+    /// Half of the picture's size in tiles.
     half_tiles: [f64; 2],
 }
 
@@ -44,7 +44,7 @@ impl Eye {
         })
     }
 
-    /// The direction of a place in the picture, in tiles from its top left.
+    /// The direction of a position in the picture, which is given in tiles from its top left.
     fn direction(&self, [x, y]: [f64; 2]) -> Vector {
         let at = [x / self.half_tiles[0] - 1.0, 1.0 - y / self.half_tiles[1]];
         let [right, up] = [0, 1].map(|axis| (at[axis] + self.shift[axis]) / self.scale[axis]);
@@ -52,7 +52,7 @@ impl Eye {
         [0, 1, 2].map(|i| right * x[i] + up * y[i] - z[i])
     }
 
-    /// Where a direction falls, in tiles from the top left; none behind the eye.
+    /// The position of a direction in tiles from the top left; none behind the eye.
     fn tile(&self, direction: Vector) -> Option<[f64; 2]> {
         let [right, up, back] = self.axes.map(|axis| dot(axis, direction));
         let ahead = -back;
@@ -68,7 +68,7 @@ impl Eye {
     }
 }
 
-/// Both eyes, and between them the head.
+/// Both eyes, and the head between them.
 #[derive(Clone, Copy, Debug)]
 pub struct Directions {
     eyes: [Eye; 2],
@@ -77,7 +77,7 @@ pub struct Directions {
 }
 
 impl Directions {
-    /// None for matrices that are no eyes'.
+    /// None if the matrices do not describe eyes.
     pub fn new(views: &[EyeView; 2], of: [View; 2], tile_px: u32) -> Option<Self> {
         let eyes = [
             Eye::new(&views[0], of[0], tile_px)?,
@@ -93,27 +93,28 @@ impl Directions {
         })
     }
 
-    /// Columns and rows by which the right eye's picture of what is straight ahead lies left of and above the left eye's.
+    /// Columns and rows by which straight ahead lies further left and further up in the right eye's picture
+    /// than in the left eye's.
     pub fn offset(&self) -> [i32; 2] {
         let ahead = self.head[2].map(|x| -x);
         let [left, right] = self.eyes.map(|eye| eye.tile(ahead));
         match (left, right) {
             (Some(left), Some(right)) => [0, 1].map(|axis| {
                 let tiles = (left[axis] - right[axis]).round();
-                // Not more than any picture has.
+                // Limited to the size of the largest picture.
                 tiles.clamp(-4096.0, 4096.0) as i32
             }),
             _ => [0, 0],
         }
     }
 
-    /// Where the middle of a tile of one eye falls in the picture of the other, in tiles.
+    /// The position of the centre of one eye's tile in the picture of the other eye, in tiles.
     pub fn in_other_eye(&self, eye: usize, tile: [u32; 2]) -> Option<[f64; 2]> {
         self.eyes[1 - eye].tile(self.middle(eye, tile))
     }
 
-    /// The cell of the head's own picture, whose cells are as large as the left eye's tiles: columns to the right and rows down
-    /// from straight ahead.
+    /// The cell in the picture of the head, whose cells are as large as the left eye's tiles. Columns count to
+    /// the right and rows downwards from straight ahead.
     pub fn in_head(&self, eye: usize, tile: [u32; 2]) -> [i32; 2] {
         let direction = self.middle(eye, tile);
         let [right, up, back] = self.head.map(|axis| dot(axis, direction));
@@ -141,10 +142,11 @@ impl Directions {
 mod tests {
     use super::*;
 
-    /// An eye turned by an angle with this sine and cosine, with tangents to left, right, up and down.
+    /// An eye that is turned by an angle with this sine and cosine. The tangents are those of its left, right,
+    /// top and bottom edges.
     fn eye([sine, cosine]: [f32; 2], [left, right, up, down]: [f32; 4]) -> EyeView {
         let mut view = EyeView::default();
-        // Columns; rows are the eye's axes.
+        // Stored by column. The rows are the eye's axes.
         view.world_to_eye[0] = [cosine, 0.0, sine, 0.0];
         view.world_to_eye[2] = [-sine, 0.0, cosine, 0.0];
         view.eye_to_clip = [
@@ -182,7 +184,8 @@ mod tests {
 
     #[test]
     fn wider_outer_angles_shift_infinity() {
-        // Straight ahead at 2/3 of the left picture and 1/3 of the right one, half as high in the left one.
+        // Straight ahead lies at 2/3 of the left picture and 1/3 of the right one, at half the height in the
+        // left one.
         let left = eye(AHEAD, [2.0, 1.0, 1.0, 1.0]);
         let right = eye(AHEAD, [1.0, 2.0, 1.0, 3.0]);
         assert_eq!(directions(left, right).offset(), [20, 17]);
@@ -190,10 +193,11 @@ mod tests {
 
     #[test]
     fn canted_eyes_see_the_same_direction_at_places_that_follow_from_the_angle() {
-        // The left eye looks 3-4-5 to the left, the right one ahead.
+        // The left eye is turned to the left by the angle of a 3-4-5 triangle. The right eye looks straight
+        // ahead.
         let left = eye([0.6, 0.8], [1.0; 4]);
         let directions = directions(left, eye(AHEAD, [1.0; 4]));
-        // Straight ahead of the left eye is at the tangent -3/4 of the right one.
+        // The axis of the left eye lies at the tangent -3/4 in the right eye.
         let [x, y] = directions.eyes[1]
             .tile(directions.eyes[0].direction([30.0, 34.0]))
             .unwrap();

@@ -1,20 +1,20 @@
-//! Orders that are lists of items: found by a search with the frame's own accesses in hand, so that no hardware can
-//! have them.
+//! Orders given as lists of items. A search finds them from the accesses of the frame, so hardware cannot
+//! implement them.
 
 use super::cost::{Cost, Knows};
 use super::parts::Parts;
 use super::{Order, OrderRow, View, WorkItem};
 use crate::palette::GREY;
 
-/// Items of pairs of views, by the left view's pass.
+/// The items of pairs of views, by the left view's pass.
 #[derive(Clone, Debug, Default)]
 pub struct Listed {
-    /// Pass of the left view, and the items in order.
+    /// The pass of the left view, and the items in order.
     pub pairs: Vec<(u32, Vec<WorkItem>)>,
 }
 
 impl Listed {
-    /// The whole list, and the frame's future.
+    /// The whole list, and knowledge of the frame's accesses.
     pub(super) fn cost(&self) -> Cost {
         let longest = self.pairs.iter().map(|(_, items)| items.len()).max();
         let items = longest.unwrap_or(0) as u64;
@@ -29,7 +29,8 @@ impl Listed {
 }
 
 impl Order {
-    /// An order of one trace: pairs of views as listed, the rest as these parts. Kept as long as the program runs.
+    /// An order for one trace: pairs of views as listed, other views by these parts. It is kept until the
+    /// program ends.
     #[must_use]
     pub fn listed(name: &str, parts: Parts, listed: Listed) -> Self {
         let name: &'static str = name.to_owned().leak();
@@ -43,7 +44,7 @@ impl Order {
         })))
     }
 
-    /// The items that are listed for a pair of views.
+    /// The listed items of a pair of views.
     pub(super) fn listed_items(self, left: View) -> Option<&'static [WorkItem]> {
         let pairs = &self.row().listed?.pairs;
         let found = pairs.iter().find(|(pass, _)| *pass == left.pass);

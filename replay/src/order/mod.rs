@@ -1,9 +1,10 @@
 //! Tile orders: pure functions from the tile grids to a sequence of work.
 //!
-//! An order is a curve over a grid of cells ([`curve`]), a rule which tiles of the two eyes share a cell ([`pairing`]), how the
-//! two follow each other, a direction, and which core takes what ([`assignment`]). A name lists the parts, as in
-//! `zig-zag+sta+offset+boustro`; the paper's orders have names of their own. A new curve or pairing is a file and a row of
-//! its table: configurations, flags, help and plots are derived from the row.
+//! An order consists of a curve over a grid of cells ([`curve`]), a rule that pairs the tiles of the two eyes
+//! ([`pairing`]), a way to combine the tiles of a pair, a direction, and an assignment of items to cores
+//! ([`assignment`]). A name lists the parts, as in `zig-zag+sta+offset+boustro`. The paper's orders have their
+//! own names. A new curve or pairing is a file and a row of its table: configurations, flags, help and plots
+//! are derived from the row.
 
 pub mod assignment;
 mod composed;
@@ -43,7 +44,7 @@ registry! { OrderRow, other = composed_by_name:
     COLUMNS =      row("test-columns", "Columns",      GREY,      "Columns from the top",                                     Parts::of(Curve::COLUMNS));
 }
 
-/// A tile order: a row of the table, or parts.
+/// A tile order: a row of the table, or a combination of parts.
 pub type Order = Named<OrderRow>;
 
 /// A row of the table of tile orders.
@@ -55,7 +56,7 @@ pub struct OrderRow {
     color: Rgb,
     help: &'static str,
     parts: Parts,
-    /// Where items of pairs of views do not follow from the parts.
+    /// The items of pairs of views, if they do not follow from the parts.
     listed: Option<&'static Listed>,
 }
 
@@ -76,7 +77,7 @@ const fn row(
     }
 }
 
-/// The order whose parts a name lists; a single name that no curve has is nothing of parts.
+/// The order whose parts the name lists.
 fn composed_by_name(name: &str) -> Result<Order, Option<String>> {
     match Parts::parse(name) {
         Ok(parts) => Ok(composed::order(parts)),
@@ -97,19 +98,19 @@ impl Order {
         self.row().color
     }
 
-    /// What it is made of.
+    /// The parts of the order.
     #[must_use]
     pub fn parts(self) -> Parts {
         self.row().parts
     }
 
-    /// The order of these parts.
+    /// The order with these parts.
     #[must_use]
     pub fn of(parts: Parts) -> Self {
         composed::order(parts)
     }
 
-    /// The order for an L2 of this size: with the number that is meant where none stands behind its curve's name.
+    /// The order for an L2 of this size: adds the default number of its curve, if the name has no number.
     #[must_use]
     pub fn resolved(self, l2_bytes: u64) -> Self {
         match self.parts().resolved(l2_bytes) {
@@ -118,21 +119,21 @@ impl Order {
         }
     }
 
-    /// How cores take its items: as it says, else as the configuration does.
+    /// How items are assigned to cores: by the order if it contains an assignment, otherwise as configured.
     #[must_use]
     pub fn dispatch(self, configured: Assign) -> Assign {
         let own = self.parts().assignment;
         own.map_or(configured, assignment::Assignment::dispatch)
     }
 
-    /// Work of the pictures of two eyes, passes 0 and 1, of so many whole tiles each.
+    /// The work for the pictures of two eyes, passes 0 and 1, which consist of whole tiles.
     #[must_use]
     pub fn stereo(self, tiles: [u32; 2], known: &Known<'_>) -> Vec<WorkItem> {
         let [left, right] = [0, 1].map(|pass| View::grid(pass, tiles));
         self.parts().stereo(left, right, known)
     }
 
-    /// What hardware needs for views of `tiles`.
+    /// The hardware cost for views of `tiles`.
     #[must_use]
     pub fn cost(self, tiles: [u32; 2], cores: u32) -> Cost {
         match self.row().listed {

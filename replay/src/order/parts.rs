@@ -1,4 +1,4 @@
-//! An order as its parts, and their names: `zig-zag+sta+offset+boustro`.
+//! The parts of an order, and order names that list them: `zig-zag+sta+offset+boustro`.
 
 use super::assignment::Assignment;
 use super::cost::Cost;
@@ -7,7 +7,7 @@ use super::pairing::{Pairing, Placement, tiles};
 use super::{Interleave, Known, TileRef, View, WorkItem};
 use std::fmt;
 
-/// How the tiles of both eyes follow each other along the curve.
+/// How an order combines the tiles of both eyes along the curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Eyes {
     /// The whole left view, then the whole right view.
@@ -19,7 +19,7 @@ pub enum Eyes {
 }
 
 impl Eyes {
-    /// All of them.
+    /// All values.
     pub const ALL: [Self; 5] = [
         Self::ViewByView,
         Self::InTurn,
@@ -52,7 +52,7 @@ impl Eyes {
     }
 }
 
-/// In which direction the curve is followed.
+/// The direction of traversal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Always the same.
@@ -64,7 +64,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// All of them.
+    /// All values.
     pub const ALL: [Self; 3] = [Self::Same, Self::Boustro, Self::RightReversed];
 
     /// Name in an order's name.
@@ -78,7 +78,7 @@ impl Direction {
     }
 
     fn cost(self) -> Cost {
-        // A bit is a byte here.
+        // Costs count whole bytes, even for a single bit.
         Cost::state(u32::from(self == Self::Boustro))
     }
 }
@@ -88,23 +88,23 @@ impl Direction {
 pub struct Parts {
     /// The path through the cells of a grid.
     pub curve: Curve,
-    /// The number behind the curve's name; none for the usual one.
+    /// The number after the curve's name; none for the curve's default.
     pub size: Option<u32>,
-    /// How tiles of both eyes follow each other.
+    /// How the tiles of both eyes are combined.
     pub eyes: Eyes,
     /// Which tiles share a cell.
     pub pairing: Pairing,
-    /// Direction.
+    /// Direction of traversal.
     pub direction: Direction,
-    /// Which core takes which item; none where the configuration says it.
+    /// The assignment of items to cores; none if the configuration decides.
     pub assignment: Option<Assignment>,
 }
 
-/// The largest number behind a curve's name.
+/// The largest number after a curve's name.
 const MOST_SIZE: u32 = 1 << 20;
 
 impl Parts {
-    /// A curve, view by view.
+    /// A curve that traverses one view after the other.
     #[must_use]
     pub const fn of(curve: Curve) -> Self {
         Self {
@@ -117,16 +117,16 @@ impl Parts {
         }
     }
 
-    /// The same with tiles of both eyes as given.
+    /// These parts with another combination of the eyes.
     #[must_use]
     pub const fn with(self, eyes: Eyes) -> Self {
         Self { eyes, ..self }
     }
 
-    /// Reads an order's name: the curve's, then those of other parts, each behind a `+`.
+    /// Parses an order's name: the name of the curve, then a `+` and a name for each other part.
     ///
     /// # Errors
-    /// An unknown part, a part named twice, or parts that mean nothing together.
+    /// An unknown part, two parts of one kind, or parts that cannot be combined.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut names = text.split('+');
         let (curve, size) = curve(names.next().unwrap_or_default())?;
@@ -145,14 +145,14 @@ impl Parts {
         parts.check()
     }
 
-    /// True for a name of several parts, or of a curve with a number.
+    /// True for a name with several parts, and for a curve with or without a number.
     #[must_use]
     pub fn is_composed(name: &str) -> bool {
         let curve = name.trim_end_matches(|c: char| c.is_ascii_digit());
         name.contains('+') || Curve::find(curve).is_some()
     }
 
-    /// Sets the part of this name: what kind of part it is.
+    /// Sets the part with this name. Returns its kind.
     fn set(&mut self, name: &str) -> Option<&'static str> {
         if let Some(eyes) = Eyes::ALL.into_iter().find(|eyes| eyes.name() == name) {
             self.eyes = eyes;
@@ -171,7 +171,7 @@ impl Parts {
         Some("assignment")
     }
 
-    /// Refuses parts that mean nothing together.
+    /// Refuses parts that cannot be combined.
     fn check(self) -> Result<Self, String> {
         let alone = self.eyes == Eyes::ViewByView;
         if alone && self.pairing != Pairing::INDEX {
@@ -189,7 +189,7 @@ impl Parts {
         Ok(self)
     }
 
-    /// The same with the number that is meant where none stands behind the curve's name.
+    /// These parts with the curve's default number for this L2, unless they contain a number.
     #[must_use]
     pub fn resolved(self, l2_bytes: u64) -> Self {
         let usual = || self.curve.usual_size(l2_bytes);
@@ -200,14 +200,14 @@ impl Parts {
         Self { size, ..self }
     }
 
-    /// True where counters of the last frame are needed.
+    /// True if the order needs counters of the last frame.
     #[must_use]
     pub fn needs_counters(&self) -> bool {
         let pairing = self.pairing == Pairing::ROW_PRIMITIVES || self.pairing == Pairing::ROW_LINES;
         pairing || self.curve == Curve::ADAPTIVE
     }
 
-    /// What hardware needs for views of `tiles`.
+    /// The hardware cost for views of `tiles`.
     #[must_use]
     pub fn cost(&self, tiles: [u32; 2], cores: u32) -> Cost {
         let assignment = self.assignment.unwrap_or(Assignment::FirstIdle);
@@ -221,7 +221,7 @@ impl Parts {
         parts.into_iter().fold(curve, Cost::and)
     }
 
-    /// A grid of cells for a view, or for a left view and its partner.
+    /// The grid of cells for a view, or for a left view and its partner.
     fn ground(&self, grid: [u32; 2], view: View, known: &Known<'_>) -> Ground {
         Ground {
             grid,
@@ -233,7 +233,7 @@ impl Parts {
         }
     }
 
-    /// Work of one view alone.
+    /// The work of a single view.
     pub(super) fn mono(&self, view: View, known: &Known<'_>) -> Vec<WorkItem> {
         let cells = self
             .curve
@@ -243,7 +243,7 @@ impl Parts {
         cells.into_iter().filter_map(tile).collect()
     }
 
-    /// Work of a stereo pair. A tile without a partner is an item of its own.
+    /// The work of a stereo pair. A tile without a partner is an item of its own.
     #[must_use]
     pub fn stereo(&self, left: View, right: View, known: &Known<'_>) -> Vec<WorkItem> {
         if self.eyes == Eyes::ViewByView {
@@ -285,7 +285,7 @@ impl Parts {
     }
 }
 
-/// The tiles of each cell in the order of the curve, those of each eye apart.
+/// The tiles of each cell in the order of the curve, separately for each eye.
 fn by_cell(placement: &Placement, cells: &[[u32; 2]], eyes: [View; 2]) -> Vec<[Vec<TileRef>; 2]> {
     let columns = placement.grid[0] as usize;
     let index = |[x, y]: [u32; 2]| y as usize * columns + x as usize;
@@ -303,7 +303,7 @@ fn by_cell(placement: &Placement, cells: &[[u32; 2]], eyes: [View; 2]) -> Vec<[V
     found
 }
 
-/// A curve's name, and the number behind it.
+/// Splits a curve's name and the number after it.
 fn curve(text: &str) -> Result<(Curve, Option<u32>), String> {
     if let Some(curve) = Curve::find(text) {
         return Ok((curve, None));
@@ -338,7 +338,7 @@ fn unknown_part(name: &str) -> String {
     format!("`{name}`: expected a part, one of {}", known.join(", "))
 }
 
-/// The name: parts that are usual are left out.
+/// The name without default parts.
 impl fmt::Display for Parts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.curve.name())?;

@@ -12,8 +12,8 @@ use formats::view::Eye;
 /// map, a frame the one before).
 pub type Phase = Vec<WorkItem>;
 
-/// All work of a trace: frame after frame, monoscopic passes before the stereo pair. Of the last frame nothing is
-/// known but what `known` has.
+/// All work of a trace: frame after frame, monoscopic passes before the stereo pair. All frames use the
+/// counters in `known`.
 #[must_use]
 pub fn plan(order: Order, known: &Known<'_>, passes: &[Pass]) -> Vec<Phase> {
     let mut frames: Vec<u32> = passes.iter().map(|p| p.frame).collect();
@@ -47,7 +47,7 @@ pub fn plan_frame(order: Order, known: &Known<'_>, passes: &[Pass], frame: u32) 
     phases.into_iter().map(deal).collect()
 }
 
-/// What a phase shows.
+/// The views of a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Views {
     /// One view alone.

@@ -19,11 +19,12 @@ pub enum Interleave {
     Alternate,
     /// By primitive number, left first, so that the same triangle is adjacent.
     Merge,
-    /// The upper halves of both tiles in turn, then the lower halves: as much is in work as of one tile.
+    /// The upper halves of both tiles in turn, then the lower halves. The fragments in progress fit into one
+    /// tile buffer.
     Halves,
 }
 
-/// What a core is given at a time.
+/// The unit of work of a core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkItem {
     /// One tile.
@@ -33,7 +34,7 @@ pub enum WorkItem {
 }
 
 impl WorkItem {
-    /// The tiles of the item, the first one first.
+    /// The tiles of the item, in rendering order.
     pub fn tiles(&self) -> impl Iterator<Item = TileRef> {
         let (first, second) = match *self {
             Self::Tile(tile) => (tile, None),
@@ -52,14 +53,14 @@ pub struct View {
     pub tiles: [u32; 2],
     /// Width and height in pixels.
     pub size_px: [u32; 2],
-    /// What it shows.
+    /// Kind of the pass.
     pub kind: PassKind,
-    /// Number among the frame's passes.
+    /// Index among the frame's passes.
     pub number: u32,
 }
 
 impl View {
-    /// The view of a pass, the `number`-th of its frame.
+    /// The view of a pass, given its index in its frame.
     #[must_use]
     pub const fn of(index: u32, number: u32, pass: &Pass) -> Self {
         Self {
@@ -71,7 +72,7 @@ impl View {
         }
     }
 
-    /// An eye's picture of so many whole tiles.
+    /// An eye's picture that consists of whole tiles.
     #[must_use]
     pub const fn grid(pass: u32, tiles: [u32; 2]) -> Self {
         Self {

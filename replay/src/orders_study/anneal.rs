@@ -1,32 +1,32 @@
-//! Simulated annealing of an order: moves that bring items next to ones that use the same lines or lie beside them,
-//! each judged by the misses that it changes.
+//! Simulated annealing of an order. Moves bring items next to items that use the same lines or are neighbours.
+//! The change in misses decides about each move.
 //!
-//! What an LRU cache holds depends only on the items used recently. So a move is judged by replaying from the block in
-//! which it changes something up to where the cache holds what it held before at the same place.
+//! The contents of an LRU cache depend only on recent items. To evaluate a move, the items are replayed from
+//! the first changed block to the block at whose end the cache contents equal the former ones.
 
 use super::items::{Items, Lru};
 
-/// Items between two stored states of the cache.
+/// Number of items between two stored states of the cache.
 const BLOCK: usize = 32;
 
-/// Moves that reach further than this are not tried: they would replay most of the order.
+/// The maximum range of a move. Larger moves would replay most of the order.
 const REACH: usize = 1500;
 
-/// How long, and how hot.
+/// The length and the temperatures of annealing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
-    /// Moves to try.
+    /// Number of moves to try.
     pub moves: u64,
-    /// Misses by which a move may be worse at first, about one of three times.
+    /// At the start, a move that adds this number of misses is accepted with a probability of about one third.
     pub from_misses: f64,
-    /// Likewise at the end.
+    /// The same at the end.
     pub to_misses: f64,
     /// Seed of the moves.
     pub seed: u64,
 }
 
 impl Schedule {
-    /// Temperatures that did well on the design cameras of docs/orders.md.
+    /// Temperatures chosen on the design cameras of docs/results/orders.md.
     #[must_use]
     pub fn new(moves: u64, seed: u64) -> Self {
         Self {
@@ -60,14 +60,14 @@ impl Random {
     }
 }
 
-/// A change of an order that can be undone.
+/// A reversible change of an order.
 #[derive(Clone, Copy, Debug)]
 enum Move {
     /// Reverses items.
     Reverse(usize, usize),
-    /// Rotates the items from the first place to the last to the left by so many.
+    /// Rotates the items from the first place to the last one to the left by a distance.
     Rotate(usize, usize, usize),
-    /// Exchanges two stretches of so many items.
+    /// Exchanges two ranges with this number of items.
     Swap(usize, usize, usize),
 }
 
@@ -87,7 +87,7 @@ impl Move {
         }
     }
 
-    /// Places that it changes, ascending.
+    /// The places that it changes, ascending.
     fn changed(self) -> [(usize, usize); 2] {
         match self {
             Self::Reverse(first, end) | Self::Rotate(first, end, _) => [(first, end), (end, end)],
@@ -96,18 +96,18 @@ impl Move {
     }
 }
 
-/// An order with what the cache holds along it.
+/// An order and the cache contents along it.
 struct Walk<'a> {
     items: &'a Items,
     cache: &'a Lru,
     order: Vec<u32>,
     /// Place by item.
     places: Vec<usize>,
-    /// What the cache holds at the beginning of each block, and at the end of the last.
+    /// The cache contents at the start of each block and at the end of the last one.
     states: Vec<Vec<u32>>,
     /// Misses of each block.
     misses: Vec<u32>,
-    /// Blocks of the move at hand: which, misses, state at their end.
+    /// The replayed blocks of the current move: index, misses, and the cache contents at their end.
     tried: Vec<(usize, u32, Vec<u32>)>,
 }
 
@@ -147,7 +147,8 @@ impl<'a> Walk<'a> {
         self.misses.iter().map(|&misses| u64::from(misses)).sum()
     }
 
-    /// Replays what a move changes; the difference in misses, or none once it is known to be above `limit`.
+    /// Replays the blocks that a move changes. Returns the difference in misses, or none as soon as it is known
+    /// to exceed `limit`.
     fn judge(&mut self, changed: [(usize, usize); 2], limit: i64) -> Option<i64> {
         let mut tried = std::mem::take(&mut self.tried);
         tried.clear();
@@ -171,7 +172,7 @@ impl<'a> Walk<'a> {
                 if settled {
                     break;
                 }
-                // What follows the last change may win misses back, though seldom as many.
+                // Blocks after the last change may save misses again, but rarely this many.
                 if block * BLOCK >= last_end && difference > 2 * limit + 64 {
                     self.tried = tried;
                     return None;
@@ -195,7 +196,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// A move that brings some items next to one that uses the same lines, or lies beside it.
+    /// A move that brings items next to one that uses the same lines or is a neighbour.
     fn draw(
         &self,
         beside: &dyn Fn(u32, usize) -> Option<u32>,
@@ -244,7 +245,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// The best order found. `beside` names up to four items that lie next to one, where there are so many.
+/// Returns the best order found. `beside` returns the neighbour of an item on a side, if there is one.
 #[must_use]
 pub fn anneal(
     items: &Items,
@@ -293,7 +294,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// Enough items for many blocks; every difference is held against a replay of the whole order.
+        /// Uses enough items for many blocks. Compares every difference with a replay of the whole order.
         #[test]
         fn moves_are_judged_as_a_replay_of_the_whole_order_does(
             parts in prop::collection::vec(accesses(), 8..12), seed in any::<u64>(),
@@ -330,7 +331,7 @@ mod tests {
 
     #[test]
     fn annealing_finds_lines_that_lie_apart_and_is_never_worse_than_its_start() {
-        // Items i and i + 32 use the same lines, and the cache holds those of four items.
+        // Items i and i + 32 use the same lines. The cache holds the lines of four items.
         let accesses: Vec<Vec<u32>> = (0..64_u32)
             .map(|i| (0..4).map(|n| i % 32 * 4 + n).collect())
             .collect();

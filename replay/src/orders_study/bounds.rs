@@ -1,12 +1,14 @@
 //! Bounds on the lines that an L2 fetches in a frame.
 //!
-//! - **Infinite cache**: each distinct line once. No order and no replacement gets below it.
-//! - **OPT**: for the requests of one order, the fewest misses that any replacement has (Belady). Other orders may be
-//!   below it.
-//! - **Windows**: cut the run of any order into stretches in which a cache of *M* lines misses *M* times. What a stretch
-//!   uses was in the cache at its beginning or is fetched in it: 2*M* distinct lines at most. No 2*M* lines have more uses
-//!   than the 2*M* lines that most items use. So all uses need at least so many stretches (Hong & Kung 1981). Holds for
-//!   every order of the items and every replacement.
+//! - **Infinite cache**: fetches each distinct line once. It is a lower bound for every order and every
+//!   replacement policy.
+//! - **OPT**: the fewest misses of any replacement policy for the requests of one order (Belady). Other orders
+//!   may have fewer.
+//! - **Windows**: divide the run of any order into windows in which a cache of *M* lines misses *M* times. The
+//!   lines used in a window were in the cache at its start or are fetched in it, so there are at most 2*M* of
+//!   them. They have at most as many uses as the 2*M* lines with the most uses. This limits the uses per
+//!   window, and therefore gives a minimum number of windows (Hong & Kung 1981). The bound holds for every
+//!   order of the items and every replacement policy.
 
 use super::Items;
 use super::stream::l2_stream;
@@ -16,7 +18,7 @@ use crate::locality::{OptMisses, opt_misses};
 use crate::order::{self, Known};
 use crate::stream::{Expander, LineMemory, TileSource, TraceCounts, rendered};
 
-/// Lines that any order of the items fetches at least into a cache of so many lines, by stretches.
+/// The minimum number of lines that any order of the items fetches into a cache of this many lines, by windows.
 #[must_use]
 pub fn windows(items: &Items, cache_lines: u64) -> u64 {
     let mut uses: Vec<u64> = items.users.iter().map(|users| users.len() as u64).collect();
@@ -28,10 +30,11 @@ pub fn windows(items: &Items, cache_lines: u64) -> u64 {
     cache_lines * stretches.saturating_sub(1)
 }
 
-/// What OPT misses of one frame's requests in an order, for each configuration; they differ in caches alone.
+/// The misses of OPT for the requests of a frame in an order, per configuration. The configurations may differ
+/// only in their caches.
 ///
 /// # Errors
-/// An impossible configuration, a trace that cannot be read.
+/// An impossible configuration, or an unreadable trace.
 pub fn opt(
     trace: &dyn TileSource,
     order: Order,
@@ -48,12 +51,12 @@ pub fn opt(
     let expanded = expander.frame(frame, &memory, &mut counts)?;
     let tables = trace.tables();
     let passes = &crate::stream::TileSource::tables(&rendered).passes;
-    // L2 caches under the same L1 caches, in the same order, see the same requests.
+    // L2 caches below equal L1 caches receive the same requests, if the order is the same.
     let mut streams: Vec<(u64, Order, Vec<u32>)> = Vec::new();
     let mut misses = Vec::with_capacity(configs.len());
     for config in configs {
-        let resolved = order.resolved(config.l2.size_bytes);
-        let l1_bytes = config.l1.size_bytes;
+        let resolved = order.resolved(config.level.l2.size_bytes);
+        let l1_bytes = config.level.l1.size_bytes;
         let known =
             |(bytes, of, _): &&(u64, Order, Vec<u32>)| (*bytes, *of) == (l1_bytes, resolved);
         if streams.iter().find(known).is_none() {
@@ -65,7 +68,7 @@ pub fn opt(
             .iter()
             .find(known)
             .map_or(&[][..], |(.., stream)| stream);
-        misses.push(opt_misses(stream, &config.l2, config.line_bytes)?);
+        misses.push(opt_misses(stream, &config.level.l2, config.line_bytes)?);
     }
     Ok(misses)
 }
@@ -95,7 +98,7 @@ mod tests {
         let accesses: Vec<Vec<u32>> = (0..10_u32)
             .map(|i| (0..4).map(|n| 4 * i + n).collect())
             .collect();
-        // 40 uses, 16 in a stretch: three stretches, of which the last may be short.
+        // 40 uses with 16 per window need three windows, of which the last may be incomplete.
         assert_eq!(windows(&Items::new(&accesses), 8), 16);
     }
 }

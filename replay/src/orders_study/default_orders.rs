@@ -1,4 +1,4 @@
-//! The orders that a study replays unless others are named.
+//! The default orders of a study.
 
 use super::BASELINE;
 use crate::config::Order;
@@ -6,7 +6,7 @@ use crate::order::Interleave;
 use crate::order::curve::Curve;
 use crate::order::parts::{Eyes, Parts};
 
-/// The other parts, one at a time, with the curves that do best.
+/// The other parts, one at a time, with the best curves.
 const FURTHER: [&str; 29] = [
     "strip16+sta",
     "strip32+sta",
@@ -39,7 +39,8 @@ const FURTHER: [&str; 29] = [
     "zig-zag+sta+offset+runs",
 ];
 
-/// The table's orders, the baseline first; every curve with both tiles of a cell on one core; then the other parts.
+/// The baseline, the other orders of the table, every curve with both tiles of a cell on one core, and the
+/// other parts.
 #[must_use]
 pub fn default_orders() -> Vec<Order> {
     let together = Eyes::OneCore(Interleave::Alternate);
@@ -65,7 +66,7 @@ mod tests {
     #[test]
     fn every_name_is_an_orders_and_no_order_comes_twice() {
         let orders = default_orders();
-        // Two orders and a curve are the tests' own; Morton with STA is in the table.
+        // Morton with STA is in the table of orders.
         assert_eq!(
             orders.len(),
             Order::all().len() + Curve::all().len() - 1 + FURTHER.len()

@@ -1,21 +1,21 @@
-//! Work items as sets of lines, for searches: without time, and without L1 caches, what an item does to the L2 is
-//! to use each of its lines. Against a replay with two cores the misses differ by a thousandth or so.
+//! Work items as sets of lines, for searches. A search ignores time and L1 caches: an item accesses each of its
+//! lines in the L2 once. Its misses differ by about a thousandth from those of a replay with two cores.
 
 use std::collections::HashMap;
 
 /// Distinct lines of items.
 #[derive(Clone, Debug, Default)]
 pub struct Items {
-    /// By item: its lines by number, in the order of their first use.
+    /// The lines of each item (by number), in order of first use.
     pub(super) lines: Vec<Vec<u32>>,
-    /// By number of a line: its address over the line size.
+    /// The address of each line over the line size.
     pub(super) addresses: Vec<u32>,
-    /// By number of a line: the items that use it, ascending.
+    /// The items that use each line, ascending.
     pub(super) users: Vec<Vec<u32>>,
 }
 
 impl Items {
-    /// Items from the lines that each uses, with repeats.
+    /// Builds items from the lines that each uses, which may repeat.
     #[must_use]
     pub fn new(accesses: &[Vec<u32>]) -> Self {
         let mut items = Self::default();
@@ -45,19 +45,19 @@ impl Items {
         self.lines.len()
     }
 
-    /// True if there is none.
+    /// True if there are no items.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.lines.is_empty()
     }
 
-    /// Distinct lines of all items.
+    /// Number of distinct lines of all items.
     #[must_use]
     pub fn distinct_lines(&self) -> u64 {
         self.addresses.len() as u64
     }
 
-    /// Misses of an LRU cache that takes the items in this order.
+    /// Misses of an LRU cache if the items run in this order.
     #[must_use]
     pub fn misses(&self, order: &[u32], cache: &Lru) -> u64 {
         let mut state = cache.empty();
@@ -66,10 +66,10 @@ impl Items {
     }
 }
 
-/// An LRU cache of some sets and ways, by numbers of lines.
+/// The geometry of an LRU cache for numbered lines.
 #[derive(Clone, Debug)]
 pub struct Lru {
-    /// By number of a line, where its set begins.
+    /// The first way of each line's set.
     first: Vec<u32>,
     ways: usize,
     lines: usize,
@@ -95,7 +95,7 @@ impl Lru {
         vec![NONE; self.lines]
     }
 
-    /// Uses a line: the line that it evicts if it was not there, or [`NONE`] for a free way.
+    /// Accesses a line. On a miss, returns the evicted line, or [`NONE`] for a free way.
     #[inline(always)]
     pub(super) fn access(&self, line: u32, state: &mut [u32]) -> Option<u32> {
         let first = self.first[line as usize] as usize;
@@ -110,7 +110,7 @@ impl Lru {
         Some(carried)
     }
 
-    /// Uses all lines of an item: its misses.
+    /// Accesses all lines of an item and returns its misses.
     #[inline(always)]
     pub(super) fn run(&self, items: &Items, item: u32, state: &mut [u32]) -> u32 {
         let lines = &items.lines[item as usize];

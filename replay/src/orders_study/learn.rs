@@ -1,40 +1,43 @@
-//! Learning from the last frames: which of some orders fetches least is found out while frames are rendered, with counters
-//! that a GPU has (lines fetched from memory in a frame).
+//! Chooses an order per frame from a counter that a GPU has: the lines fetched from memory in a frame.
 //!
-//! The learner renders a frame with each order in turn, then stays with the one that fetched least, and from time to time
-//! renders a frame with another one to see whether that has become better. All orders cross the picture in the same
-//! direction in the same frame, so that a change of orders finds in the L2 what a stay would find.
+//! The learner renders one frame with each order, and then uses the order that fetched least. Every few frames
+//! it tries another order again, which may have become better. All orders should traverse the picture in the
+//! same direction in the same frame, so that the L2 contents suit each of them.
 
 use super::stream::Counting;
 use crate::config::{Order, RunConfig};
-use crate::engine::{OtherWork, ReplayError};
+use crate::engine::{ReplayError, check_other_work};
 use crate::order::{self, Counters, Known};
 use crate::stream::{
     Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, interleave, rendered,
 };
 use rayon::prelude::*;
 
-/// Frames between two tries of another order.
+/// Number of frames between two trials of other orders.
 const TRY_EVERY: u64 = 8;
 
-/// A learner over some orders: what was fetched with each when it was used last.
+/// A learner that chooses among several orders.
 #[derive(Clone, Debug)]
 pub struct Learner {
+    /// Lines fetched with each order in its last frame.
     fetched: Vec<Option<u64>>,
-    /// Frames so far, and the order that is tried next.
+    /// Number of frames so far.
     frames: u64,
+    /// The order of the next trial.
     next: usize,
+    /// The order of the current frame.
     current: usize,
 }
 
 impl Learner {
-    /// Registers of it for so many orders: a counter for each, the current one and the next, frames.
+    /// Bytes of registers for this number of orders: a counter per order, the current and the next order, and a
+    /// frame counter.
     #[must_use]
     pub const fn state_bytes(orders: u32) -> u32 {
         4 * orders + 3
     }
 
-    /// Knows nothing of `orders` orders, of which there is at least one.
+    /// A learner for one or more orders, without observations.
     #[must_use]
     pub fn new(orders: usize) -> Self {
         Self {
@@ -65,14 +68,14 @@ impl Learner {
         self.current
     }
 
-    /// What the frame fetched.
+    /// Records the lines that the frame fetched.
     pub fn observe(&mut self, fetched: u64) {
         if let Some(of_order) = self.fetched.get_mut(self.current) {
             *of_order = Some(fetched);
         }
     }
 
-    /// The order that fetched least when it was used last; the first of equals.
+    /// The order that fetched least in its last frame (the first one if equal).
     fn best(&self) -> usize {
         let known = self.fetched.iter().enumerate();
         let best = known.min_by_key(|(order, fetched)| (fetched.unwrap_or(u64::MAX), *order));
@@ -80,16 +83,16 @@ impl Learner {
     }
 }
 
-/// What came of a trace.
+/// The results for a trace.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Learned {
     /// The orders.
     pub orders: Vec<Order>,
-    /// Bytes fetched by order and frame, where it is used throughout.
+    /// Bytes fetched per order and frame, if each order is used in all frames.
     pub fixed: Vec<Vec<u64>>,
-    /// By frame, where the learner chooses.
+    /// Bytes fetched per frame with the orders that the learner chose.
     pub learned: Vec<u64>,
-    /// What it chose.
+    /// The chosen order per frame.
     pub chosen: Vec<usize>,
 }
 
@@ -98,7 +101,7 @@ impl Learned {
         frames.iter().sum()
     }
 
-    /// The order that is best throughout, and its bytes.
+    /// The best fixed order and its bytes over all frames.
     #[must_use]
     pub fn best_fixed(&self) -> Option<(Order, u64)> {
         let totals = self.fixed.iter().map(|frames| Self::total(frames));
@@ -109,14 +112,14 @@ impl Learned {
             .min_by_key(|(_, total)| *total)
     }
 
-    /// Bytes of the learner over those of the best fixed order, percent more.
+    /// Additional bytes of the learner over the best fixed order, percent.
     #[must_use]
     pub fn regret_pct(&self) -> Option<f64> {
         let (_, best) = self.best_fixed().filter(|(_, best)| *best > 0)?;
         Some(100.0 * (Self::total(&self.learned) as f64 / best as f64 - 1.0))
     }
 
-    /// Bytes of the frame-wise best of the fixed orders, percent less than the best fixed order's.
+    /// Bytes saved by the best order of each frame over the best fixed order, percent.
     #[must_use]
     pub fn frame_best_pct(&self) -> Option<f64> {
         let (_, best) = self.best_fixed().filter(|(_, best)| *best > 0)?;
@@ -132,7 +135,7 @@ impl Learned {
     }
 }
 
-/// One run over the frames: caches, and what chooses the order.
+/// One run over the frames, with its own caches.
 struct Run {
     caches: Counting,
     learner: Option<Learner>,
@@ -141,11 +144,11 @@ struct Run {
     chosen: Vec<usize>,
 }
 
-/// Renders all frames of a trace with each order throughout, and with a learner. None unless caches are of four ways and
-/// plain LRU.
+/// Renders all frames of a trace with each fixed order and with a learner. None unless all caches are plain LRU
+/// caches of four ways.
 ///
 /// # Errors
-/// An impossible configuration, a trace that cannot be read.
+/// An impossible configuration, or an unreadable trace.
 pub fn learn(
     trace: &dyn TileSource,
     config: &RunConfig,
@@ -157,10 +160,10 @@ pub fn learn(
     let tables = TileSource::tables(&rendered);
     let expander = Expander::new(&rendered, config)?;
     if config.between_frames.lost_percent().is_some() {
-        OtherWork::check(expander.lines())?;
+        check_other_work(expander.lines())?;
     }
-    // Caches of four ways hold what a footprint asks for, so that repeats find it.
-    let l1_sets = config.l1.sets("L1", config.line_bytes)?;
+    // Caches of four ways hold all lines of a footprint, so repeats hit.
+    let l1_sets = config.level.l1.sets("L1", config.line_bytes)?;
     let expander = expander.without_idle_accesses(l1_sets);
     let mut runs = Vec::new();
     for order in 0..=orders.len() {
@@ -253,7 +256,7 @@ impl Run {
 mod tests {
     use super::*;
 
-    /// Runs a learner on frames that fetch so much with each order.
+    /// Runs a learner on frames with these numbers of fetched lines.
     fn run(orders: usize, frames: u64, fetched: impl Fn(u64, usize) -> u64) -> (u64, Vec<usize>) {
         let mut learner = Learner::new(orders);
         let mut total = 0;

@@ -1,8 +1,8 @@
-//! Tile orders held against each other and against bounds: which fetches the fewest bytes, what hardware it needs, and how
-//! much is left.
+//! Compares tile orders with each other and with bounds: the bytes that they fetch and the hardware that they
+//! need.
 //!
-//! [`study`] replays every order with every pair of caches; [`search`] looks for better orders with the frame's own accesses
-//! in hand, and [`bounds`] says what no order gets below; [`learn`] chooses an order from frame to frame.
+//! [`study`] replays every order with every pair of caches. [`search`] finds better orders from the accesses of
+//! the frame, and [`bounds`] computes lower bounds. [`learn`] chooses an order per frame.
 
 mod anneal;
 pub mod bounds;

@@ -1,4 +1,4 @@
-//! Searched orders as files: text with a header, then a line for each item.
+//! Files of searched orders: text with a header and a line per item.
 //!
 //! ```text
 //! parallax order 1
@@ -10,8 +10,8 @@
 //! 0:18
 //! ```
 //!
-//! An item is a tile, or two that are rendered together with their triangles in turn: index of the pass and number of the
-//! tile. The items visit all tiles of both passes once.
+//! An item is a tile, or two tiles whose triangles are rendered in turn. A tile is the index of its pass and
+//! its number. The items visit all tiles of both passes once.
 
 use crate::order::{Interleave, TileRef, Views, WorkItem, views};
 use formats::textrace::Tables;
@@ -25,7 +25,7 @@ const MAGIC: &str = "parallax order 1";
 pub struct OrderFile {
     /// Checksum of the trace's content.
     pub trace: String,
-    /// How it was found.
+    /// The name of the search method.
     pub name: String,
     /// The L2 that it was searched for.
     pub l2_bytes: u64,
@@ -33,11 +33,11 @@ pub struct OrderFile {
     pub items: Vec<WorkItem>,
 }
 
-/// An order that cannot be read, or is none.
+/// An unreadable file, or items that are not an order.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("line {line}: expected {expected}, found {found}")]
 pub struct OrderFileError {
-    /// From 1; one past the end where something is missing.
+    /// From 1; one past the end if something is missing.
     line: usize,
     expected: String,
     found: String,
@@ -80,7 +80,7 @@ impl OrderFile {
     /// Reads a file's text.
     ///
     /// # Errors
-    /// What is not as it should be, with its line.
+    /// The first error, with its line.
     pub fn parse(text: &str) -> Result<Self, OrderFileError> {
         let mut lines = (1..).zip(text.lines());
         let mut next = |key: &str, expected: &str| -> Result<String, OrderFileError> {
@@ -132,7 +132,7 @@ impl OrderFile {
         })
     }
 
-    /// The pass of the left view whose items these are.
+    /// The pass of the left view of these items.
     ///
     /// # Errors
     /// The items do not visit all tiles of a left and a right view once.

@@ -1,4 +1,4 @@
-//! What a study finds of an order, or of a bound.
+//! The result of a study for an order or a bound.
 
 use crate::config::{BetweenFrames, Order, RunConfig};
 use crate::experiment::{Subject, frame_count};
@@ -6,19 +6,19 @@ use crate::order::cost::Cost;
 use crate::result::RunResult;
 use std::collections::HashMap;
 
-/// What every order is held against: the paper's best.
+/// The order that all others are compared with: the best one of the Z2 paper.
 pub const BASELINE: Order = Order::Z2_STA;
 
-/// A lower bound, or what a replacement of another kind would miss.
+/// A lower bound, or the misses of optimal replacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     /// Each distinct line once.
     Infinite,
-    /// Stretches of uses.
+    /// Windows of uses.
     Windows,
-    /// OPT replacement in the L2 for the baseline's requests, fully associative.
+    /// OPT replacement in a fully associative L2 for the requests of this order.
     Opt(Order),
-    /// Likewise with the L2's sets and ways.
+    /// OPT replacement with the L2's sets and ways.
     OptWays(Order),
 }
 
@@ -35,7 +35,7 @@ impl Bound {
     }
 }
 
-/// What a row is of.
+/// The subject of a row.
 #[derive(Clone, Debug)]
 pub enum Of {
     /// An order.
@@ -51,13 +51,13 @@ pub enum Of {
 pub struct Row<'a> {
     /// The trace.
     pub subject: &'a Subject<'a>,
-    /// Columns by which infinity is shifted between the eyes.
+    /// Columns by which points at infinity are shifted between the eyes.
     pub offset_tiles: i32,
-    /// What it is of.
+    /// An order or a bound.
     pub of: Of,
     /// The whole configuration.
     pub config: RunConfig,
-    /// What hardware needs; none for bounds.
+    /// The hardware cost; none for bounds.
     pub cost: Option<Cost>,
     /// Bytes from memory, all frames together.
     pub external_bytes: u64,
@@ -67,7 +67,7 @@ pub struct Row<'a> {
     pub baseline_bytes: u64,
     /// Cycles of the baseline, in timed mode.
     pub baseline_cycles: Option<u64>,
-    /// Bytes of the greedy order with the same caches, where it was searched.
+    /// Bytes of the greedy order with the same caches, if it was searched.
     pub greedy_bytes: Option<u64>,
     /// Bytes of the trace's distinct lines.
     pub distinct_bytes: u64,
@@ -88,7 +88,7 @@ impl Row<'_> {
         matches!(self.of, Of::Order(order) if order == BASELINE)
     }
 
-    /// True for what hardware can have.
+    /// True if hardware can implement it.
     #[must_use]
     pub fn is_buildable(&self) -> bool {
         self.cost.is_some_and(|cost| cost.is_buildable())
@@ -100,31 +100,31 @@ impl Row<'_> {
         frame_count(self.subject.source.tables())
     }
 
-    /// Bytes over the baseline's; none where that has none.
+    /// Bytes relative to the baseline; none if the baseline fetches nothing.
     #[must_use]
     pub fn ratio(&self) -> Option<f64> {
         (self.baseline_bytes > 0).then(|| self.external_bytes as f64 / self.baseline_bytes as f64)
     }
 
-    /// False where the baseline fetches each line once, so that no order can fetch less.
+    /// False if the baseline fetches each line once, so that no order can fetch less.
     #[must_use]
     pub fn can_change(&self) -> bool {
         self.baseline_bytes > self.distinct_bytes
     }
 
-    /// Bytes of a frame, MB.
+    /// Bytes per frame in MB.
     #[must_use]
     pub fn mb_per_frame(&self) -> f64 {
         self.external_bytes as f64 / f64::from(self.frames().max(1)) / 1e6
     }
 
-    /// What the order knows: a name, `bound` for bounds.
+    /// Name of the information that the order uses; `bound` for bounds.
     #[must_use]
     pub fn knows(&self) -> &'static str {
         self.cost.map_or("bound", |cost| cost.knows.name())
     }
 
-    /// Of the distance from the baseline to the greedy order, how much is closed, percent.
+    /// The part of the distance from the baseline to the greedy order that the order closes, percent.
     #[must_use]
     pub fn closed_pct(&self) -> Option<f64> {
         let greedy = self.greedy_bytes? as f64;
@@ -164,15 +164,15 @@ pub(super) fn row<'a>(
     }
 }
 
-/// Fills in what each row is held against.
+/// Fills in the values that each row is compared with.
 pub(super) fn compare(rows: &mut [Row<'_>]) {
     type Caches = (BetweenFrames, u64, u64);
     let caches = |row: &Row<'_>| -> Caches {
         let config = &row.config;
         (
             config.between_frames,
-            config.l1.size_bytes,
-            config.l2.size_bytes,
+            config.level.l1.size_bytes,
+            config.level.l2.size_bytes,
         )
     };
     let mut baseline: HashMap<Caches, (u64, Option<u64>)> = HashMap::new();

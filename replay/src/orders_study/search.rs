@@ -1,4 +1,4 @@
-//! Better orders of one frame, found with its own accesses in hand.
+//! Searches for better orders of a frame, given the frame's accesses.
 
 use super::anneal::anneal;
 use super::greedy::greedy;
@@ -13,12 +13,13 @@ use std::collections::HashMap;
 
 pub use super::anneal::Schedule;
 
-/// How to search.
+/// A search method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
-    /// Always what the cache holds the largest share of, among so many of the items that are left.
+    /// Always takes the item of which the cache holds the largest share, among the next `ahead` remaining
+    /// items.
     Greedy {
-        /// The look-ahead; none for all items.
+        /// The look-ahead in items; none for all items.
         ahead: Option<u32>,
     },
     /// Annealing from the order that the search starts from.
@@ -26,7 +27,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// Name of what is found.
+    /// Name of the orders that it finds.
     #[must_use]
     pub fn name(self) -> String {
         match self {
@@ -52,20 +53,20 @@ impl Method {
     }
 }
 
-/// The items of one frame's pair of views, in the order of a search's start, and their lines.
+/// The items of a frame's pair of views, in the order from which searches start, and their lines.
 pub struct Ground {
     items: Vec<WorkItem>,
     lines: Items,
-    /// Items that lie next to each: right, left, below, above.
+    /// The neighbours of each item: right, left, below, above.
     beside: Vec<[Option<u32>; 4]>,
     config: RunConfig,
 }
 
 impl Ground {
-    /// Reads the items of an order's first pair of views of a frame; none where it has no such pair.
+    /// Reads the items of the first pair of views of a frame; none if the frame has no pair.
     ///
     /// # Errors
-    /// An impossible configuration, a trace that cannot be read.
+    /// An impossible configuration, or an unreadable trace.
     pub fn new(
         trace: &dyn TileSource,
         start: Order,
@@ -113,23 +114,23 @@ impl Ground {
         }))
     }
 
-    /// The items' lines.
+    /// The lines of the items.
     #[must_use]
     pub fn lines(&self) -> &Items {
         &self.lines
     }
 
-    /// Searches for an L2 of the configuration's ways and this size.
+    /// Searches an order for an L2 of this size with the configured ways.
     ///
     /// # Errors
-    /// A size that no L2 can have.
+    /// An impossible L2 size.
     pub fn search(
         &self,
         method: Method,
         l2_bytes: u64,
         trace: &str,
     ) -> Result<OrderFile, ReplayError> {
-        let mut l2 = self.config.l2;
+        let mut l2 = self.config.level.l2;
         l2.size_bytes = l2_bytes;
         let sets = l2.sets("L2", self.config.line_bytes)?;
         let cache = Lru::new(&self.lines, sets, l2.ways);

@@ -1,12 +1,12 @@
-//! Lines of items, and what comes to the L2.
+//! The lines of work items, and the requests that reach the L2.
 
-use crate::cache::{Cache, FourWayLru, Levels};
 use crate::config::{BetweenFrames, RunConfig};
-use crate::engine::{OtherWork, ReplayError};
+use crate::engine::ReplayError;
+use crate::memory::{Cache, Caches, Found, FourWayLru, Hierarchy, MissPath, OtherWork};
 use crate::order::{Phase, WorkItem};
 use crate::stream::{Consumer, Cores, Frame, QuadLines, StreamError, interleave};
 
-/// Lists lines as they come.
+/// Lists lines in order of access.
 #[derive(Default)]
 struct Lines(Vec<u32>);
 
@@ -16,7 +16,7 @@ impl Consumer for Lines {
     }
 }
 
-/// The lines of each item as its core asks for them, those that it asks for again left out.
+/// The distinct lines of each item in order of first access.
 pub fn lines_of_items(
     frame: &Frame<'_>,
     items: &[WorkItem],
@@ -35,7 +35,7 @@ pub fn lines_of_items(
     Ok(of_items)
 }
 
-/// L1 caches, and a list of what misses them.
+/// L1 caches, and a list of their misses.
 struct Misses {
     l1: Vec<Box<dyn Cache>>,
     missed: Vec<u32>,
@@ -53,18 +53,14 @@ impl Consumer for Misses {
     }
 }
 
-/// What comes to the L2, in its order.
+/// The requests that reach the L2, in order.
 pub fn l2_stream(
     frame: &Frame<'_>,
     phases: &[Phase],
     config: &RunConfig,
 ) -> Result<Vec<u32>, ReplayError> {
-    let Levels { l1, .. } = Levels::build(config)?;
     let mut misses = Misses {
-        l1: l1
-            .into_iter()
-            .map(crate::cache::AnyCache::into_box)
-            .collect(),
+        l1: Caches::build(config)?.boxed().l1,
         missed: Vec::new(),
     };
     let mut cores = Cores::new(frame, config.cores as usize);
@@ -72,41 +68,33 @@ pub fn l2_stream(
     Ok(misses.missed)
 }
 
-/// Caches of one machine that count what they fetch.
+/// Caches of a machine, with a count of the lines that they fetch.
 pub struct Counting {
-    l1: Vec<FourWayLru>,
-    l2: FourWayLru,
+    caches: Hierarchy<FourWayLru>,
     /// Lines fetched from memory.
     pub fetched: u64,
 }
 
 impl Counting {
-    /// Empty caches; none unless all of them are of four ways and plain LRU.
+    /// Empty caches. None unless all of them are plain LRU caches of four ways.
     ///
     /// # Errors
-    /// A geometry that cannot be built.
+    /// An impossible geometry.
     pub fn new(config: &RunConfig) -> Result<Option<Self>, ReplayError> {
-        let levels = Levels::build(config)?.all_four_way().ok();
-        Ok(levels.map(|Levels { l1, l2 }| Self { l1, l2, fetched: 0 }))
+        let caches = Caches::build(config)?.all_four_way().ok();
+        Ok(caches.map(|caches| Self {
+            caches: Hierarchy::new(caches, MissPath::memory_alone()),
+            fetched: 0,
+        }))
     }
-}
 
-impl Counting {
-    /// Between frames: what becomes of the caches.
+    /// Applies what happens to the caches between two frames.
     pub fn between(&mut self, config: &RunConfig, frame: usize) {
-        if config.between_frames != BetweenFrames::Keep {
-            self.l1.iter_mut().for_each(Cache::clear);
-        }
         match config.between_frames {
             BetweenFrames::Keep => {}
-            BetweenFrames::Flush => self.l2.clear(),
+            BetweenFrames::Flush => self.caches.clear(),
             BetweenFrames::Lose(percent) => {
-                let lines = config.l2.size_bytes / u64::from(config.line_bytes);
-                OtherWork::after(frame, percent)
-                    .lines(lines)
-                    .for_each(|line| {
-                        self.l2.access(line);
-                    });
+                self.caches.lose(OtherWork::after(frame, percent, config));
             }
         }
     }
@@ -115,9 +103,8 @@ impl Counting {
 impl Consumer for Counting {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
         for &line in quad.lines {
-            if !self.l1[core].access(line) {
-                self.fetched += u64::from(!self.l2.access(line));
-            }
+            let found = self.caches.access(core, line);
+            self.fetched += u64::from(found == Found::Below);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Every order with every pair of caches on every trace, beside bounds.
+//! Replays every order with every pair of caches on every trace, and computes bounds.
 
 use super::row::{BASELINE, Bound, Of, Row, compare, row};
 use super::search::{Ground, Method};
@@ -11,51 +11,51 @@ use formats::view::TILE_SIZE_PX;
 use rayon::prelude::*;
 use thiserror::Error;
 
-/// What is studied.
+/// The subject of a study.
 #[derive(Clone, Debug)]
 pub struct Study {
-    /// The machine but for caches, order and what happens between frames.
+    /// The machine, except for cache sizes, order, and caches between frames.
     pub base: RunConfig,
     /// L1 and L2 sizes in bytes.
     pub caches_bytes: Vec<(u64, u64)>,
-    /// What happens between frames; of no meaning for traces of one frame.
+    /// What happens to caches between frames. Traces of one frame ignore it.
     pub between: Vec<BetweenFrames>,
-    /// The orders, the baseline among them.
+    /// The orders, including the baseline.
     pub orders: Vec<Order>,
-    /// Searches, of traces of one frame.
+    /// Search methods for traces of one frame.
     pub methods: Vec<Method>,
-    /// Also the bounds.
+    /// True if bounds are computed.
     pub bounds: bool,
 }
 
-/// Why a study ends.
+/// Reasons why a study fails.
 #[derive(Debug, Error)]
 pub enum StudyError {
-    /// A replay.
+    /// A failed replay.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A search or a bound.
+    /// A failed search or bound.
     #[error("{label}: {error}")]
     Replay {
         /// The trace.
         label: String,
-        /// What went wrong.
+        /// The error.
         error: ReplayError,
     },
-    /// A searched order.
+    /// An invalid file of a searched order.
     #[error("{file}: {error}")]
     File {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The error.
         error: OrderFileError,
     },
 }
 
-/// A searched order and where it comes from.
+/// A searched order and its source.
 #[derive(Clone, Debug)]
 pub struct Searched {
-    /// The file's name, or that of the search.
+    /// The name of the file or of the search.
     pub source: String,
     /// The order.
     pub file: OrderFile,
@@ -70,11 +70,11 @@ pub struct Subjects<'a> {
 }
 
 impl Study {
-    /// Replays, searches and bounds: the rows trace by trace, the orders in the order of the study, and the searched orders.
-    /// `done` is called with the number of replays done with each step.
+    /// Replays, searches and computes bounds. Returns the rows trace by trace and the searched orders. Calls
+    /// `done` with the number of replays of each step.
     ///
     /// # Errors
-    /// An impossible configuration, a trace that cannot be read, an order from a file that is none of its trace.
+    /// An impossible configuration, an unreadable trace, or a file whose order does not belong to its trace.
     pub fn run<'a>(
         &self,
         subjects: &'a Subjects<'a>,
@@ -129,8 +129,8 @@ impl Study {
                         between_frames,
                         ..self.base
                     };
-                    config.l1.size_bytes = l1_bytes;
-                    config.l2.size_bytes = l2_bytes;
+                    config.level.l1.size_bytes = l1_bytes;
+                    config.level.l2.size_bytes = l2_bytes;
                     points.push(Point {
                         settings: Vec::new(),
                         change: None,
@@ -145,7 +145,7 @@ impl Study {
         }
     }
 
-    /// Searches all traces of one frame, and checks the orders from files.
+    /// Searches orders for all traces of one frame, and checks the orders from files.
     fn searched(&self, subjects: &Subjects<'_>) -> Result<Vec<Searched>, StudyError> {
         for searched in &subjects.files {
             let of = subjects
@@ -199,12 +199,12 @@ impl Study {
         Ok(all)
     }
 
-    /// The order that searches start from: the study's best guess that pairs tiles as the display needs it.
+    /// The order from which searches start. It pairs tiles as the display needs it.
     fn start(&self) -> Order {
         Order::find("zig-zag+sta+offset").unwrap_or(BASELINE)
     }
 
-    /// Replays the searched orders of a trace with the caches that they were searched for.
+    /// Replays the searched orders of a trace with the L2 for which they were searched.
     fn add_searched<'a>(
         &self,
         subject: &'a Subject<'a>,
@@ -232,14 +232,15 @@ impl Study {
             let of_size = plan
                 .points
                 .into_iter()
-                .filter(|point| point.config.l2.size_bytes == file.l2_bytes);
+                .filter(|point| point.config.level.l2.size_bytes == file.l2_bytes);
             for point in of_size {
                 names.push(file.name.clone());
                 points.push(point);
             }
         }
         let mut work = Work::default();
-        // Configurations are told apart by the names of their orders, which several files may share.
+        // Each configuration is run alone, because results are identified by the name of the order, which
+        // several files may share.
         for (point, name) in points.into_iter().zip(names) {
             let plan = Plan {
                 base: self.base,
@@ -260,7 +261,7 @@ impl Study {
         Ok(work)
     }
 
-    /// Bounds with every pair of caches.
+    /// Adds the bounds for every pair of caches.
     fn add_bounds<'a>(
         &self,
         subject: &'a Subject<'a>,
@@ -314,7 +315,7 @@ impl Study {
             Ground::new(subject.source, self.start(), frame, &self.base).map_err(fail)?
         {
             for config in &configs {
-                let lines = config.l2.size_bytes / u64::from(config.line_bytes);
+                let lines = config.level.l2.size_bytes / u64::from(config.line_bytes);
                 let lines = bounds::windows(ground.lines(), lines);
                 rows.push(bound(
                     Bound::Windows,
@@ -326,14 +327,17 @@ impl Study {
         Ok(())
     }
 
-    /// Caches outermost, then the orders as the study has them, searched ones and bounds.
+    /// Sorts by caches, then orders as listed in the study, then searched orders, then bounds.
     fn sort(&self, rows: &mut [Row<'_>]) {
         let caches = |row: &Row<'_>| {
             let between = self
                 .between
                 .iter()
                 .position(|of| *of == row.config.between_frames);
-            let sizes = (row.config.l1.size_bytes, row.config.l2.size_bytes);
+            let sizes = (
+                row.config.level.l1.size_bytes,
+                row.config.level.l2.size_bytes,
+            );
             (
                 between,
                 self.caches_bytes.iter().position(|of| *of == sizes),
@@ -353,7 +357,7 @@ fn first_frame(subject: &Subject<'_>) -> u32 {
     passes.iter().map(|pass| pass.frame).min().unwrap_or(0)
 }
 
-/// Columns by which infinity is shifted between the eyes of the first frame.
+/// Columns by which points at infinity are shifted between the eyes of the first frame.
 fn offset(subject: &Subject<'_>, config: &RunConfig) -> i32 {
     let tables = subject.source.tables();
     let known = Known {

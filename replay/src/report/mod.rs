@@ -10,6 +10,7 @@ pub mod errors;
 pub mod figures;
 pub mod html;
 pub mod locality;
+mod memory_columns;
 pub mod orders;
 pub mod parquet;
 pub mod picture;

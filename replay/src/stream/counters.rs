@@ -1,14 +1,14 @@
-//! What a GPU can count by tile in a frame, for the orders of the next one.
+//! Counters of a frame that a GPU can maintain, for the orders of the next frame.
 
 use super::expand::Work;
 use super::{Frame, StreamError, TileLines};
 use crate::order::{Counters, Known, TileRef, View, ViewCounters, Views, views};
 use formats::textrace::Pass;
 
-/// Columns around the shift of infinity at which a row may be found to agree best.
+/// Maximum distance in columns between a row's best shift and the shift of infinity.
 const SHIFTS: i32 = 8;
 
-/// What a tile has: its distinct lines and its primitives, both ascending.
+/// The distinct lines and the primitives of a tile, both ascending.
 #[derive(Default)]
 struct Own {
     lines: Vec<u32>,
@@ -17,7 +17,7 @@ struct Own {
 
 impl Own {
     fn of(tile: &TileLines) -> Self {
-        // Where only distinct lines are listed, quad by quad.
+        // Streams without all lines list the distinct lines of each quad.
         let mut lines = match tile.lines.is_empty() {
             true => tile.distinct.clone(),
             false => tile.lines.clone(),
@@ -31,7 +31,7 @@ impl Own {
     }
 }
 
-/// Members of two ascending lists without repeats that are in both.
+/// Counts the common members of two ascending lists without repeats.
 fn common(a: &[u32], b: &[u32]) -> u32 {
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     let mut count = 0;
@@ -48,7 +48,7 @@ fn common(a: &[u32], b: &[u32]) -> u32 {
     count
 }
 
-/// Lines of the tiles of a row, each once a tile.
+/// The number of lines of the tiles of a row; a line counts once per tile.
 fn lines_of(row: &[Own]) -> u32 {
     row.iter().map(|own| own.lines.len() as u32).sum()
 }
@@ -66,7 +66,7 @@ impl Frame<'_> {
     /// Counts the views of a frame.
     ///
     /// # Errors
-    /// A tile that cannot be read.
+    /// An unreadable tile.
     pub fn counters(
         &self,
         passes: &[Pass],
@@ -119,7 +119,8 @@ impl Frame<'_> {
             };
             let best = |of: fn(&Own) -> &[u32]| {
                 let shifts = offset[0] - SHIFTS..=offset[0] + SHIFTS;
-                // Of equals the nearest to infinity, of two such the one of what is near.
+                // If equal, the shift nearest to that of infinity wins, then the larger one, which suits near
+                // surfaces.
                 shifts
                     .max_by_key(|&shift| {
                         let far = (shift - offset[0]).abs();
@@ -136,7 +137,7 @@ impl Frame<'_> {
         Ok(counted)
     }
 
-    /// The tiles of a row, if there is one.
+    /// The tiles of a row; none outside of the grid.
     fn row(&self, view: View, y: Option<u32>, work: &mut Work) -> Result<Vec<Own>, StreamError> {
         let Some(y) = y.filter(|&y| y < view.tiles[1]) else {
             return Ok(Vec::new());

@@ -1,21 +1,22 @@
-//! Rows to and fro where the L2 holds the lines of a row, else bands, the lower the more lines there are: by the lines that the
-//! last frame asked for.
+//! Rows in alternating direction if the L2 holds the lines of a row, otherwise bands. The more lines the last
+//! frame accessed, the fewer rows a band has.
 
 use super::band::lay;
 use super::{Ground, Path};
 use crate::order::cost::{Cost, Knows};
 
-/// The fewest and the most rows of a band, and how many columns of a band the L2 is to hold beside one another. Chosen on the
-/// design cameras of docs/orders.md, with four texel formats, three line sizes and shadow maps.
+/// Minimum and maximum rows of a band, and the number of adjacent columns of a band that the L2 should hold.
+/// Chosen on the design cameras of docs/results/orders.md with four texel formats, three line sizes and shadow
+/// maps.
 const ROWS: [u64; 2] = [3, 8];
 const COLUMNS: u64 = 6;
 
-/// Size of the L2.
+/// The size of the L2 in KiB.
 pub(super) fn l2_kib(l2_bytes: u64) -> u32 {
     u32::try_from(l2_bytes / 1024).unwrap_or(u32::MAX).max(1)
 }
 
-/// Rows or bands; rows where nothing is known of a last frame.
+/// Rows or bands. Rows if no counters of a last frame are known.
 #[derive(Debug)]
 pub struct Adaptive;
 
@@ -33,13 +34,13 @@ impl Path for Adaptive {
         cells
     }
 
-    /// A band's counters and bounds, its height and a sum.
+    /// The counters and bounds of a band, its height, and a sum.
     fn cost(&self, _grid: [u32; 2]) -> Cost {
         Cost::state(14).deciding_in(1).knowing(Knows::LastFrame)
     }
 }
 
-/// Rows of a band.
+/// The number of rows of a band.
 fn height(ground: &Ground, frame_bytes: u64) -> u32 {
     let [columns, rows] = ground.grid.map(u64::from);
     let l2_bytes = u64::from(ground.size) * 1024;

@@ -1,13 +1,13 @@
-//! Horizontal bands, each traversed column by column up and down, every other band from the right: neighbours within a
-//! band are so near in time that a small cache holds what they share.
+//! Horizontal bands. Each is traversed in columns of alternating direction, every other band from the right.
+//! Neighbours in a band follow each other so closely that a small cache holds their common lines.
 
 use super::{Ground, Path};
 use crate::order::cost::Cost;
 
-/// Rows of a band unless its name says otherwise.
+/// The default number of rows of a band.
 pub(super) const USUAL_ROWS: u32 = 4;
 
-/// Bands of as many rows as the number behind the name; the last one may have fewer.
+/// Bands with the number of rows in the curve's name. The last band may have fewer.
 #[derive(Debug)]
 pub struct Band;
 

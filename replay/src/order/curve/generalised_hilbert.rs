@@ -1,6 +1,6 @@
-//! A Hilbert curve for any grid: a rectangle is cut into two along its longer side, or into three as the Hilbert curve
-//! cuts a square, until a row of cells is left. Nothing outside of the grid is visited, and all steps but a few go to
-//! a neighbour.
+//! A Hilbert curve for any grid. A rectangle is divided into two along its longer side, or into three as the
+//! Hilbert curve divides a square, down to single rows of cells. Nearly all steps go to a neighbour, and no
+//! outside cells are visited.
 
 use super::{Ground, Path};
 use crate::order::cost::Cost;
@@ -25,7 +25,7 @@ impl Path for GeneralisedHilbert {
         cells
     }
 
-    /// A stack of rectangles, 12 bytes each, as deep as the sides can be halved.
+    /// A stack of rectangles of 12 bytes each. Its depth is how often the longer side can be halved.
     fn cost(&self, grid: [u32; 2]) -> Cost {
         let halvings = grid[0].max(1).ilog2() + grid[1].max(1).ilog2() + 2;
         Cost::state(12 * halvings).deciding_in(halvings)
@@ -44,7 +44,7 @@ fn difference(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// Half of a side, made even where that leaves something of both halves.
+/// Half of a side, made even unless one half would become empty.
 fn half(side: [i32; 2]) -> [i32; 2] {
     let half = side.map(|n| n / 2);
     if length(half) % 2 == 1 && length(side) > 2 {
@@ -54,7 +54,8 @@ fn half(side: [i32; 2]) -> [i32; 2] {
     }
 }
 
-/// Visits the rectangle with a corner `at` and two sides, from that corner to the other end of the first side.
+/// Visits a rectangle given by the corner `at` and two sides, from that corner to the other end of the first
+/// side.
 fn fill(at: [i32; 2], [first, second]: [[i32; 2]; 2], cells: &mut Vec<[u32; 2]>) {
     let [step, across] = [first, second].map(|side| side.map(i32::signum));
     if length(second) == 1 || length(first) == 1 {

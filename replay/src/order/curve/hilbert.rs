@@ -1,10 +1,10 @@
-//! Hilbert order: like Morton hierarchical, but every step goes to a neighbour.
+//! Hilbert order: hierarchical like Morton order, but every step goes to a neighbour.
 
 use super::{Ground, Path};
 use crate::order::cost::Cost;
 
-/// Hilbert order. On a grid that is no power of two the curve of the next larger square is
-/// followed and what lies outside is skipped.
+/// Hilbert order. On other grids than squares of a power of two, follows the curve of the next larger such
+/// square and skips cells outside of the grid.
 #[derive(Debug)]
 pub struct Hilbert;
 
@@ -19,8 +19,8 @@ impl Path for Hilbert {
         cells
     }
 
-    /// A counter, whose bits are turned to column and row a level after another, and the cells outside are stepped
-    /// over as on the Morton curve.
+    /// A counter, whose bits are converted to column and row level by level. Outside cells are skipped as on
+    /// the Morton curve.
     fn cost(&self, grid: [u32; 2]) -> Cost {
         let side = grid[0].max(grid[1]).max(1).next_power_of_two();
         Cost::state(4).deciding_in(1 + 2 * side.ilog2())
@@ -35,7 +35,7 @@ fn distance(side: u32, [mut x, mut y]: [u32; 2]) -> u64 {
         let right = u32::from(x & s != 0);
         let down = u32::from(y & s != 0);
         d += u64::from(s) * u64::from(s) * u64::from((3 * right) ^ down);
-        // Turn the quadrant so that its curve starts and ends as the whole square's does.
+        // Rotates the quadrant so that its curve starts and ends like that of the whole square.
         if down == 0 {
             if right == 1 {
                 x = (side - 1) - x;

@@ -1,6 +1,6 @@
-//! Curves, one a file: in which order the cells of a grid are visited.
+//! Curves: the order in which the cells of a grid are visited. One per file.
 //!
-//! A curve knows a grid of cells and nothing of eyes. A new one is a file with a `Path` and a row of the table.
+//! A curve depends on a grid of cells, not on eyes. A new one is a file with a `Path` and a row of the table.
 
 mod adaptive;
 mod band;
@@ -34,10 +34,10 @@ registry! { CurveRow:
     MORTON =     row("morton",    ORANGE,    Size::NONE,                                 "Z-order curve of the next power of two",                                &Morton);
     HILBERT =    row("hilbert",   YELLOW,    Size::NONE,                                 "Hilbert curve of the next power of two",                                &Hilbert);
     GILBERT =    row("gilbert",   GREEN,     Size::NONE,                                 "Hilbert curve generalised to any grid",                                 &GeneralisedHilbert);
-    STRIP =      row("strip",     BLUE,      Size::new("columns", strip::columns),       "Vertical strips of N columns, rows to and fro; without N as wide as the L2 allows", &Strip);
-    BAND =       row("band",      SKY_BLUE,  Size::new("rows", |_| band::USUAL_ROWS),    "Horizontal bands of N rows, columns up and down; without N of 4",       &Band);
-    ADAPTIVE =   row("adaptive",  GREEN,     Size::new("KiB of L2", adaptive::l2_kib),   "Rows where the L2 holds one, else bands, by the lines that the last frame had", &Adaptive);
-    RANDOM =     row("random",    GREY,      Size::NONE,                                 "Shuffled cells: the control",                                           &Random);
+    STRIP =      row("strip",     BLUE,      Size::new("columns", strip::columns),       "Vertical strips of N columns, rows in alternating direction; without N as wide as the L2 allows", &Strip);
+    BAND =       row("band",      SKY_BLUE,  Size::new("rows", |_| band::USUAL_ROWS),    "Horizontal bands of N rows, columns in alternating direction; without N 4 rows", &Band);
+    ADAPTIVE =   row("adaptive",  GREEN,     Size::new("KiB of L2", adaptive::l2_kib),   "Rows if the L2 holds a row, otherwise bands, by the lines of the last frame", &Adaptive);
+    RANDOM =     row("random",    GREY,      Size::NONE,                                 "Shuffled cells: a control",                                           &Random);
     #[cfg(test)]
     COLUMNS =    row("test-columns", GREY,   Size::NONE,                                 "Columns from the top",                                                  &super::tests::columns::Columns);
 }
@@ -58,9 +58,9 @@ pub struct CurveRow {
 /// The number that may follow a curve's name.
 #[derive(Debug)]
 pub struct Size {
-    /// What it counts; empty for none.
+    /// Its unit; empty if the curve has no number.
     unit: &'static str,
-    /// What it is where it is left out, by the size of the L2 in bytes.
+    /// The default, given the size of the L2 in bytes.
     usual: fn(u64) -> u32,
 }
 
@@ -95,43 +95,43 @@ impl Curve {
         self.row().color
     }
 
-    /// What the number behind the name counts; none for a curve without one.
+    /// The unit of the number after the name; none for a curve without a number.
     #[must_use]
     pub fn size_unit(self) -> Option<&'static str> {
         Some(self.row().size.unit).filter(|unit| !unit.is_empty())
     }
 
-    /// The number that is meant where it is left out.
+    /// The default of the number after the name.
     #[must_use]
     pub fn usual_size(self, l2_bytes: u64) -> u32 {
         (self.row().size.usual)(l2_bytes)
     }
 
-    /// The path itself.
+    /// The path.
     #[must_use]
     pub fn path(self) -> &'static dyn Path {
         self.row().path
     }
 }
 
-/// What a path is laid through.
+/// The input of a path.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ground {
     /// Columns and rows of cells.
     pub grid: [u32; 2],
-    /// The number behind the curve's name.
+    /// The number after the curve's name.
     pub size: u32,
     /// Seed of the random curve.
     pub seed: u64,
-    /// Bytes of the lines that the cells of the last frame asked for; none where nothing is known of it.
+    /// Bytes of the lines that the cells accessed in the last frame; none if no counters are known.
     pub frame_bytes: Option<u64>,
 }
 
 /// A path through all cells of a grid.
 pub trait Path: std::fmt::Debug {
-    /// Columns and rows of the cells in the order of traversal: each exactly once.
+    /// Column and row of each cell in order of traversal. Visits each cell exactly once.
     fn cells(&self, ground: &Ground) -> Vec<[u32; 2]>;
 
-    /// What hardware needs for it.
+    /// Its hardware cost.
     fn cost(&self, grid: [u32; 2]) -> Cost;
 }

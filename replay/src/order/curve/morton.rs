@@ -3,8 +3,8 @@
 use super::{Ground, Path};
 use crate::order::cost::Cost;
 
-/// Morton order. On a grid that is no power of two the curve of the next larger square is
-/// followed and what lies outside is skipped.
+/// Morton order. On other grids than squares of a power of two, follows the curve of the next larger such
+/// square and skips cells outside of the grid.
 #[derive(Debug)]
 pub struct Morton;
 
@@ -14,20 +14,20 @@ impl Path for Morton {
         let mut cells: Vec<[u32; 2]> = (0..rows)
             .flat_map(|y| (0..columns).map(move |x| [x, y]))
             .collect();
-        // Sorting by the code is the curve with the outside skipped, at no cost for long grids.
+        // Sorting by the code yields the curve without outside cells, and is fast for long grids.
         cells.sort_unstable_by_key(|&[x, y]| spread(x) | spread(y) << 1);
         cells
     }
 
-    /// A counter whose even and odd bits are column and row. It steps over the cells outside of the grid, at worst
-    /// a quadrant with a step for each level.
+    /// A counter whose even and odd bits are column and row. It skips outside cells by quadrants, in at most
+    /// one step per level.
     fn cost(&self, grid: [u32; 2]) -> Cost {
         let side = grid[0].max(grid[1]).max(1).next_power_of_two();
         Cost::state(4).deciding_in(1 + side.ilog2())
     }
 }
 
-/// Puts a zero bit above every bit of `x`.
+/// Inserts a zero bit above every bit of `x`.
 fn spread(x: u32) -> u64 {
     let mut x = u64::from(x);
     for (shift, mask) in [

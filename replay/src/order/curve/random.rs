@@ -1,4 +1,4 @@
-//! Random order: the control that shows what any locality is worth.
+//! Random order: a control without locality.
 
 use super::scanline::Scanline;
 use super::{Ground, Path};

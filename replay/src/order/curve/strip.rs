@@ -1,22 +1,24 @@
-//! Vertical strips, each traversed row by row to and fro, every other strip from the bottom: what a row of a strip
-//! fetched is still in the L2 when the next row of the strip asks for it, however wide the picture.
+//! Vertical strips. Each is traversed in rows of alternating direction, every other strip from the bottom. The
+//! lines of a strip's row are still in the L2 when the strip's next row needs them, whatever the width of the
+//! picture.
 
 use super::{Ground, Path};
 use crate::order::cost::Cost;
 
-/// Bytes of L2 for each column of tiles that a strip is wide. Chosen on the design cameras of docs/orders.md: a pair of
+/// Bytes of L2 per column of a strip. Chosen on the design cameras of docs/results/orders.md, where a pair of
 /// tiles has about 100 distinct lines of 16 bytes.
 const BYTES_PER_COLUMN: u64 = 1536;
 
-/// Columns that an L2 holds a row of.
+/// The number of columns whose row an L2 holds.
 pub(super) fn columns(l2_bytes: u64) -> u32 {
     u32::try_from(l2_bytes / BYTES_PER_COLUMN)
         .unwrap_or(u32::MAX)
         .max(1)
 }
 
-/// Strips at most as wide as the number behind the name; an odd number of them of nearly the same width, so that none
-/// ends in the middle of the picture, where what lies left and right of it is often alike.
+/// Strips that are at most as wide as the number after the name. Their number is odd and their widths nearly
+/// equal, so that no strip ends in the middle of the picture, because textures left and right of the middle are
+/// often the same.
 #[derive(Debug)]
 pub struct Strip;
 
@@ -37,7 +39,7 @@ impl Path for Strip {
         cells
     }
 
-    /// Two counters and the strip's bounds; the counters' lowest bits are the directions.
+    /// Two counters and the strip's bounds. The lowest bits of the counters are the directions.
     fn cost(&self, _grid: [u32; 2]) -> Cost {
         Cost::state(8).deciding_in(1)
     }

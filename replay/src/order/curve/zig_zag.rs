@@ -18,7 +18,7 @@ impl Path for ZigZag {
             .collect()
     }
 
-    /// Two counters; the lowest bit of the row's is the direction.
+    /// Two counters. The lowest bit of the row counter is the direction.
     fn cost(&self, _grid: [u32; 2]) -> Cost {
         Cost::state(4).deciding_in(1)
     }

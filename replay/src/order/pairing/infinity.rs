@@ -1,18 +1,18 @@
-//! Tiles that see the same direction. Where the eyes are turned outwards, what is far away is not shifted by the same
-//! distance everywhere: rows of one eye are slanted in the other.
+//! Pairs tiles that see the same direction. For eyes that are turned outwards, the shift of distant points
+//! differs from place to place, and rows of one eye are slanted in the other.
 
 use super::offset::Offset;
 use super::{Placement, Rule, tiles};
 use crate::order::cost::{Cost, Knows};
 use crate::order::{Known, View};
 
-/// Pairs by direction, on the grid of a picture straight ahead of the head.
+/// Pairs by direction, on the grid of a picture that faces straight ahead of the head.
 #[derive(Debug)]
 pub struct Infinity;
 
 impl Rule for Infinity {
-    /// A right tile goes to the cell of the left tile whose middle falls into it, others to the cell of their own
-    /// direction.
+    /// A right tile shares the cell of the left tile whose centre falls into it. Other tiles get the cell of
+    /// their own direction.
     fn place(&self, eyes: [View; 2], known: &Known<'_>) -> Placement {
         let Some(directions) = known.directions(eyes) else {
             return Offset.place(eyes, known);
@@ -38,7 +38,8 @@ impl Rule for Infinity {
         Placement::new([left, right])
     }
 
-    /// A list of the tiles in their order, which a driver makes once for a display: two bytes a tile of both eyes.
+    /// A list of the tiles in traversal order, which a driver writes once per display: two bytes per tile of
+    /// both eyes.
     fn cost(&self, [columns, rows]: [u32; 2]) -> Cost {
         let tiles = 2 * u64::from(columns) * u64::from(rows);
         Cost::state(4)

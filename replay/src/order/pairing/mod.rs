@@ -1,7 +1,7 @@
-//! Which tiles of the two eyes belong together, one rule a file.
+//! Rules that pair the tiles of the two eyes, one per file.
 //!
-//! A rule lays the tiles of both eyes on one grid of cells, along which a curve then runs. Tiles in the same cell are
-//! rendered together or one after the other.
+//! A rule places the tiles of both eyes on one grid of cells, which a curve then visits. Tiles in the same cell
+//! are rendered together or one after the other.
 
 mod index;
 mod infinity;
@@ -19,10 +19,10 @@ use row::{LINES, PRIMITIVES};
 registry! { PairingRow:
     // constant           name              help                                                                                          the rule
     INDEX =          row("index",          "Tiles of the same column and row",                                                           &Index);
-    OFFSET =         row("offset",         "The right eye's tiles shifted by where infinity lies straight ahead: a constant of the display", &Offset);
-    INFINITY =       row("infinity",       "Tiles that see the same direction, also of eyes that are turned outwards",                   &Infinity);
-    ROW_PRIMITIVES = row("row-primitives", "Row by row, by the shift at which the last frame's tiles had most primitives in common",      &PRIMITIVES);
-    ROW_LINES =      row("row-lines",      "Row by row, by the shift at which the last frame's tiles had most lines in common",           &LINES);
+    OFFSET =         row("offset",         "The right eye's tiles shifted so that points at infinity straight ahead coincide", &Offset);
+    INFINITY =       row("infinity",       "Tiles that see the same direction, also for eyes that are turned outwards",                   &Infinity);
+    ROW_PRIMITIVES = row("row-primitives", "Each row shifted so that the last frame's tiles have most primitives in common",      &PRIMITIVES);
+    ROW_LINES =      row("row-lines",      "Each row shifted so that the last frame's tiles have most lines in common",           &LINES);
 }
 
 /// A pairing by name.
@@ -45,23 +45,23 @@ const fn row(
 }
 
 impl Pairing {
-    /// The rule itself.
+    /// The rule.
     pub(super) fn rule(self) -> &'static dyn Rule {
         self.row().rule
     }
 }
 
-/// Where the tiles of both eyes lie on one grid.
+/// The placement of the tiles of both eyes on one grid.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Placement {
     /// Columns and rows of cells.
     pub grid: [u32; 2],
-    /// By eye and tile, its cell.
+    /// The cell of each tile, by eye and tile.
     pub cells: [Vec<[u32; 2]>; 2],
 }
 
 impl Placement {
-    /// From cells that may lie anywhere, shifted so that the first column and row are zero.
+    /// Shifts arbitrary cells so that the first column and row are zero.
     pub(super) fn new(cells: [Vec<[i32; 2]>; 2]) -> Self {
         let least = [0, 1].map(|axis: usize| {
             let all = cells.iter().flatten().map(|cell| cell[axis]);
@@ -85,11 +85,11 @@ pub(super) fn tiles(view: View) -> impl Iterator<Item = [u32; 2]> {
     (0..rows).flat_map(move |y| (0..columns).map(move |x| [x, y]))
 }
 
-/// Which tiles belong together.
+/// A rule that pairs tiles.
 pub trait Rule: std::fmt::Debug {
-    /// Lays the tiles of a left and a right view on one grid.
+    /// Places the tiles of a left and a right view on one grid.
     fn place(&self, eyes: [View; 2], known: &Known<'_>) -> Placement;
 
-    /// What hardware needs for it.
+    /// Its hardware cost.
     fn cost(&self, grid: [u32; 2]) -> Cost;
 }

@@ -1,10 +1,10 @@
-//! The right eye's tiles shifted by a constant of the display: what is far away falls on the same cell.
+//! Shifts the right eye's tiles by a constant of the display, so that distant points fall into the same cell.
 
 use super::{Placement, Rule, tiles};
 use crate::order::cost::{Cost, Knows};
 use crate::order::{Known, View};
 
-/// Pairs at a constant shift.
+/// Pairs with a constant shift.
 #[derive(Debug)]
 pub struct Offset;
 

@@ -1,5 +1,5 @@
-//! Each row at a shift of its own, by what the tiles of the last frame had in common: what lies near falls on other cells
-//! than what is far away.
+//! Shifts each row by its own amount, at which the tiles of the last frame had most in common. Near and distant
+//! surfaces need different shifts.
 
 use super::offset::Offset;
 use super::{Placement, Rule, tiles};
@@ -7,18 +7,18 @@ use crate::order::cost::{Cost, Knows};
 use crate::order::known::ViewCounters;
 use crate::order::{Known, View};
 
-/// Pairs at a shift a row.
+/// Pairs with one shift per row.
 #[derive(Debug)]
 pub struct Row {
     shifts: fn(&ViewCounters) -> &[i32],
 }
 
-/// By primitives.
+/// Compares primitives.
 pub const PRIMITIVES: Row = Row {
     shifts: |of| &of.primitive_shift,
 };
 
-/// By lines.
+/// Compares lines.
 pub const LINES: Row = Row {
     shifts: |of| &of.line_shift,
 };
@@ -43,7 +43,7 @@ impl Rule for Row {
         Placement::new([cells(0), cells(1)])
     }
 
-    /// A byte a row.
+    /// One byte per row.
     fn cost(&self, [_, rows]: [u32; 2]) -> Cost {
         Cost::state(4)
             .with_table(rows.into())

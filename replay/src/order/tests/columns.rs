@@ -1,4 +1,4 @@
-//! A curve that only tests know: with its row in the table it is all that a curve takes.
+//! A curve for tests: this file and its row in the table are all that a curve needs.
 
 use crate::order::cost::Cost;
 use crate::order::curve::{Ground, Path};

@@ -1,4 +1,4 @@
-//! What holds for every combination of parts.
+//! Properties of every combination of parts.
 
 use super::super::assignment::Assignment;
 use super::super::curve::Ground;
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use std::collections::HashSet;
 use std::sync::Mutex;
 
-/// Every order that parts can make; curves with a number without one and with `size`.
+/// Every combination of parts. Curves that accept a number appear without one and with `size`.
 fn all(size: u32) -> Vec<Order> {
     let mut orders = Vec::new();
     for curve in Curve::all() {
@@ -33,7 +33,7 @@ fn all(size: u32) -> Vec<Order> {
                                 direction,
                                 assignment,
                             };
-                            // What means nothing together has no name.
+                            // Parts that cannot be combined have no name.
                             if Parts::parse(&parts.to_string()).is_ok() {
                                 orders.push(Order::of(parts));
                             }
@@ -63,7 +63,7 @@ fn there_are_as_many_orders_as_parts_make_and_each_has_a_name_of_its_own() {
     }
 }
 
-/// A display with eyes turned outwards and wider to the outside.
+/// A display with eyes that are turned outwards and see further on the outside.
 fn canted(angle: f32) -> TraceMeta {
     let mut views = FrameViews::default();
     let (sine, cosine) = (
@@ -144,7 +144,8 @@ proptest! {
     }
 }
 
-/// Every order replays the same accesses, in every mode of work, and a cache that holds everything misses each line once.
+/// All orders replay the same accesses in every mode, and a cache that holds all lines misses each of them
+/// once.
 #[test]
 fn every_combination_conserves_the_accesses() {
     let trace = Synthetic {
@@ -162,7 +163,7 @@ fn every_combination_conserves_the_accesses() {
             between_frames: BetweenFrames::Keep,
             ..RunConfig::default()
         };
-        config.l2.size_bytes = 16 << 20;
+        config.level.l2.size_bytes = 16 << 20;
         configs.push(config);
     }
     let results = Mutex::new(Vec::new());

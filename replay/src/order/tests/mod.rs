@@ -77,7 +77,7 @@ fn hilbert_and_zig_zag_step_to_neighbours_only() {
     }
 }
 
-/// Steps that go to no neighbour, diagonals included.
+/// Counts steps that do not go to one of the eight neighbours.
 fn far_steps(cells: &[[u32; 2]]) -> usize {
     let distance =
         |step: &[[u32; 2]]| step[0][0].abs_diff(step[1][0]) + step[0][1].abs_diff(step[1][1]);
@@ -99,7 +99,7 @@ fn the_generalised_hilbert_curve_steps_to_neighbours_on_any_grid_but_for_one_dia
 
 #[test]
 fn strips_are_an_odd_number_and_every_other_one_runs_upwards() {
-    // Four columns at two a strip are three strips: of one, one and two columns.
+    // Four columns with two columns per strip are three strips with one, one and two columns.
     assert_eq!(
         cells_of(Curve::STRIP, [4, 2], 2),
         [
@@ -150,7 +150,7 @@ fn rows_that_the_l2_does_not_hold_become_bands_the_lower_the_more_lines_there_ar
     assert_eq!(rows_of_first_columns(None), [0]);
     // A row of 100 KiB fits into the L2.
     assert_eq!(rows_of_first_columns(Some(1000)), [0]);
-    // The L2 holds 40 columns of a row, 20, and 6.
+    // The L2 holds 40, 20 and 6 columns of a row.
     assert_eq!(rows_of_first_columns(Some(1500)), [0, 1, 2, 3, 4, 5]);
     assert_eq!(rows_of_first_columns(Some(3000)), [0, 1, 2]);
     assert_eq!(rows_of_first_columns(Some(10_000)), [0, 1, 2]);
@@ -170,7 +170,8 @@ fn lrta_takes_left_and_right_tiles_in_turn() {
     );
 }
 
-/// A display whose right eye sees infinity so many pixels left of where the left one does, in pictures of 64x32.
+/// A display with pictures of 64x32 pixels. A point at infinity lies this many pixels further left in the right
+/// picture.
 fn shifted_by(pixels: f32) -> TraceMeta {
     let mut views = FrameViews::default();
     for (eye, side) in views.eyes.iter_mut().zip([1.0, -1.0]) {
@@ -206,7 +207,7 @@ fn tiles_pair_where_infinity_falls_and_those_without_a_partner_keep_their_place(
             "{name}"
         );
     }
-    // Layers have projections of their own.
+    // Layers have their own projections.
     let layers = passes.map(|pass| Pass {
         kind: PassKind::Layer,
         ..pass
@@ -403,7 +404,7 @@ fn names_are_unique() {
     }
 }
 
-/// A curve that no paper's table needs is named by its own file, its row, and the row of its order alone.
+/// Only the file of a curve, its row, and the row of its order mention it.
 #[test]
 fn nothing_outside_the_table_names_an_order() {
     fn scan(folder: &Path, found: &mut Vec<String>) {

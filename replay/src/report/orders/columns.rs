@@ -1,4 +1,4 @@
-//! The tables' rows and their columns, a line each.
+//! The columns of the tables, one per line.
 
 use super::Mean;
 use crate::config::Order;
@@ -27,7 +27,7 @@ fn kib(bytes: u64) -> f64 {
     bytes as f64 / 1024.0
 }
 
-/// A part of an order's name; none for what is no order of parts.
+/// A part of an order; none for searched orders and bounds.
 fn part(row: &Row<'_>, of: fn(Order) -> String) -> Option<String> {
     match row.of {
         Of::Order(order) => Some(of(order)),
@@ -63,8 +63,8 @@ pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
         C::text("mode", "mode", |r| r.config.mode.name()),
         whole("cores", "cores", "", |r| Some(r.config.cores.into())),
         whole("line_bytes", "line", "bytes", |r| Some(r.config.line_bytes.into())),
-        real("l1_kib", "L1", "KiB", 0, |r| Some(kib(r.config.l1.size_bytes))),
-        real("l2_kib", "L2", "KiB", 0, |r| Some(kib(r.config.l2.size_bytes))),
+        real("l1_kib", "L1", "KiB", 0, |r| Some(kib(r.config.level.l1.size_bytes))),
+        real("l2_kib", "L2", "KiB", 0, |r| Some(kib(r.config.level.l2.size_bytes))),
         whole("frames", "frames", "", |r| Some(r.frames().into())),
         C::text("between_frames", "between frames", |r| r.config.between_frames.to_string()),
         whole("external_bytes", "traffic", "bytes", |r| Some(r.external_bytes)).about("between the L2 and memory, all frames together"),
@@ -82,7 +82,7 @@ pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
             Some(100.0 * (own as f64 / base as f64 - 1.0))
         }),
         real("dram_row_hit_pct", "DRAM row hits", "%", 2, |r| row_hit_rate(r).map(|rate| 100.0 * rate)),
-        real("dram_energy_mj", "DRAM energy", "mJ", 4, |r| Some(r.result.as_ref()?.dram.as_ref()?.energy_mj)),
+        real("dram_energy_mj", "DRAM energy", "mJ", 4, |r| Some(r.result.as_ref()?.memory.dram.as_ref()?.energy_mj)),
         whole("whole_frame_bytes", "whole frame", "bytes", |r| {
             let clients = &r.result.as_ref()?.clients;
             (!clients.is_empty()).then(|| clients.iter().map(|client| client.read_bytes + client.write_bytes).sum())
@@ -103,7 +103,7 @@ fn utilization(row: &Row<'_>) -> Option<f64> {
 }
 
 fn row_hit_rate(row: &Row<'_>) -> Option<f64> {
-    Some(row.result.as_ref()?.dram.as_ref()?.row_hit_rate)
+    Some(row.result.as_ref()?.memory.dram.as_ref()?.row_hit_rate)
 }
 
 /// Columns of the means.
@@ -137,20 +137,20 @@ pub fn means<'a>() -> Vec<Column<'a, Mean<'a>>> {
     ]
 }
 
-/// What was learned on a trace with a pair of caches.
+/// The results of the learner for a trace and a pair of caches.
 pub struct LearnedTrace<'a> {
     /// The trace.
     pub label: &'a str,
     /// The configuration.
     pub config: crate::config::RunConfig,
-    /// What came of it.
+    /// The results.
     pub learned: Learned,
 }
 
-/// An order used throughout, or the learner.
+/// A fixed order, or the learner.
 pub struct LearnedRow<'a> {
     of: &'a LearnedTrace<'a>,
-    /// Number of the order; none for the learner.
+    /// Index of the order; none for the learner.
     order: Option<usize>,
 }
 
@@ -174,15 +174,15 @@ impl LearnedRow<'_> {
     }
 }
 
-/// Columns of what was learned.
+/// Columns of the learner's results.
 #[must_use]
 #[rustfmt::skip]
 pub fn learned<'a>() -> Vec<Column<'a, LearnedRow<'a>>> {
     type C<'a> = Column<'a, LearnedRow<'a>>;
     vec![
         C::text("trace", "trace", |r| r.of.label),
-        C::real("l1_kib", "L1", "KiB", 0, |r| kib(r.of.config.l1.size_bytes)),
-        C::real("l2_kib", "L2", "KiB", 0, |r| kib(r.of.config.l2.size_bytes)),
+        C::real("l1_kib", "L1", "KiB", 0, |r| kib(r.of.config.level.l1.size_bytes)),
+        C::real("l2_kib", "L2", "KiB", 0, |r| kib(r.of.config.level.l2.size_bytes)),
         C::text("between_frames", "between frames", |r| r.of.config.between_frames.to_string()),
         C::text("order", "order", |r| r.order.map_or("learned", |order| r.of.learned.orders[order].name())),
         C::new("frames", "frames", "", Show::Whole, |r| r.frames().len() as u64),

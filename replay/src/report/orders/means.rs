@@ -7,13 +7,13 @@ use crate::orders_study::Row;
 /// An order over all traces and caches.
 #[derive(Clone)]
 pub struct Mean<'a> {
-    /// What happens between frames.
+    /// What happens to caches between frames.
     pub between: BetweenFrames,
-    /// Rows of the order, all of them.
+    /// All rows of the order.
     pub rows: Vec<&'a Row<'a>>,
 }
 
-/// Geometric mean; none of nothing, or of what has no logarithm.
+/// Geometric mean; none without values, or if a value is not positive.
 fn geometric(ratios: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0);
     for ratio in ratios {
@@ -46,24 +46,24 @@ impl<'a> Mean<'a> {
         self.rows.first().map(|row| row.name()).unwrap_or_default()
     }
 
-    /// Rows in which an order can change anything.
+    /// Number of rows in which an order can change the bytes.
     fn open(&self) -> impl Iterator<Item = &'a Row<'a>> + '_ {
         self.rows.iter().copied().filter(|row| row.can_change())
     }
 
-    /// Rows that count.
+    /// The rows in which an order can change the bytes.
     #[must_use]
     pub fn count(&self) -> u64 {
         self.open().count() as u64
     }
 
-    /// Bytes against the baseline's, percent more.
+    /// Change of the bytes relative to the baseline, percent.
     #[must_use]
     pub fn change_pct(&self) -> Option<f64> {
         geometric(self.open().filter_map(Row::ratio)).map(change_pct)
     }
 
-    /// Cycles against the baseline's, percent more.
+    /// Change of the cycles relative to the baseline, percent.
     #[must_use]
     pub fn cycles_change_pct(&self) -> Option<f64> {
         let ratio = |row: &Row<'_>| {
@@ -74,7 +74,7 @@ impl<'a> Mean<'a> {
         geometric(self.open().filter_map(ratio)).map(change_pct)
     }
 
-    /// The trace of which the mean over caches is worst, and its change.
+    /// The trace with the worst mean over caches, and its change.
     #[must_use]
     pub fn worst_trace(&self) -> Option<(&'a str, f64)> {
         let mut traces: Vec<(&str, Vec<f64>)> = Vec::new();
@@ -94,14 +94,14 @@ impl<'a> Mean<'a> {
         changes.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// The worst change of a trace with a pair of caches.
+    /// The worst change of any trace with any pair of caches.
     #[must_use]
     pub fn worst_pct(&self) -> Option<f64> {
         let changes = self.open().filter_map(Row::ratio).map(change_pct);
         changes.max_by(f64::total_cmp)
     }
 
-    /// Of the distance to the greedy order, how much is closed: by the geometric means of both.
+    /// The part of the distance to the greedy order that the order closes, by geometric means.
     #[must_use]
     pub fn closed_pct(&self) -> Option<f64> {
         let known = || self.open().filter(|row| row.greedy_bytes.is_some());
@@ -111,13 +111,13 @@ impl<'a> Mean<'a> {
         (greedy < 1.0).then(|| 100.0 * own.ln() / greedy.ln())
     }
 
-    /// Mean of a rate of the replays, percent.
+    /// Mean of a rate over the replays, percent.
     #[must_use]
     pub fn rate_pct(&self, rate: fn(&Row<'_>) -> Option<f64>) -> Option<f64> {
         mean(self.open().filter_map(rate)).map(|rate| 100.0 * rate)
     }
 
-    /// What hardware needs where most is needed; none for bounds.
+    /// The largest hardware cost of any row; none for bounds.
     #[must_use]
     pub fn cost(&self) -> Option<Cost> {
         let costs = self.rows.iter().filter_map(|row| row.cost);
@@ -125,7 +125,7 @@ impl<'a> Mean<'a> {
     }
 }
 
-/// A mean for each order and each thing that happens between frames, the least bytes first.
+/// The means by order and by what happens between frames, fewest bytes first.
 pub fn means<'a>(rows: &'a [Row<'a>]) -> Vec<Mean<'a>> {
     let mut means: Vec<Mean<'a>> = Vec::new();
     let mut betweens: Vec<BetweenFrames> = Vec::new();

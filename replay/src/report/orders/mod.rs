@@ -1,4 +1,4 @@
-//! Tile orders against each other and against bounds: table, JSON, CSV and page.
+//! Reports of a study of tile orders: table, JSON, CSV and HTML page.
 
 mod columns;
 mod means;
@@ -18,13 +18,13 @@ use serde::Serialize;
 /// Schema of the JSON object.
 pub const SCHEMA: &str = "replay.orders/1";
 
-/// What a study finds.
+/// The results of a study.
 pub struct OrdersReport<'a> {
     /// Rows, trace by trace.
     pub rows: Vec<Row<'a>>,
-    /// What was learned, trace by trace and cache by cache; empty unless asked for.
+    /// Results of the learner, by trace and caches; empty unless requested.
     pub learned: Vec<LearnedTrace<'a>>,
-    /// The machine but for what is varied.
+    /// The machine, except for the varied settings.
     pub config: RunConfig,
 }
 
@@ -50,7 +50,7 @@ struct TraceFacts<'a> {
 }
 
 impl<'a> OrdersReport<'a> {
-    /// Means over traces and caches, the least bytes first.
+    /// Means over traces and caches, fewest bytes first.
     #[must_use]
     pub fn means(&self) -> Vec<Mean<'_>> {
         means::means(&self.rows)
@@ -60,7 +60,7 @@ impl<'a> OrdersReport<'a> {
         self.learned.iter().flat_map(LearnedTrace::rows).collect()
     }
 
-    /// The means, and of a single trace its rows.
+    /// The means; for a single trace, its rows.
     #[must_use]
     pub fn text(&self) -> String {
         let means = self.means();
@@ -91,7 +91,7 @@ impl<'a> OrdersReport<'a> {
     /// As one JSON object.
     ///
     /// # Errors
-    /// A figure that is not finite.
+    /// A value that is not finite.
     pub fn json(&self) -> serde_json::Result<String> {
         let mut traces: Vec<TraceFacts<'_>> = Vec::new();
         for row in &self.rows {

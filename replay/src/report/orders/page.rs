@@ -1,4 +1,4 @@
-//! The page: means and bounds by display, hardware, and each order's path as a picture.
+//! The HTML page: means and bounds by display, hardware costs, and a picture of each order's path.
 
 use super::{Mean, OrdersReport, columns, means};
 use crate::order::{Known, View, WorkItem};
@@ -28,17 +28,17 @@ const SHOWN: [&str; 15] = [
     "decision_cycles",
 ];
 
-/// Tiles of the pictures of paths.
+/// Size of the pictures of paths in tiles.
 const PATH_TILES: [u32; 2] = [12, 8];
 
-/// An L2 for those pictures: strips of four columns.
+/// The L2 size for those pictures, which gives strips of four columns.
 const PATH_L2_BYTES: u64 = 4 * 1536;
 
 impl OrdersReport<'_> {
     /// The page.
     ///
     /// # Errors
-    /// A plot that cannot be drawn.
+    /// A plot that could not be drawn.
     pub fn page(&self) -> Result<String, PlotError> {
         let mut sections = Vec::new();
         let mut displays: Vec<(&str, i32)> = Vec::new();
@@ -84,7 +84,7 @@ impl OrdersReport<'_> {
         Ok(html::page("Parallax: tile orders", &lead, &sections))
     }
 
-    /// Each order's path over a small picture, and on the display of the first trace.
+    /// The path of each order over a small picture on the display of the first trace.
     fn paths(&self) -> Result<Markup, PlotError> {
         let mut pictures = Vec::new();
         let mut known: Vec<String> = Vec::new();
@@ -113,7 +113,7 @@ impl OrdersReport<'_> {
     }
 }
 
-/// Pixels of a tile of which a picture has as many columns as the small one.
+/// The tile size at which a picture has as many columns as the small picture.
 fn small_tile_px(row: &Row<'_>) -> u32 {
     row.subject.id.eye_size_px[0].div_ceil(PATH_TILES[0])
 }
