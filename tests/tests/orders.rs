@@ -309,10 +309,6 @@ fn what_makes_no_sense_is_refused() {
             "--search: expected greedy, greedy-N with a look-ahead of N items, or anneal, found `best`",
         ],
     );
-    refused(
-        &["--between", "lose-50", "--l3", "4MiB"],
-        &["between_frames: expected keep or flush with further levels"],
-    );
     let mut run = program("replay");
     refuse(
         run.arg("run").arg(trace()).args(["--order", "spiral+sta"]),
