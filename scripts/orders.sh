@@ -1,12 +1,12 @@
 #!/bin/sh
 # Measures what tile orders save: `scripts/orders.sh SCENES [PART...]` writes results/orders-*.csv, the tables of docs/results/orders.md.
-# Parts: displays, cameras, frames, timed, axes, speed; by default all of them. docs/results/orders.md explains which cameras and displays
+# Parts: displays, all, cameras, frames, timed, axes, speed; by default all of them. docs/results/orders.md explains which cameras and displays
 # were used for the design and which were held out.
 set -eu
 . "$(dirname "$0")/captures.sh"
 here=$(dirname "$results")/scripts
 shift
-parts=${*:-displays cameras frames timed axes speed}
+parts=${*:-displays all cameras frames timed axes speed}
 
 # One line per camera: set, label, file, name of the camera.
 cameras() {
@@ -74,9 +74,13 @@ for part in $parts; do
             study displays,built-in.json built-in/*.textrace --orders "$fixed"
             write displays
             ;;
+        all)
+            [ -d symmetric-100 ] || capture symmetric-100 --hmd symmetric-100
+            study all.json symmetric-100/*.textrace
+            write all
+            ;;
         cameras)
             [ -d symmetric-100 ] || capture symmetric-100 --hmd symmetric-100
-            study cameras,all.json symmetric-100/*.textrace
             study cameras.json symmetric-100/*.textrace --orders z2-sta,zig-zag+sta+offset,adaptive+sta+offset,adaptive+sta+offset+runs,adaptive+halves+offset+runs --bounds --search greedy,greedy-16,greedy-64,greedy-256,anneal --moves 200000
             write cameras
             ;;
@@ -136,7 +140,7 @@ for part in $parts; do
             python3 "$here/orders.py" speed "$results" "$bin/replay" symmetric-100/*.textrace
             ;;
         *)
-            echo "expected displays, cameras, frames, timed, axes or speed, found $part" >&2
+            echo "expected displays, all, cameras, frames, timed, axes or speed, found $part" >&2
             exit 2
             ;;
     esac
