@@ -66,8 +66,11 @@ pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
             Err(Some(why)) => bail!("--orders: {why}"),
             Err(None) => {
                 let known: Vec<&str> = Order::all().map(|o| o.name()).collect();
+                let similar = Order::similar(name);
+                let hint =
+                    similar.map_or(String::new(), |o| format!("; did you mean `{}`?", o.name()));
                 bail!(
-                    "--orders: expected `all` or some of {}, found `{name}`",
+                    "--orders: expected `all` or some of {}, found `{name}`{hint}",
                     known.join(", ")
                 );
             }
@@ -100,6 +103,19 @@ mod tests {
                 known.join(", ")
             )
         );
+    }
+
+    #[test]
+    fn a_mistyped_order_comes_with_a_suggestion() {
+        for (typed, order) in [
+            ("z2-sts", "z2-sta"),
+            ("Mortn", "morton"),
+            ("hilber", "hilbert"),
+        ] {
+            let error = parse_orders(typed).unwrap_err().to_string();
+            let hint = format!("found `{typed}`; did you mean `{order}`?");
+            assert!(error.ends_with(&hint), "{error}");
+        }
     }
 
     #[test]

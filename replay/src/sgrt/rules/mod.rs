@@ -14,7 +14,7 @@ mod triangle;
 mod triangles;
 
 use super::frame::{Frame, Sample};
-use super::place::{Offset, Place};
+use super::place::{Offset, RightSample};
 use super::reads::Reads;
 use super::reproject::Reprojection;
 use serde::{Deserialize, Serialize};
@@ -58,7 +58,7 @@ pub struct RuleKind {
 pub trait Test: Sync {
     /// True if `hit`, the left sample to be reused, must be rejected. After a re-test, `hit` is the sample
     /// whose triangle was hit, otherwise the candidate's.
-    fn rejects(&self, at: Place, hit: &Sample) -> bool;
+    fn rejects(&self, at: RightSample, hit: &Sample) -> bool;
 }
 
 /// Default depth share of rules that take one.
