@@ -1,5 +1,6 @@
 //! The configuration of one replay. The default is the Z2 paper's machine (section 4.1).
 
+mod between_frames;
 mod dram;
 mod error;
 mod frame;
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::memory::Replacement;
 pub use crate::order::Order;
+pub use between_frames::BetweenFrames;
 pub use error::ConfigError;
 pub(crate) use error::{accept, in_range};
 use formats::footprint::MOST_ANISOTROPY;
@@ -80,25 +82,6 @@ pub enum Hsr {
 }
 
 impl Hsr {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
-/// What happens to cache contents between the frames of a trace.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum BetweenFrames {
-    /// Caches keep their lines, so that a frame can hit lines of the frame before.
-    #[default]
-    Keep,
-    /// Caches are emptied, as if other work ran between the frames.
-    Flush,
-}
-
-impl BetweenFrames {
     fn is_default(&self) -> bool {
         *self == Self::default()
     }
@@ -281,6 +264,14 @@ impl RunConfig {
             self.sampling.max_anisotropy,
             1..=MOST_ANISOTROPY,
         )?;
+        let l1_lines = |level: &LevelConfig| level.size_bytes / u64::from(self.line_bytes);
+        accept(
+            self.between_frames.lost_percent().is_none()
+                || self.level.iter().all(|level| l1_lines(level) <= MOST_LINES),
+            "between_frames",
+            "keep or flush with a level as large as more than 2^24 lines of the L1",
+            self.between_frames,
+        )?;
         self.dram.as_ref().map_or(Ok(()), DramConfig::check)?;
         self.frame.as_ref().map_or(Ok(()), FrameConfig::check)?;
         self.tmu.check()?;
@@ -299,6 +290,12 @@ impl RunConfig {
     #[must_use]
     pub fn follows_l2_misses(&self) -> bool {
         self.simulates_below_l2() || self.prefetch.is_some() || self.level.depend_on_evictions()
+    }
+
+    /// How work items are given to cores: as the order says, else as the configuration does.
+    #[must_use]
+    pub fn dispatch(&self) -> Assign {
+        self.order.dispatch(self.assign)
     }
 
     /// True if L2 misses go to further levels or to DRAM.

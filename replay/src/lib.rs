@@ -14,6 +14,7 @@ pub mod locality;
 pub mod memory;
 pub mod model_version;
 pub mod order;
+pub mod orders_study;
 mod palette;
 pub mod paper;
 pub mod preset;

@@ -17,6 +17,13 @@ pub trait Row: fmt::Debug + Sized + 'static {
     fn table() -> &'static [Named<Self>];
     /// The table's names, in the same order.
     fn names() -> &'static [&'static str];
+    /// What a name stands for that no row has.
+    ///
+    /// # Errors
+    /// Nothing; none where names are those of the table alone.
+    fn other(_name: &str) -> Result<Named<Self>, Option<String>> {
+        Err(None)
+    }
 }
 
 /// The name most similar to a mistyped one, if any is similar.
@@ -50,7 +57,16 @@ impl<R: Row> Named<R> {
     /// The row with this name.
     #[must_use]
     pub fn find(name: &str) -> Option<Self> {
-        Self::all().find(|row| row.name() == name)
+        Self::by_name(name).ok()
+    }
+
+    /// The row of that name, or what else it stands for.
+    ///
+    /// # Errors
+    /// An unknown name: why, where there is more to say than that no row has it.
+    pub fn by_name(name: &str) -> Result<Self, Option<String>> {
+        let row = Self::all().find(|row| row.name() == name);
+        row.map_or_else(|| R::other(name), Ok)
     }
 
     /// The row whose name is most similar to a mistyped one, if any is similar.
@@ -102,7 +118,10 @@ impl<R: Row> Serialize for Named<R> {
 impl<'de, R: Row> Deserialize<'de> for Named<R> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let name = String::deserialize(deserializer)?;
-        Self::find(&name).ok_or_else(|| de::Error::unknown_variant(&name, R::names()))
+        Self::by_name(&name).map_err(|why| match why {
+            Some(why) => de::Error::custom(why),
+            None => de::Error::unknown_variant(&name, R::names()),
+        })
     }
 }
 
@@ -117,8 +136,9 @@ impl<R: Row> clap::ValueEnum for Named<R> {
 }
 
 /// Implements [`Row`] for a type with the fields `name` and `help`, and defines one constant per row.
+/// `other = FUNCTION` gives the meaning of names that no row has.
 macro_rules! registry {
-    ($row:ty: $($(#[$only:meta])* $id:ident = $value:expr;)+) => {
+    ($row:ty $(, other = $other:path)?: $($(#[$only:meta])* $id:ident = $value:expr;)+) => {
         impl $crate::registry::Named<$row> {
             $(
                 $(#[$only])*
@@ -147,6 +167,10 @@ macro_rules! registry {
                     &[$($(#[$only])* <$crate::registry::Named<$row>>::$id.row().name),+];
                 NAMES
             }
+
+            $(fn other(name: &str) -> Result<$crate::registry::Named<Self>, Option<String>> {
+                $other(name)
+            })?
         }
     };
 }

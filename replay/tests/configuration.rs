@@ -43,6 +43,8 @@ Levels are a list of two to six `[[level]]` tables, the L1 first. Such a list in
     [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
     layout.block_order = [\"morton\", \"tiled\"]
 
+`order` accepts the names below and lists of parts, for example `\"strip8+sta+offset+boustro\"` ([orders.md](../models/orders.md)).
+
 A sweep has at most 100000 points. An impossible point is refused before any is replayed. A sweep that was stopped continues
 where it stopped: each point's result is a row of a file under `points/` in the output folder.
 [many-machines.md](many-machines.md) shows how to split a sweep over machines.
@@ -124,7 +126,6 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
         "TmuModel" => of::<TmuModel>(),
         "Assign" => of::<Assign>(),
         "Hsr" => of::<Hsr>(),
-        "BetweenFrames" => of::<BetweenFrames>(),
         "CountBy" => of::<CountBy>(),
         "Inclusion" => of::<Inclusion>(),
         "LevelClients" => of::<LevelClients>(),
@@ -132,11 +133,13 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
         "Mapping" => of::<Mapping>(),
         "PagePolicy" => of::<PagePolicy>(),
         "FrameMachine" => of::<FrameMachine>(),
-        "FilterOverride" | "LodFormula" | "AnisotropyModel" | "BlockOrder" | "TextureOrder"
-        | "TexelFormat" => {
+        "BetweenFrames" | "FilterOverride" | "LodFormula" | "AnisotropyModel" | "BlockOrder"
+        | "TextureOrder" | "TexelFormat" => {
             let name = |item: &Item| {
                 let variant = item.line.split([' ', ',']).next().unwrap();
-                item.renamed.clone().unwrap_or_else(|| kebab(variant))
+                let number = variant.split_once('(');
+                let name = number.map_or_else(|| kebab(variant), |(name, _)| kebab(name) + "-N");
+                item.renamed.clone().unwrap_or(name)
             };
             let items = items(sources, type_name);
             items.iter().map(|i| (name(i), i.about.clone())).collect()
@@ -244,7 +247,7 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
         };
         let values = values(sources, kind);
         for (value, _) in &values {
-            let read = with(&key, Value::String(value.clone()));
+            let read = with(&key, Value::String(value.replace("-N", "-50")));
             assert!(read.is_ok(), "{key} = {value}: {read:?}");
         }
         let range = range(&key).map_or_else(String::new, |r| format!(" Accepted: {r}."));
@@ -260,6 +263,7 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
 fn page() -> String {
     let sources: String = [
         "replay/src/config.rs",
+        "replay/src/config/between_frames.rs",
         "replay/src/config/level.rs",
         "replay/src/config/prefetch.rs",
         "replay/src/config/tmu.rs",

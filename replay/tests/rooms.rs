@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 12] = [
     &["addresses", "compare", "locality"],
     &["sgrt"],
     &["experiment"],
-    &["accuracy", "techniques"],
+    &["accuracy", "orders_study", "techniques"],
     &["report"],
     &["cli"],
 ];

@@ -247,6 +247,23 @@ fn every_golden_trace_replays_to_its_golden_result() {
     compare(&path, digests.text().as_bytes());
 }
 
+/// All orders of `replay orders`, functional and, without what is slow, timed.
+#[test]
+fn every_order_replays_every_golden_trace_to_its_golden_row() {
+    for trace in golden_traces("textrace") {
+        for (name, options) in [
+            ("orders-functional", &["--caches", "8/64,16/256"][..]),
+            ("orders-timed", &["--caches", "8/64", "--mode", "timed"]),
+        ] {
+            let mut command = program("replay");
+            command.arg("orders").arg(&trace).args(options);
+            let output = run_ok(command.args(["--csv", "-"]));
+            let folder = trace.with_extension("golden");
+            compare(&folder.join(format!("{name}.csv")), &output.stdout);
+        }
+    }
+}
+
 #[test]
 fn changed_counts_need_another_model_version() {
     let of = |model_version, checksum: &str, misses: u32| {

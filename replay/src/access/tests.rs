@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::config::Order;
+use crate::order::Known;
 use crate::stream::MemoryTrace;
 use crate::stream::synthetic::Synthetic;
 use formats::textrace::geometry::{GeometryView, MeshGeometry, TileLists};
@@ -101,11 +102,12 @@ fn traffic(
     texture_bytes: u64,
 ) -> Result<WholeFrame, StreamError> {
     let mut of = FrameClients::new(source, config, *machine, 1 << 20)?;
-    let order = config.order.build(config.seed);
+    let tables = source.tables();
+    let known = Known::new(config, &tables.meta);
     let mut sums = [[0; 2]; Client::ALL.len()];
     for frame in [0] {
         of.start_frame(frame)?;
-        let phases = crate::order::plan_frame(&*order, &source.tables().passes, frame);
+        let phases = crate::order::plan_frame(config.order, &known, &tables.passes, frame);
         for (number, item) in phases.iter().flatten().enumerate() {
             of.start_item(number % config.cores as usize, item)?;
         }

@@ -6,7 +6,7 @@ use super::vertices::{POSITION_BYTES, ShadedView};
 use crate::config::{FrameConfig, RunConfig};
 use crate::memory::{Client, Lru, WaysOf};
 use crate::order::{Interleave, TileRef, WorkItem};
-use crate::stream::{StreamError, TileSource, interleaved};
+use crate::stream::{ListEntry, Listed, StreamError, TileSource, interleaved};
 use formats::textrace::Tile;
 use formats::textrace::geometry::ViewTarget;
 
@@ -74,7 +74,9 @@ impl Tiles {
         views: &[ShadedView],
         traffic: &mut Traffic,
     ) {
-        for list in lists {
+        // Lists belong to whole tiles, so each half of an item reads them again.
+        let times = 1 + usize::from(interleave == Some(Interleave::Halves));
+        for list in lists.into_iter().cycle().take(times * lists.len()) {
             let bytes = list.primitives.len() as u64 * u64::from(self.machine.list_entry_bytes);
             traffic.read(Client::PrimitiveList, list.address, bytes);
         }
@@ -87,11 +89,17 @@ impl Tiles {
             return;
         };
         let mut order = Vec::new();
-        let [mut left, mut right] = lists.map(|list| list.primitives.iter().map(|entry| entry.0));
+        let [mut left, mut right] = lists.map(|list| {
+            let primitives = list.primitives.iter();
+            primitives.map(|&(primitive, _)| ListEntry {
+                primitive,
+                in_half: [true; 2],
+            })
+        });
         interleaved(interleave, [&mut left, &mut right], &mut order);
-        for (of, entry) in order {
-            let list = lists[usize::from(of)];
-            let entry = list.primitives[entry as usize];
+        for Listed { tile, run, .. } in order {
+            let list = lists[usize::from(tile)];
+            let entry = list.primitives[run as usize];
             self.primitive(core, list.view, entry, views, traffic);
         }
     }

@@ -2,10 +2,10 @@
 //! all lines of an L1 set and the L2 sets that hold no other lines. It can be replayed separately with
 //! exact results.
 
-use crate::config::{BetweenFrames, ConfigError, Order, RunConfig};
+use crate::config::{ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::memory::{Cache, Found, Hierarchy};
-use crate::order::{self, Phase};
+use crate::order::{self, Known, Phase};
 use crate::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, rendered,
 };
@@ -95,11 +95,11 @@ pub fn counts(
         },
     };
     let passes = &rendered.tables().passes;
-    let order = order.build(config.seed);
+    let known = Known::new(config, &rendered.tables().meta);
     let mut index = 0;
     for &number in part.frames {
         let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-        if config.between_frames == BetweenFrames::Flush {
+        if config.between_frames.empties()? {
             counting.caches.clear();
         }
         let frame = expander.frame(number, &memory, &mut accesses)?;
@@ -110,11 +110,16 @@ pub fn counts(
             });
             kept.collect()
         };
-        let plan = order::plan_frame(&*order, passes, number);
+        let plan = order::plan_frame(order, &known, passes, number);
         let phases: Vec<Phase> = plan.into_iter().map(&mut keep).collect();
         let before: u64 = counting.counts.by_cluster.iter().sum();
         let mut cores = Cores::new(&frame, config.cores as usize);
-        interleave(&mut cores, &phases, config.assign, &mut counting)?;
+        interleave(
+            &mut cores,
+            &phases,
+            order.dispatch(config.assign),
+            &mut counting,
+        )?;
         let after: u64 = counting.counts.by_cluster.iter().sum();
         counting.counts.by_frame.push(after - before);
     }
@@ -139,7 +144,7 @@ pub fn frames(trace: &dyn TileSource) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Assign, Hsr, LevelConfig, Levels, Mode};
+    use crate::config::{Assign, BetweenFrames, Hsr, LevelConfig, Levels, Mode};
     use crate::engine::replay;
     use crate::stream::synthetic::Synthetic;
     use formats::textrace::{Pass, Surfaces};

@@ -1,7 +1,7 @@
 //! `replay compare`: compares two captures of the same views, and their cache misses.
 
 use super::ConfigArgs;
-use super::experiment_args::parse_orders;
+use super::order_arg::parse_orders;
 use super::subjects::Traces;
 use crate::compare::compare;
 use crate::config::Order;

@@ -1,5 +1,6 @@
 //! Flags that set the machine. Flags override `--config`, which overrides the defaults.
 
+use super::order_arg::OrderParser;
 use crate::config::FrameMachine;
 use crate::config::{
     Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, CountBy, FilterOverride, Hsr,
@@ -40,8 +41,8 @@ pub struct ConfigArgs {
     /// Named machine instead of the defaults; flags override it
     #[arg(long, conflicts_with = "config")]
     preset: Option<Preset>,
-    /// Tile order
-    #[arg(long)]
+    /// Tile order: a name, or parts as in zig-zag+sta+offset+boustro (docs/models/orders.md)
+    #[arg(long, value_parser = OrderParser)]
     order: Option<Order>,
     /// Model: texture units with timing, or cache counts only
     #[arg(long)]
@@ -89,8 +90,9 @@ pub struct ConfigArgs {
     /// Hidden-surface removal
     #[arg(long, hide_short_help = true)]
     hsr: Option<Hsr>,
-    /// State of the caches at the start of each frame of a trace
-    #[arg(long, hide_short_help = true)]
+    /// State of the caches at the start of each frame of a trace: keep, flush, or lose-N, after which other work has
+    /// filled N percent of each cache below the L1
+    #[arg(long, value_name = "CACHES", value_parser = str::parse::<BetweenFrames>, hide_short_help = true)]
     between_frames: Option<BetweenFrames>,
 
     /// Prefetcher of the L2; `[prefetch]` of --config sets the number of lines

@@ -3,7 +3,7 @@
 use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
-use crate::order;
+use crate::order::{self, Known};
 use crate::stream::{for_quads, rendered};
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
@@ -286,8 +286,11 @@ fn accesses(
         line_bytes: config.line_bytes,
     };
     let source = rendered(trace, config)?;
-    let order = config.order.build(config.seed);
-    for item in order::plan(&*order, &tables.passes).iter().flatten() {
+    let known = Known::new(config, &tables.meta);
+    for item in order::plan(config.order, &known, &tables.passes)
+        .iter()
+        .flatten()
+    {
         for_quads(&source, item, |quad| -> Result<()> {
             let origin = Origin {
                 pass: quad.at.pass,

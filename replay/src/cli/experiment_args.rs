@@ -1,8 +1,9 @@
 //! Arguments that `replay paper` and `replay report` share: axes and outputs.
 
 use super::ConfigArgs;
+use super::order_arg::parse_orders;
 use super::subjects::Traces;
-use crate::config::{Order, RunConfig};
+use crate::config::RunConfig;
 use crate::experiment::{self, Plan, Subject};
 use crate::files::{self, write_atomically};
 use crate::paper::{self, z2};
@@ -194,33 +195,6 @@ pub fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> 
     write_atomically(path, page.as_bytes())
 }
 
-/// Parses comma-separated names of orders, or `all`.
-///
-/// # Errors
-/// An unknown name.
-pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
-    if text == "all" {
-        let others = Order::all().filter(|o| !z2::ORDERS.contains(o));
-        return Ok(z2::ORDERS.into_iter().chain(others).collect());
-    }
-    let mut orders = Vec::new();
-    for name in text.split(',').map(str::trim) {
-        let Some(order) = Order::find(name) else {
-            let known: Vec<&str> = Order::all().map(|o| o.name()).collect();
-            let similar = Order::similar(name);
-            let hint = similar.map_or(String::new(), |o| format!("; did you mean `{}`?", o.name()));
-            bail!(
-                "--orders: expected `all` or some of {}, found `{name}`{hint}",
-                known.join(", ")
-            );
-        };
-        if !orders.contains(&order) {
-            orders.push(order);
-        }
-    }
-    Ok(orders)
-}
-
 /// Parses L1 and L2 sizes in KiB, such as `8/128,16/256`, to bytes.
 ///
 /// # Errors
@@ -251,38 +225,6 @@ pub fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn all_orders_begin_with_those_of_the_paper() {
-        let orders = parse_orders("all").unwrap();
-        assert_eq!(orders[..3], z2::ORDERS);
-        assert_eq!(orders.len(), Order::all().len());
-    }
-
-    #[test]
-    fn an_unknown_order_is_named_with_the_known_ones() {
-        let known: Vec<&str> = Order::all().map(Order::name).collect();
-        assert_eq!(
-            parse_orders("morton,spiral").unwrap_err().to_string(),
-            format!(
-                "--orders: expected `all` or some of {}, found `spiral`",
-                known.join(", ")
-            )
-        );
-    }
-
-    #[test]
-    fn a_mistyped_order_comes_with_a_suggestion() {
-        for (typed, order) in [
-            ("z2-sts", "z2-sta"),
-            ("Mortn", "morton"),
-            ("hilber", "hilbert"),
-        ] {
-            let error = parse_orders(typed).unwrap_err().to_string();
-            let hint = format!("found `{typed}`; did you mean `{order}`?");
-            assert!(error.ends_with(&hint), "{error}");
-        }
-    }
 
     #[test]
     fn cache_sizes_are_in_kib() {

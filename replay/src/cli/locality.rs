@@ -2,7 +2,8 @@
 
 use super::ConfigArgs;
 use super::addresses::{AddressInput, name_of, two_levels_only};
-use super::experiment_args::{page_outputs, parse_orders, write_page};
+use super::experiment_args::{page_outputs, write_page};
+use super::order_arg::parse_orders;
 use super::subjects::Traces;
 use crate::config::{Order, RunConfig};
 use crate::experiment::frame_count;

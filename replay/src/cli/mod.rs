@@ -11,6 +11,8 @@ pub mod dump;
 mod experiment_args;
 pub mod info;
 mod locality;
+mod order_arg;
+mod orders;
 mod paper;
 mod parquet_arg;
 mod report;
@@ -86,6 +88,8 @@ enum Command {
     Report(Box<report::Args>),
     /// Compare stereo rendering techniques: frame time, image error, cache misses.
     Techniques(Box<techniques::Args>),
+    /// Compare tile orders with each other and with lower bounds, with their hardware costs.
+    Orders(Box<orders::Args>),
     /// Analyse reuse distances, working sets, miss-ratio curves, OPT and 3C misses, by order.
     Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
@@ -113,6 +117,7 @@ pub fn main() -> ExitCode {
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),
             Command::Techniques(args) => techniques::run(&args),
+            Command::Orders(args) => orders::run(&args),
             Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
             Command::Documents(documents) => documents.run::<Cli>(),

@@ -1,7 +1,8 @@
 //! `replay techniques`: compares rendering techniques from the measurements of `tracegen techniques`.
 
 use super::ConfigArgs;
-use super::experiment_args::{page_outputs, parse_orders, write_page};
+use super::experiment_args::{page_outputs, write_page};
+use super::order_arg::parse_orders;
 use super::parquet_arg::ParquetArg;
 use super::subjects::Traces;
 use crate::config::{Mode, Order, RunConfig};

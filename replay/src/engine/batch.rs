@@ -278,6 +278,7 @@ fn stream_key(config: &RunConfig) -> RunConfig {
     let model = config.tmu_model().unwrap_or_default();
     RunConfig {
         order: usual.order,
+        level: usual.level,
         seed: usual.seed,
         cores: usual.cores,
         assign: usual.assign,
@@ -292,8 +293,15 @@ fn stream_key(config: &RunConfig) -> RunConfig {
 /// The configuration reduced to the settings that must agree within a group.
 fn pass_key(config: &RunConfig) -> RunConfig {
     let usual = RunConfig::default();
+    let mut level = usual.level;
+    if config.between_frames.lost_percent().is_some() {
+        // Caches of several associativities share stacks, which other work would fill differently.
+        level.l2.ways = config.level.l2.ways;
+    }
     RunConfig {
-        level: usual.level,
+        // If the order depends on the L2's size, the resolved name contains that size.
+        order: config.order.resolved(config.level.l2.size_bytes),
+        level,
         memory_cycles: usual.memory_cycles,
         tmu: usual.tmu,
         tile_maps: false,

@@ -5,7 +5,7 @@ use super::counts::{CacheCounts, FootprintMisses};
 use super::{AtOnce, Machine};
 use crate::access::FrameClients;
 use crate::config::{Assign, RunConfig};
-use crate::memory::{Cache, Hierarchy};
+use crate::memory::{Cache, Hierarchy, OtherWork};
 use crate::order::{Phase, WorkItem};
 use crate::stream::{Consumer, Cores, QuadLines, StreamError, Tag, interleave};
 
@@ -116,6 +116,10 @@ impl<C: Cache> Machine for Functional<C> {
 
     fn flush(&mut self) {
         self.caches.clear();
+    }
+
+    fn lose(&mut self, other: OtherWork) {
+        self.caches.lose(other);
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {

@@ -18,6 +18,7 @@ pub use lines::{LineOutcome, LineReplay};
 
 use crate::access::FrameClients;
 use crate::config::{Assign, ConfigError, RunConfig};
+use crate::memory::OtherWork;
 use crate::order::Phase;
 use crate::result::RunResult;
 use crate::stream::{Cores, LineMemory, StreamError, Tag, TileSource};
@@ -51,6 +52,18 @@ pub fn replay(trace: &dyn TileSource, config: &RunConfig) -> Result<RunResult, R
     Ok(answer.into_inner().unwrap_or_default())
 }
 
+/// Checks that the lines of other work between frames are not lines of textures, which have `lines` lines.
+///
+/// # Errors
+/// Textures with too many lines.
+pub(crate) fn check_other_work(lines: u64) -> Result<(), StreamError> {
+    OtherWork::check(lines).map_err(|most| {
+        StreamError::Tables(format!(
+            "expected at most {most} lines of textures if part of the caches is lost between frames, found {lines}"
+        ))
+    })
+}
+
 /// A machine that processes the cores' work: caches, with or without clocks, for one or more configurations.
 trait Machine: Send {
     /// Runs the phases of a frame. Other clients of memory, if simulated, follow the cores' items.
@@ -67,6 +80,9 @@ trait Machine: Send {
 
     /// Empties the caches between frames.
     fn flush(&mut self);
+
+    /// Between frames, other work empties the L1 caches and fills part of each other cache.
+    fn lose(&mut self, other: OtherWork);
 
     /// The counts for one of its configurations.
     fn outcome(&self, config: &RunConfig) -> batch::Outcome;

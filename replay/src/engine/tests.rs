@@ -3,12 +3,13 @@ use super::functional::Functional;
 use super::summary::summary;
 use super::*;
 use crate::config::{
-    BetweenFrames, CountBy, LevelConfig, Levels, Mode, Order, Replacement, TmuModel,
+    BetweenFrames, CountBy, Inclusion, LevelConfig, Levels, Mode, Order, Replacement, TmuModel,
 };
 use crate::memory::Hierarchy;
-use crate::order::{self, WorkItem};
+use crate::order::{self, Known, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
+use crate::stream::testing::repeated;
 use crate::stream::{
     Bins, Consumer, Expander, LineSet, MemoryTrace, QuadLines, TraceCounts, interleave, testing,
 };
@@ -34,6 +35,18 @@ fn functional(order: Order) -> RunConfig {
         level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(8 << 10)),
         ..RunConfig::default()
     }
+}
+
+/// Orders of parts for random machines.
+fn composed() -> impl Iterator<Item = Order> {
+    let names = [
+        "strip2+sta+offset",
+        "band2+halves+boustro",
+        "gilbert+merge+affinity",
+        "zig-zag+halves+infinity",
+        "scanline+lrta+quads",
+    ];
+    names.into_iter().map(|name| Order::find(name).unwrap())
 }
 
 /// Mode, and model of the texture unit.
@@ -78,8 +91,9 @@ fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounter
     );
     let mut seen = HashSet::new();
     let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
-    let order = config.order.build(config.seed);
-    for item in order::plan(&*order, &trace.tables.passes).iter().flatten() {
+    let known = Known::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &known, &trace.tables.passes);
+    for item in phases.iter().flatten() {
         let WorkItem::Tile(at) = item else {
             panic!("single-view orders only")
         };
@@ -380,10 +394,11 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let memory = LineMemory::new(1 << 30);
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
-    let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
+    let known = Known::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &known, &trace.tables.passes);
     let mut cores = Cores::new(&frame, config.cores as usize);
     machine
-        .run(&mut cores, &phases, config.assign, None)
+        .run(&mut cores, &phases, config.dispatch(), None)
         .unwrap();
     let outcome = machine.outcome(config);
     let (tmu, cycles) = (outcome.tmu, outcome.cycles);
@@ -471,10 +486,11 @@ fn sent(trace: &MemoryTrace, config: &RunConfig) -> Vec<Sent> {
     );
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
-    let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
+    let known = Known::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &known, &trace.tables.passes);
     let mut recorder = Recorder::default();
     let mut cores = Cores::new(&frame, config.cores as usize);
-    interleave(&mut cores, &phases, config.assign, &mut recorder).unwrap();
+    interleave(&mut cores, &phases, config.dispatch(), &mut recorder).unwrap();
     recorder.sent
 }
 
@@ -560,18 +576,6 @@ mod plain_timed;
 mod prefetch_fifo;
 mod timeline;
 
-/// The same frame `frames` times.
-fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
-    let mut long = trace.clone();
-    for frame in 1..frames {
-        long.tiles.extend_from_slice(&trace.tiles);
-        let passes = trace.tables.passes.iter().cloned();
-        let passes = passes.map(|pass| formats::textrace::Pass { frame, ..pass });
-        long.tables.passes.extend(passes);
-    }
-    long
-}
-
 #[test]
 fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
     let (one, three) = (small(), repeated(&small(), 3));
@@ -613,6 +617,156 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             }
         }
     }
+}
+
+/// Part of the L2 is lost between frames, compared with plain lists: in a shared pass, alone, and with caches of other types.
+#[test]
+fn other_work_between_frames_takes_its_share_of_the_l2() {
+    let (one, three) = (small(), repeated(&small(), 3));
+    let mut of_size = Vec::new();
+    for (percent, l2_bytes, ways) in [
+        (1, 8, 4),
+        (30, 2, 4),
+        (50, 8, 2),
+        (75, 8, 4),
+        (100, 16, 4),
+        (50, 16, 8),
+    ] {
+        let mut config = RunConfig {
+            between_frames: BetweenFrames::Lose(percent),
+            ..functional(Order::Z2_STA)
+        };
+        config.level.l2.size_bytes = l2_bytes << 10;
+        config.level.l2.ways = ways;
+        let sent = sent(&one, &config);
+        let mut l2 = one_pass::Twin::new(&config.level.l2);
+        let mut misses = 0;
+        for frame in 0..3_u32 {
+            let mut l1 = [0, 1].map(|_| one_pass::Twin::new(&config.level.l1));
+            for (core, _, lines) in &sent {
+                let missing = lines.iter().filter(|line| !l1[*core].access(**line));
+                misses += missing.filter(|line| !l2.access(**line)).count() as u64;
+            }
+            let other = (l2_bytes << 10) / 16 * u64::from(percent) / 100;
+            (0..other as u32).for_each(|line| {
+                l2.access(0xf000_0000 + (frame << 20) + line);
+            });
+        }
+        of_size.push((config, misses));
+    }
+    let configs: Vec<RunConfig> = of_size.iter().map(|(config, _)| *config).collect();
+    let results = all(&three, &configs, 1 << 30);
+    for ((config, misses), result) in of_size.iter().zip(&results) {
+        assert_eq!(result.l2.counters.line_misses, *misses, "{config:?}");
+        assert_eq!(*result, replay(&three, config).unwrap());
+    }
+    // Losing all of the L2 equals a flush. Without time, losing less costs less.
+    let fifo = (Mode::Timed, TmuModel::PrefetchFifo);
+    for time in [AT_ONCE, LOOPING, FIRST_MISS, fifo] {
+        let misses = |between_frames, replacement| {
+            let mut config = RunConfig {
+                between_frames,
+                ..in_time(time, functional(Order::Z2_STA))
+            };
+            config.level.l2.replacement = replacement;
+            replay(&three, &config).unwrap().l2.counters.line_misses
+        };
+        for replacement in [Replacement::LRU, Replacement::FIFO] {
+            let shares = [
+                BetweenFrames::Keep,
+                BetweenFrames::Lose(25),
+                BetweenFrames::Lose(75),
+                BetweenFrames::Lose(100),
+            ];
+            let found = shares.map(|share| misses(share, replacement));
+            let is_sorted = time != AT_ONCE || found.is_sorted();
+            assert!(is_sorted, "{replacement:?}: {found:?}");
+            let is_less = time == FIRST_MISS || found[0] < found[3];
+            assert!(is_less, "{time:?} {replacement:?}: {found:?}");
+            assert_eq!(
+                found[3],
+                misses(BetweenFrames::Flush, replacement),
+                "{time:?}"
+            );
+        }
+    }
+}
+
+/// A machine with DRAM is simulated line by line, others in a shared pass. Misses are the same.
+#[test]
+fn an_l2_per_core_misses_as_often_with_and_without_dram() {
+    let trace = small();
+    let misses = |shared, dram| {
+        let mut config = functional(Order::Z2_LRTA);
+        config.level.l2.shared = shared;
+        config.level.l2.size_bytes = 4 << 10;
+        config.dram = dram;
+        replay(&trace, &config).unwrap().l2.counters.line_misses
+    };
+    let dram = Some(crate::memory::dram::DramConfig::default());
+    let [of_all, of_each] = [true, false].map(|shared| misses(shared, None));
+    assert_eq!([of_all, of_each], [misses(true, dram), misses(false, dram)]);
+    assert_ne!(of_all, of_each);
+}
+
+/// Other work takes its share of each lower level too, whatever the inclusion, the sharing and the time.
+#[test]
+fn other_work_between_frames_takes_its_share_of_lower_levels() {
+    let three = repeated(&small(), 3);
+    for time in [AT_ONCE, LOOPING] {
+        for (inclusion, shared) in [
+            (Inclusion::None, true),
+            (Inclusion::None, false),
+            (Inclusion::Inclusive, true),
+            (Inclusion::Exclusive, true),
+        ] {
+            let misses = |between_frames| {
+                let mut config = RunConfig {
+                    between_frames,
+                    ..in_time(time, functional(Order::Z2_STA))
+                };
+                let l3 = LevelConfig {
+                    inclusion,
+                    ways: 16,
+                    ..LevelConfig::lru(64 << 10)
+                };
+                config.level = config.level.over(&[l3]).unwrap();
+                config.level.l2.size_bytes = 4 << 10;
+                config.level.l2.shared = shared;
+                let result = replay(&three, &config).unwrap();
+                result.memory.lower_levels[0].line_misses
+            };
+            let found = [
+                BetweenFrames::Keep,
+                BetweenFrames::Lose(50),
+                BetweenFrames::Lose(100),
+            ]
+            .map(misses);
+            let place = format!("{time:?} {inclusion:?} {shared}: {found:?}");
+            assert!(found.is_sorted() && found[0] < found[2], "{place}");
+            assert_eq!(found[2], misses(BetweenFrames::Flush), "{place}");
+        }
+    }
+}
+
+#[test]
+fn a_part_is_not_lost_of_levels_with_more_lines_than_other_work_has() {
+    let mut config = functional(Order::MORTON);
+    config.between_frames = BetweenFrames::Lose(50);
+    config.validate().unwrap();
+    let l3 = LevelConfig {
+        ways: 16,
+        line_bytes: Some(64),
+        ..LevelConfig::lru(512 << 20)
+    };
+    config.level = config.level.over(&[l3]).unwrap();
+    let error = config.validate().unwrap_err().to_string();
+    assert!(
+        error.starts_with("between_frames: expected keep or flush"),
+        "{error}"
+    );
+    config.between_frames = BetweenFrames::Flush;
+    config.validate().unwrap();
 }
 
 /// Each material of the trace has its own textures, so counts by draw are sums of counts by texture.

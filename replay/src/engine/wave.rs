@@ -3,11 +3,14 @@
 use super::batch::{Job, Pass};
 use super::scheduler::Stage;
 use super::summary::summary;
-use super::{Machine, ReplayError};
+use super::{Machine, ReplayError, check_other_work};
 use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
-use crate::order::{self, Phase};
+use crate::memory::OtherWork;
+use crate::order::parts::Eyes;
+use crate::order::{self, Counters, Interleave, Known, Phase};
 use crate::result::RunResult;
 use crate::stream::{Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, rendered};
+use formats::textrace::TraceMeta;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -26,11 +29,17 @@ impl<'a> Wave<'a> {
         let rendered = rendered(self.job.trace, passes[0].config())?;
         let trace_passes = &rendered.tables().passes;
         let expander = expander_for(Expander::new(&rendered, passes[0].config())?, &passes);
+        let lost = |pass: &Pass<'_>| pass.config().between_frames.lost_percent();
+        if passes.iter().filter_map(lost).next().is_some() {
+            check_other_work(expander.lines())?;
+        }
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
         frames.sort_unstable();
         frames.dedup();
         let orders = Orders::of(&passes);
+        let meta = &rendered.tables().meta;
+        let mut counters = None;
         let mut ahead = None;
         for (index, &number) in frames.iter().enumerate() {
             let frame = match ahead.take() {
@@ -38,7 +47,16 @@ impl<'a> Wave<'a> {
                 None => expander.frame(number, self.memory, &mut counts)?,
             };
             (self.report_stage)(Stage::Loaded);
-            let plans = orders.plans(trace_passes, number);
+            let counted = match orders.need_counters() {
+                true => {
+                    let known = Known::new(passes[0].config(), meta);
+                    Some(frame.counters(trace_passes, number, &known)?)
+                }
+                false => None,
+            };
+            let last = counters.take().or_else(|| counted.clone());
+            let plans = orders.plans(trace_passes, number, meta, last.as_ref());
+            counters = counted;
             let waiting = AtomicUsize::new(passes.len());
             let is_last = index + 1 == frames.len();
             let replay = |pass: &mut Pass<'a>, frame: &Frame<'_>| {
@@ -48,8 +66,12 @@ impl<'a> Wave<'a> {
                 let config = *pass.config();
                 let mut machine = match pass.machine.take() {
                     Some(mut machine) => {
-                        if config.between_frames == BetweenFrames::Flush {
-                            machine.flush();
+                        match config.between_frames {
+                            BetweenFrames::Keep => {}
+                            BetweenFrames::Flush => machine.flush(),
+                            BetweenFrames::Lose(percent) => {
+                                machine.lose(OtherWork::after(index, percent, &config));
+                            }
                         }
                         machine
                     }
@@ -64,7 +86,7 @@ impl<'a> Wave<'a> {
                     machine.client_accesses(clients);
                 }
                 let phases = orders.plan(&plans, &config);
-                machine.run(&mut cores, phases, config.assign, pass.clients.as_mut())?;
+                machine.run(&mut cores, phases, config.dispatch(), pass.clients.as_mut())?;
                 if let Some(clients) = &mut pass.clients {
                     clients.end_frame();
                     machine.client_accesses(clients);
@@ -147,6 +169,9 @@ impl<'a> Wave<'a> {
 
 /// Configures the expander to list what the groups read.
 fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a> {
+    let in_halves =
+        |pass: &Pass<'_>| pass.config().order.parts().eyes == Eyes::OneCore(Interleave::Halves);
+    let expander = expander.in_halves(passes.iter().any(in_halves));
     let at_once = |pass: &Pass<'_>| pass.config().misses_change_caches_at_once();
     match passes[0].config().tmu_model() {
         None => match passes.iter().map(Pass::least_sets).min() {
@@ -160,32 +185,53 @@ fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a>
     }
 }
 
-/// The distinct orders of some groups.
-struct Orders(Vec<(Order, u64)>);
+/// The distinct orders of some groups, each with the configuration of the first group that has it.
+struct Orders(Vec<RunConfig>);
 
 impl Orders {
+    /// The settings that a plan depends on.
+    fn key(config: &RunConfig) -> (Order, u64, u32) {
+        let order = config.order.resolved(config.level.l2.size_bytes);
+        (order, config.seed, config.cores)
+    }
+
     fn of(passes: &[Pass<'_>]) -> Self {
-        let mut orders = Vec::new();
+        let mut orders: Vec<RunConfig> = Vec::new();
         for pass in passes {
-            let order = (pass.config().order, pass.config().seed);
-            if !orders.contains(&order) {
-                orders.push(order);
+            let key = Self::key(pass.config());
+            if !orders.iter().any(|other| Self::key(other) == key) {
+                orders.push(*pass.config());
             }
         }
         Self(orders)
     }
 
+    fn need_counters(&self) -> bool {
+        let mut orders = self.0.iter();
+        orders.any(|config| config.order.parts().needs_counters())
+    }
+
     /// The plan of each order for a frame.
-    fn plans(&self, trace_passes: &[formats::textrace::Pass], frame: u32) -> Vec<Vec<Phase>> {
-        let plan = |&(order, seed): &(Order, u64)| {
-            order::plan_frame(&*order.build(seed), trace_passes, frame)
+    fn plans(
+        &self,
+        trace_passes: &[formats::textrace::Pass],
+        frame: u32,
+        meta: &TraceMeta,
+        last: Option<&Counters>,
+    ) -> Vec<Vec<Phase>> {
+        let plan = |config: &RunConfig| {
+            let known = Known {
+                last,
+                ..Known::new(config, meta)
+            };
+            order::plan_frame(config.order, &known, trace_passes, frame)
         };
         self.0.par_iter().map(plan).collect()
     }
 
     fn plan<'p>(&self, plans: &'p [Vec<Phase>], config: &RunConfig) -> &'p [Phase] {
-        let order = (config.order, config.seed);
-        let index = self.0.iter().position(|other| *other == order);
+        let key = Self::key(config);
+        let index = self.0.iter().position(|other| Self::key(other) == key);
         index.map_or(&[], |index| &plans[index])
     }
 }

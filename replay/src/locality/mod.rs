@@ -9,6 +9,7 @@ mod distances;
 mod figures;
 mod last_use;
 mod opt;
+mod optimal;
 mod orders;
 mod place;
 mod plain;
@@ -21,6 +22,7 @@ mod working_set;
 
 pub use distances::{DistanceBin, Distances};
 pub use figures::Figures;
+pub use optimal::{OptMisses, opt_misses};
 pub use orders::{OrderFigures, Sequence, Stream, analyse};
 pub use place::{ByOrigin, Origin, Place};
 pub use plain::analyse_addresses;

@@ -3,9 +3,9 @@
 use super::figures::Figures;
 use super::place::Place;
 use super::profile::{Profile, StreamCache, check_size};
-use crate::config::{BetweenFrames, ConfigError, LevelConfig, Order, RunConfig};
+use crate::config::{ConfigError, LevelConfig, Order, RunConfig};
 use crate::engine::ReplayError;
-use crate::order::{self, Phase};
+use crate::order::{self, Counters, Known, Phase};
 use crate::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, TraceCounts,
     interleave, rendered,
@@ -108,6 +108,7 @@ pub fn analyse(
         0 | 1 => orders.len(),
         _ => rayon::current_num_threads(),
     };
+    let empties = config.between_frames.empties()?;
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
     let rendered = rendered(trace, config)?;
     let passes = &rendered.tables().passes;
@@ -133,25 +134,44 @@ pub fn analyse(
             .collect();
         let mut analyses = analyses?;
         let mut finished: Vec<Option<OrderFigures>> = orders.iter().map(|_| None).collect();
+        let need_counters = orders.iter().any(|order| order.parts().needs_counters());
+        let mut last_counters: Option<Counters> = None;
         for &number in &frames {
             let frame = expander.frame(number, &memory, &mut counts)?;
             let last = frames.last() == Some(&number);
+            let counted = match need_counters {
+                true => {
+                    let known = Known::new(config, &trace.tables().meta);
+                    Some(frame.counters(passes, number, &known)?)
+                }
+                false => None,
+            };
+            let counters = last_counters.take().or_else(|| counted.clone());
             let run = |((&order, kept), finished): (
                 (&Order, &mut Option<Analysis>),
                 &mut Option<OrderFigures>,
             )| {
-                let phases = order::plan_frame(&*order.build(config.seed), passes, number);
+                let known = Known {
+                    last: counters.as_ref(),
+                    ..Known::new(config, &trace.tables().meta)
+                };
+                let phases = order::plan_frame(order, &known, passes, number);
                 let mut analysis = match kept.take() {
                     Some(analysis) => analysis,
                     None => Analysis::new(config, merged)?,
                 };
                 let places = Places::new(passes, number, &phases, expander.bins().first_tiles());
-                if config.between_frames == BetweenFrames::Flush {
+                if empties {
                     analysis.flush()?;
                 }
                 analysis.begin_frame(places);
                 let mut cores = Cores::new(&frame, config.cores as usize);
-                interleave(&mut cores, &phases, config.assign, &mut analysis)?;
+                interleave(
+                    &mut cores,
+                    &phases,
+                    order.dispatch(config.assign),
+                    &mut analysis,
+                )?;
                 if last {
                     *finished = Some(analysis.finish(order));
                 } else {
@@ -162,6 +182,7 @@ pub fn analyse(
             };
             let orders = orders.par_iter().zip(&mut analyses).zip(&mut finished);
             orders.with_max_len(1).try_for_each(run)?;
+            last_counters = counted;
         }
         let empty = orders.iter().zip(analyses);
         for ((order, analysis), finished) in empty.zip(finished) {

@@ -24,7 +24,7 @@ mod watched;
 pub use access::{Access, Client};
 pub use cache::{AnyCache, Cache};
 pub use fast::Forest;
-pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, SecondLevel};
+pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, OtherWork, SecondLevel};
 pub use in_flight::{AllocateOnMiss, Delay, DelayedFill, NOT_IN_FLIGHT};
 pub use policy::{AnyWays, FourWayLru, Lru, Replacement, WaysOf};
 pub use prefetch::Prefetching;

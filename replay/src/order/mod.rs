@@ -1,49 +1,50 @@
-//! Tile orders, one a file: pure functions from the tile grids to a sequence of work.
+//! Tile orders: pure functions from the tile grids to a sequence of work.
 //!
-//! An order is a curve over one grid of tiles and a rule that says how the two views of a stereo
-//! pair are combined along it. A new one is a file with a `TileOrder` (its `mod` line below) and a
-//! row of the table: configurations, flags, help and plots are derived from the row.
+//! An order consists of a curve over a grid of cells ([`curve`]), a rule that pairs the tiles of the two eyes
+//! ([`pairing`]), a way to combine the tiles of a pair, a direction, and an assignment of items to cores
+//! ([`assignment`]). A name lists the parts, as in `zig-zag+sta+offset+boustro`. The paper's orders have their
+//! own names. A new curve or pairing is a file and a row of its table: configurations, flags, help and plots
+//! are derived from the row.
 
-mod hilbert;
-mod morton;
+pub mod assignment;
+mod composed;
+pub mod cost;
+pub mod curve;
+mod directions;
+mod known;
+mod listed;
+pub mod pairing;
+pub mod parts;
 mod plan;
-mod random;
-mod scanline;
 mod work;
-mod z2_lrta;
-mod z2_sta;
-mod z2_sta_merge;
-mod zig_zag;
 
-pub use plan::{Phase, plan, plan_frame};
+pub use known::{Counters, Known, ViewCounters};
+pub use listed::Listed;
+pub use plan::{Phase, Views, plan, plan_frame, views};
 pub use work::{Interleave, TileRef, View, WorkItem};
 
+use crate::config::Assign;
 use crate::palette::{BLUE, GREEN, GREY, ORANGE, PURPLE, Rgb, SKY_BLUE, VERMILION, YELLOW};
 use crate::registry::{Named, registry};
-use hilbert::Hilbert;
-use morton::Morton;
-use random::Random;
-use scanline::Scanline;
-use z2_lrta::Z2Lrta;
-use z2_sta::Z2Sta;
-use z2_sta_merge::Z2StaMerge;
-use zig_zag::ZigZag;
+use cost::Cost;
+use curve::Curve;
+use parts::{Eyes, Parts};
 
-registry! { OrderRow:
-    // constant     name            title           colour      help                                                                    built from a seed
-    SCANLINE =     row("scanline",     "Scanline",     VERMILION, "Rows from left to right",                                      |_| Box::new(Scanline));
-    ZIG_ZAG =      row("zig-zag",      "Zig-zag",      PURPLE,    "Rows, every other one from right to left",                     |_| Box::new(ZigZag));
-    MORTON =       row("morton",       "Morton",       ORANGE,    "Z-order curve: the paper's baseline",                          |_| Box::new(Morton));
-    HILBERT =      row("hilbert",      "Hilbert",      YELLOW,    "Hilbert curve",                                                |_| Box::new(Hilbert));
-    Z2_LRTA =      row("z2-lrta",      "Z2 LRTA",      SKY_BLUE,  "Morton, left and right tile in turn",                          |_| Box::new(Z2Lrta));
-    Z2_STA =       row("z2-sta",       "Z2 STA",       BLUE,      "Morton, both tiles on one core, their triangles in turn",      |_| Box::new(Z2Sta));
-    Z2_STA_MERGE = row("z2-sta-merge", "Z2 STA-merge", GREEN,     "As z2-sta, the triangle lists merged by primitive number",     |_| Box::new(Z2StaMerge));
-    RANDOM =       row("random",       "Random",       GREY,      "Shuffled tiles: the control",                                  |seed| Box::new(Random { seed }));
+registry! { OrderRow, other = composed_by_name:
+    // constant     name            title           colour      help                                                            parts
+    SCANLINE =     row("scanline",     "Scanline",     VERMILION, "Rows from left to right",                                  Parts::of(Curve::SCANLINE));
+    ZIG_ZAG =      row("zig-zag",      "Zig-zag",      PURPLE,    "Rows, every other one from right to left",                 Parts::of(Curve::ZIG_ZAG));
+    MORTON =       row("morton",       "Morton",       ORANGE,    "Z-order curve: the paper's baseline",                      Parts::of(Curve::MORTON));
+    HILBERT =      row("hilbert",      "Hilbert",      YELLOW,    "Hilbert curve",                                            Parts::of(Curve::HILBERT));
+    Z2_LRTA =      row("z2-lrta",      "Z2 LRTA",      SKY_BLUE,  "Morton, left and right tile in turn",                      Parts::of(Curve::MORTON).with(Eyes::InTurn));
+    Z2_STA =       row("z2-sta",       "Z2 STA",       BLUE,      "Morton, both tiles on one core, their triangles in turn",  Parts::of(Curve::MORTON).with(Eyes::OneCore(Interleave::Alternate)));
+    Z2_STA_MERGE = row("z2-sta-merge", "Z2 STA-merge", GREEN,     "As z2-sta, the triangle lists merged by primitive number", Parts::of(Curve::MORTON).with(Eyes::OneCore(Interleave::Merge)));
+    RANDOM =       row("random",       "Random",       GREY,      "Shuffled tiles: the control",                              Parts::of(Curve::RANDOM));
     #[cfg(test)]
-    COLUMNS =      row("test-columns", "Columns",      GREY,      "Columns from the top",                                         |_| Box::new(tests::columns::Columns));
+    COLUMNS =      row("test-columns", "Columns",      GREY,      "Columns from the top",                                     Parts::of(Curve::COLUMNS));
 }
 
-/// A tile order by name.
+/// A tile order: a row of the table, or a combination of parts.
 pub type Order = Named<OrderRow>;
 
 /// A row of the table of tile orders.
@@ -54,7 +55,9 @@ pub struct OrderRow {
     title: &'static str,
     color: Rgb,
     help: &'static str,
-    build: fn(u64) -> Box<dyn TileOrder>,
+    parts: Parts,
+    /// The items of pairs of views, if they do not follow from the parts.
+    listed: Option<&'static Listed>,
 }
 
 const fn row(
@@ -62,14 +65,23 @@ const fn row(
     title: &'static str,
     color: Rgb,
     help: &'static str,
-    build: fn(u64) -> Box<dyn TileOrder>,
+    parts: Parts,
 ) -> OrderRow {
     OrderRow {
         name,
         title,
         color,
         help,
-        build,
+        parts,
+        listed: None,
+    }
+}
+
+/// The order whose parts the name lists.
+fn composed_by_name(name: &str) -> Result<Order, Option<String>> {
+    match Parts::parse(name) {
+        Ok(parts) => Ok(composed::order(parts)),
+        Err(why) => Err(Some(why).filter(|_| Parts::is_composed(name))),
     }
 }
 
@@ -86,60 +98,48 @@ impl Order {
         self.row().color
     }
 
-    /// The order itself; only random ones need the seed.
+    /// The parts of the order.
     #[must_use]
-    pub fn build(self, seed: u64) -> Box<dyn TileOrder> {
-        (self.row().build)(seed)
-    }
-}
-
-/// How the tiles of a stereo pair follow each other along the curve.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pairing {
-    /// The whole left view, then the whole right view.
-    ViewByView,
-    /// The left tile, then the right tile at the same place.
-    InTurn,
-    /// Both tiles at a place as one item for one core.
-    OneCore(Interleave),
-}
-
-/// A tile order.
-pub trait TileOrder {
-    /// Columns and rows of one view's tiles in the order of traversal: each exactly once.
-    fn curve(&self, tiles: [u32; 2]) -> Vec<[u32; 2]>;
-
-    /// How the two views are combined.
-    fn pairing(&self) -> Pairing {
-        Pairing::ViewByView
+    pub fn parts(self) -> Parts {
+        self.row().parts
     }
 
-    /// Work of one view alone.
-    fn mono(&self, view: View) -> Vec<WorkItem> {
-        self.curve(view.tiles)
-            .into_iter()
-            .filter_map(|at| view.tile(at).map(WorkItem::Tile))
-            .collect()
+    /// The order with these parts.
+    #[must_use]
+    pub fn of(parts: Parts) -> Self {
+        composed::order(parts)
     }
 
-    /// Work of a stereo pair. Grids of different sizes are both followed along the curve of the
-    /// smallest grid that covers them; a tile without a partner is an item of its own.
-    fn stereo(&self, left: View, right: View) -> Vec<WorkItem> {
-        let pairing = self.pairing();
-        if pairing == Pairing::ViewByView {
-            return [self.mono(left), self.mono(right)].concat();
+    /// The order for an L2 of this size: adds the default number of its curve, if the name has no number.
+    #[must_use]
+    pub fn resolved(self, l2_bytes: u64) -> Self {
+        match self.parts().resolved(l2_bytes) {
+            parts if parts == self.parts() => self,
+            parts => composed::order(parts),
         }
-        let covering = [0, 1].map(|axis| left.tiles[axis].max(right.tiles[axis]));
-        let mut items = Vec::new();
-        for at in self.curve(covering) {
-            match (left.tile(at), right.tile(at), pairing) {
-                (Some(l), Some(r), Pairing::OneCore(interleave)) => {
-                    items.push(WorkItem::Pair(l, r, interleave));
-                }
-                (l, r, _) => items.extend([l, r].into_iter().flatten().map(WorkItem::Tile)),
-            }
+    }
+
+    /// How items are assigned to cores: by the order if it contains an assignment, otherwise as configured.
+    #[must_use]
+    pub fn dispatch(self, configured: Assign) -> Assign {
+        let own = self.parts().assignment;
+        own.map_or(configured, assignment::Assignment::dispatch)
+    }
+
+    /// The work for the pictures of two eyes, passes 0 and 1, which consist of whole tiles.
+    #[must_use]
+    pub fn stereo(self, tiles: [u32; 2], known: &Known<'_>) -> Vec<WorkItem> {
+        let [left, right] = [0, 1].map(|pass| View::grid(pass, tiles));
+        self.parts().stereo(left, right, known)
+    }
+
+    /// The hardware cost for views of `tiles`.
+    #[must_use]
+    pub fn cost(self, tiles: [u32; 2], cores: u32) -> Cost {
+        match self.row().listed {
+            Some(listed) => listed.cost(),
+            None => self.parts().cost(tiles, cores),
         }
-        items
     }
 }
 

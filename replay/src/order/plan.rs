@@ -3,7 +3,8 @@
 //! and a right pass that show the same as the order combines them, each other one alone. Every order
 //! visits every tile of every pass exactly once.
 
-use super::{TileOrder, View, WorkItem};
+use super::parts::Direction;
+use super::{Known, Order, View, WorkItem};
 use formats::textrace::{Pass, PassKind};
 use formats::view::Eye;
 
@@ -11,34 +12,64 @@ use formats::view::Eye;
 /// map, a frame the one before).
 pub type Phase = Vec<WorkItem>;
 
-/// All work of a trace: frame after frame, monoscopic passes before the stereo pair.
+/// All work of a trace: frame after frame, monoscopic passes before the stereo pair. All frames use the
+/// counters in `known`.
 #[must_use]
-pub fn plan(order: &dyn TileOrder, passes: &[Pass]) -> Vec<Phase> {
+pub fn plan(order: Order, known: &Known<'_>, passes: &[Pass]) -> Vec<Phase> {
     let mut frames: Vec<u32> = passes.iter().map(|p| p.frame).collect();
     frames.sort_unstable();
     frames.dedup();
-    let plan = |frame| plan_frame(order, passes, frame);
+    let plan = |frame| plan_frame(order, known, passes, frame);
     frames.into_iter().flat_map(plan).collect()
 }
 
 /// The work of one frame.
 #[must_use]
-pub fn plan_frame(order: &dyn TileOrder, passes: &[Pass], frame: u32) -> Vec<Phase> {
-    let view = |(index, pass): (usize, &Pass)| View {
-        pass: index as u32,
-        tiles: pass.tiles,
+pub fn plan_frame(order: Order, known: &Known<'_>, passes: &[Pass], frame: u32) -> Vec<Phase> {
+    let parts = order.parts();
+    let mut phases: Vec<Phase> = (views(passes, frame).into_iter())
+        .map(|phase| match phase {
+            Views::One(view) => parts.mono(view, known),
+            Views::Pair(left, right) => match order.listed_items(left) {
+                Some(items) => items.to_vec(),
+                None => parts.stereo(left, right, known),
+            },
+        })
+        .collect();
+    if parts.direction == Direction::Boustro && !frame.is_multiple_of(2) {
+        phases.iter_mut().for_each(|phase| phase.reverse());
+    }
+    let Some(assignment) = parts.assignment else {
+        return phases;
     };
+    let columns = |pass: u32| passes.get(pass as usize).map_or(1, |pass| pass.tiles[0]);
+    let deal = |phase| assignment.deal(phase, known.cores, &columns);
+    phases.into_iter().map(deal).collect()
+}
+
+/// The views of a phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Views {
+    /// One view alone.
+    One(View),
+    /// A left and a right view that show the same.
+    Pair(View, View),
+}
+
+/// The views of a frame, phase by phase.
+#[must_use]
+pub fn views(passes: &[Pass], frame: u32) -> Vec<Views> {
     let of_frame = passes.iter().enumerate().filter(|(_, p)| p.frame == frame);
+    let first = of_frame.clone().next().map_or(0, |(index, _)| index);
+    let view = |(index, pass): (usize, &Pass)| View::of(index as u32, (index - first) as u32, pass);
     let (seen, before): (Vec<_>, Vec<_>) =
         of_frame.partition(|(_, p)| p.kind == PassKind::Layer || (p.is_seen() && p.eye.is_some()));
-    let mut phases: Vec<Phase> = (before.into_iter())
-        .map(|pass| order.mono(view(pass)))
-        .collect();
+    let mut phases: Vec<Views> = before.into_iter().map(view).map(Views::One).collect();
     let mut open = seen;
     while !open.is_empty() {
         let pass = open.remove(0);
         let Some(partner) = open.iter().position(|other| pair(pass.1, other.1)) else {
-            phases.push(order.mono(view(pass)));
+            phases.push(Views::One(view(pass)));
             continue;
         };
         let other = open.remove(partner);
@@ -46,7 +77,7 @@ pub fn plan_frame(order: &dyn TileOrder, passes: &[Pass], frame: u32) -> Vec<Pha
             Some(Eye::Left) => (pass, other),
             _ => (other, pass),
         };
-        phases.push(order.stereo(view(left), view(right)));
+        phases.push(Views::Pair(view(left), view(right)));
     }
     phases
 }

@@ -1,5 +1,8 @@
 //! Units of work: tiles, pairs of tiles, and the views that they belong to.
 
+use formats::textrace::{Pass, PassKind};
+use formats::view::TILE_SIZE_PX;
+
 /// A tile of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TileRef {
@@ -16,9 +19,12 @@ pub enum Interleave {
     Alternate,
     /// By primitive number, left first, so that the same triangle is adjacent.
     Merge,
+    /// The upper halves of both tiles in turn, then the lower halves. The fragments in progress fit into one
+    /// tile buffer.
+    Halves,
 }
 
-/// What a core is given at a time.
+/// The unit of work of a core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkItem {
     /// One tile.
@@ -28,7 +34,7 @@ pub enum WorkItem {
 }
 
 impl WorkItem {
-    /// The tiles of the item, the first one first.
+    /// The tiles of the item, in rendering order.
     pub fn tiles(&self) -> impl Iterator<Item = TileRef> {
         let (first, second) = match *self {
             Self::Tile(tile) => (tile, None),
@@ -45,9 +51,39 @@ pub struct View {
     pub pass: u32,
     /// Tile columns and rows.
     pub tiles: [u32; 2],
+    /// Width and height in pixels.
+    pub size_px: [u32; 2],
+    /// Kind of the pass.
+    pub kind: PassKind,
+    /// Index among the frame's passes.
+    pub number: u32,
 }
 
 impl View {
+    /// The view of a pass, given its index in its frame.
+    #[must_use]
+    pub const fn of(index: u32, number: u32, pass: &Pass) -> Self {
+        Self {
+            pass: index,
+            tiles: pass.tiles,
+            size_px: pass.size_px,
+            kind: pass.kind,
+            number,
+        }
+    }
+
+    /// An eye's picture that consists of whole tiles.
+    #[must_use]
+    pub const fn grid(pass: u32, tiles: [u32; 2]) -> Self {
+        Self {
+            pass,
+            tiles,
+            size_px: [tiles[0] * TILE_SIZE_PX, tiles[1] * TILE_SIZE_PX],
+            kind: PassKind::Main,
+            number: pass,
+        }
+    }
+
     /// The tile at a column and row, if the grid has it.
     #[must_use]
     pub fn tile(&self, [x, y]: [u32; 2]) -> Option<TileRef> {

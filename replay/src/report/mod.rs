@@ -11,6 +11,7 @@ pub mod figures;
 pub mod html;
 pub mod locality;
 mod memory_columns;
+pub mod orders;
 pub mod parquet;
 pub mod picture;
 pub mod plots;

@@ -1,7 +1,7 @@
 //! The work of each core: the quads of its work item, in order.
 
 use super::expand::Work;
-use super::lines::interleaved;
+use super::lines::{Listed, interleaved};
 use super::{Frame, QuadLines, StreamError, TileLines};
 use crate::order::{TileRef, WorkItem};
 use std::collections::HashSet;
@@ -19,7 +19,7 @@ pub struct Cores<'f> {
 #[derive(Debug, Default)]
 struct Core<'f> {
     tiles: [Slot<'f>; 2],
-    runs: Vec<(u8, u32)>,
+    runs: Vec<Listed>,
     next_run: usize,
     /// Remaining quads of the current run, and the slot of their tile.
     slot: usize,
@@ -82,11 +82,9 @@ impl<'f> Cores<'f> {
         let [left, right] = core.tiles.each_ref().map(Slot::lines);
         match (*item, left, right) {
             (WorkItem::Pair(_, _, interleave), Some(left), Some(right)) => {
-                let primitives = |tile: &'_ TileLines| -> Vec<u32> {
-                    tile.runs.iter().map(|run| run.primitive).collect()
-                };
-                let [mut left, mut right] = [left, right].map(|t| primitives(t).into_iter());
-                interleaved(interleave, [&mut left, &mut right], &mut core.runs);
+                let lists = [&mut left.list(), &mut right.list()];
+                let lists = lists.map(|list| list as &mut dyn Iterator<Item = _>);
+                interleaved(interleave, lists, &mut core.runs);
             }
             (_, left, _) => core.quads = 0..left.map_or(0, TileLines::quad_count),
         }
@@ -130,10 +128,10 @@ impl<'f> Cores<'f> {
             if let Some(quad) = core.quads.next() {
                 return core.tiles[core.slot].lines().map(|tile| tile.quad(quad));
             }
-            let &(slot, run) = core.runs.get(core.next_run)?;
+            let &Listed { tile, run, part } = core.runs.get(core.next_run)?;
             core.next_run += 1;
-            core.slot = usize::from(slot);
-            core.quads = core.tiles[core.slot].lines()?.run(run as usize);
+            core.slot = usize::from(tile);
+            core.quads = core.tiles[core.slot].lines()?.run(run as usize, part);
         }
     }
 }

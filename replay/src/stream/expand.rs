@@ -72,6 +72,8 @@ pub struct Expander<'a> {
     all: bool,
     /// Number of sets for which idle accesses are left out (see [`LastUsed`]).
     idle_sets: Option<u32>,
+    /// Halves of a tile may be apart in time.
+    halves: bool,
 }
 
 /// Buffers for expanding a tile, reused from tile to tile, and the counts.
@@ -105,6 +107,7 @@ impl<'a> Expander<'a> {
             distinct: false,
             all: true,
             idle_sets: None,
+            halves: false,
         })
     }
 
@@ -131,6 +134,12 @@ impl<'a> Expander<'a> {
             idle_sets: Some(sets),
             ..self
         }
+    }
+
+    /// Keeps accesses to the lower half of a tile even if the upper half accesses the same lines, because other tiles may come in between.
+    #[must_use]
+    pub fn in_halves(self, halves: bool) -> Self {
+        Self { halves, ..self }
     }
 
     /// The bins for counts.
@@ -232,11 +241,19 @@ impl<'a> Expander<'a> {
         lines.begin(self.bins.place(at));
         let first_cell = self.bins.first_cell(at);
         let mut sums = TileSums::default();
+        let half_rows = feed::half_rows(self.source);
         for run in &tile.runs {
+            let mut middle = None;
             if let Some(idle) = idle {
                 idle.begin();
             }
             for records in feed::quads(tile, run) {
+                if middle.is_none() && records.iter().any(|of| feed::is_lower(of, half_rows)) {
+                    middle = Some(lines.quads.len() as u32);
+                    if let Some(idle) = idle.as_mut().filter(|_| self.halves) {
+                        idle.begin();
+                    }
+                }
                 let lanes = feed::lanes(records);
                 counts.quads += 1;
                 counts.lanes += u64::from(lanes);
@@ -281,9 +298,11 @@ impl<'a> Expander<'a> {
                     footprints,
                 });
             }
+            let end = lines.quads.len() as u32;
             lines.runs.push(QuadRun {
                 primitive: run.primitive,
-                end: lines.quads.len() as u32,
+                middle: middle.unwrap_or(end),
+                end,
             });
             sums.checked(at)?;
         }

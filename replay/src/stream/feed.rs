@@ -1,6 +1,6 @@
 //! Iterates over the quads of work items with their records.
 
-use super::lines::interleaved;
+use super::lines::{ListEntry, Listed, Part, interleaved};
 use super::{StreamError, TileSource};
 use crate::order::{TileRef, WorkItem};
 use formats::textrace::{PrimitiveRun, QuadRecord, Tile};
@@ -34,22 +34,43 @@ pub fn for_quads<E: From<StreamError>>(
         tiles.push((at, tile));
     }
     let mut runs = Vec::new();
+    let half = half_rows(source);
     match (*item, &*tiles) {
         (WorkItem::Pair(_, _, interleave), [(_, left), (_, right)]) => {
-            let mut primitives = [left, right].map(|t| t.runs.iter().map(|run| run.primitive));
-            let [left, right] = &mut primitives;
+            let mut lists = [left, right].map(|tile| {
+                tile.runs.iter().map(move |run| ListEntry {
+                    primitive: run.primitive,
+                    in_half: [false, true].map(|lower| {
+                        let mut records = records(tile, run).iter();
+                        records.any(|of| is_lower(of, half) == lower)
+                    }),
+                })
+            });
+            let [left, right] = &mut lists;
             interleaved(interleave, [left, right], &mut runs);
         }
         _ => runs.extend(
             (0..)
                 .zip(tiles.iter().flat_map(|(_, tile)| &tile.runs))
-                .map(|(run, _)| (0, run)),
+                .map(|(run, _)| Listed {
+                    tile: 0,
+                    run,
+                    part: Part::Whole,
+                }),
         ),
     }
-    for (slot, run) in runs {
-        let (at, tile) = &tiles[usize::from(slot)];
+    for Listed { tile, run, part } in runs {
+        let (at, tile) = &tiles[usize::from(tile)];
         let run = &tile.runs[run as usize];
-        for records in quads(tile, run) {
+        let is_in_part = |records: &&[QuadRecord]| {
+            let lower = records.first().is_some_and(|of| is_lower(of, half));
+            match part {
+                Part::Whole => true,
+                Part::Upper => !lower,
+                Part::Lower => lower,
+            }
+        };
+        for records in quads(tile, run).filter(is_in_part) {
             send(Quad {
                 at: *at,
                 draw: run.draw,
@@ -71,13 +92,27 @@ pub(super) fn read(
     check(tile, at, source.tables().draws.len())
 }
 
+fn records<'a>(tile: &'a Tile, run: &PrimitiveRun) -> &'a [QuadRecord] {
+    &tile.records[run.first as usize..][..run.count as usize]
+}
+
 /// The quads of a run: consecutive records at the same position.
 pub(super) fn quads<'a>(
     tile: &'a Tile,
     run: &PrimitiveRun,
 ) -> impl Iterator<Item = &'a [QuadRecord]> {
-    let records = &tile.records[run.first as usize..][..run.count as usize];
+    let records = records(tile, run);
     records.chunk_by(|a, b| (a.x, a.y) == (b.x, b.y))
+}
+
+/// Rows of quads in the upper half of a tile.
+pub(super) fn half_rows(source: &dyn TileSource) -> u32 {
+    source.tile_px() / 4
+}
+
+/// True for a quad of the tile's lower half.
+pub(super) fn is_lower(record: &QuadRecord, half_rows: u32) -> bool {
+    u32::from(record.y) >= half_rows
 }
 
 /// Covered lanes of a quad, whatever they sample.
@@ -173,5 +208,55 @@ mod tests {
         trace.tiles[0][0].runs[2].count = 7;
         let error = quads(&trace, WorkItem::Tile(LEFT)).unwrap_err();
         assert!(error.to_string().contains("records 3 + 7"), "{error}");
+    }
+
+    /// A tile whose primitives have quads in rows 0 to 7 as given.
+    fn halves(runs: &[(u32, &[u8])]) -> Tile {
+        let mut tile = Tile::default();
+        for &(primitive, rows) in runs {
+            tile.runs.push(PrimitiveRun {
+                primitive,
+                draw: 0,
+                first: tile.records.len() as u32,
+                count: rows.len() as u32,
+            });
+            tile.records.extend(rows.iter().map(|&y| record(0, y)));
+        }
+        tile
+    }
+
+    #[test]
+    fn halves_take_the_upper_quads_of_both_tiles_in_turn_then_the_lower_ones() {
+        let trace = MemoryTrace {
+            tables: tables(&[[64, 64]]),
+            tiles: vec![
+                vec![halves(&[(1, &[0, 3, 4]), (2, &[7]), (3, &[2])])],
+                vec![halves(&[(1, &[5]), (4, &[1, 6])])],
+            ],
+        };
+        let pair = WorkItem::Pair(LEFT, RIGHT, Interleave::Halves);
+        let mut sent = Vec::new();
+        for_quads(&trace, &pair, |quad| {
+            sent.push((quad.at.pass, quad.primitive, quad.records[0].y));
+            Ok::<_, StreamError>(())
+        })
+        .unwrap();
+        let upper = [(0, 1, 0), (0, 1, 3), (1, 4, 1), (0, 3, 2)];
+        let lower = [(0, 1, 4), (1, 1, 5), (0, 2, 7), (1, 4, 6)];
+        assert_eq!(sent, [upper, lower].concat());
+        // The lists of lines are taken in the same order.
+        let config = crate::config::RunConfig::default();
+        let expander = crate::stream::Expander::new(&trace, &config).unwrap();
+        let memory = crate::stream::LineMemory::new(1 << 20);
+        let mut counts = crate::stream::TraceCounts::new(expander.bins());
+        let frame = expander.frame(0, &memory, &mut counts).unwrap();
+        let mut cores = crate::stream::Cores::new(&frame, 1);
+        cores.load(0, &pair).unwrap();
+        let mut tiles = Vec::new();
+        while let Some(quad) = cores.next_quad(0) {
+            tiles.push(quad.tile() as u32);
+        }
+        let expected: Vec<u32> = sent.iter().map(|&(pass, ..)| pass).collect();
+        assert_eq!(tiles, expected);
     }
 }

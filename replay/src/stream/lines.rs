@@ -58,6 +58,8 @@ impl Tag {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct QuadRun {
     pub(super) primitive: u32,
+    /// The first quad of the tile's lower half.
+    pub(super) middle: u32,
     pub(super) end: u32,
 }
 
@@ -122,17 +124,37 @@ impl TileLines {
         ));
     }
 
+    /// Its primitive list.
+    pub(super) fn list(&self) -> impl Iterator<Item = ListEntry> {
+        let mut first = 0;
+        self.runs.iter().map(move |run| {
+            let in_half = [first < run.middle, run.middle < run.end];
+            first = run.end;
+            ListEntry {
+                primitive: run.primitive,
+                in_half,
+            }
+        })
+    }
+
     /// Number of quads.
     #[must_use]
     pub fn quad_count(&self) -> usize {
         self.quads.len()
     }
 
-    /// The quads of a run.
-    pub(super) fn run(&self, run: usize) -> std::ops::Range<usize> {
-        let end = |run: &QuadRun| run.end as usize;
+    /// The quads of a run, or those in the tile's upper or lower half.
+    pub(super) fn run(&self, run: usize, part: Part) -> std::ops::Range<usize> {
         let before = run.checked_sub(1).and_then(|before| self.runs.get(before));
-        before.map_or(0, end)..self.runs.get(run).map_or(0, end)
+        let first = before.map_or(0, |run| run.end as usize);
+        let Some(&QuadRun { middle, end, .. }) = self.runs.get(run) else {
+            return first..first;
+        };
+        match part {
+            Part::Whole => first..end as usize,
+            Part::Upper => first..middle as usize,
+            Part::Lower => middle as usize..end as usize,
+        }
     }
 
     /// A quad.
@@ -159,38 +181,95 @@ impl TileLines {
     }
 }
 
-/// The combined rendering order of the primitives of two tiles, as tile and run. The lists hold the
-/// primitives of the runs.
+/// The part of a run that is rendered: all quads, or those in a half of the tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Part {
+    /// All quads.
+    #[default]
+    Whole,
+    /// Quads in the upper half.
+    Upper,
+    /// Quads in the lower half.
+    Lower,
+}
+
+/// Quads of one primitive in one of two tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Listed {
+    /// 0 or 1.
+    pub tile: u8,
+    /// Number of the run in its tile.
+    pub run: u32,
+    /// Which of its quads.
+    pub part: Part,
+}
+
+/// A run of a tile's primitive list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ListEntry {
+    /// The primitive.
+    pub primitive: u32,
+    /// True if it has quads in the upper half, and in the lower half.
+    pub in_half: [bool; 2],
+}
+
+/// The combined rendering order of the primitives of two tiles.
 pub fn interleaved(
     interleave: Interleave,
-    lists: [&mut dyn Iterator<Item = u32>; 2],
-    out: &mut Vec<(u8, u32)>,
+    lists: [&mut dyn Iterator<Item = ListEntry>; 2],
+    out: &mut Vec<Listed>,
 ) {
     out.clear();
+    let part = Part::Whole;
     match interleave {
         Interleave::Alternate => {
-            let [left, right] = lists;
-            for run in 0.. {
-                let (l, r) = (left.next(), right.next());
-                out.extend(l.map(|_| (0, run)));
-                out.extend(r.map(|_| (1, run)));
-                if l.or(r).is_none() {
-                    break;
-                }
-            }
+            let [left, right] = lists.map(|list| (0..).zip(list));
+            alternate(
+                left.map(|(run, _)| run),
+                right.map(|(run, _)| run),
+                part,
+                out,
+            );
         }
         Interleave::Merge => {
             let mut primitives: Vec<(u32, u8, u32)> = Vec::new();
             for (tile, list) in (0..).zip(lists) {
-                primitives.extend(
-                    (0..)
-                        .zip(list)
-                        .map(|(run, primitive)| (primitive, tile, run)),
-                );
+                primitives.extend((0..).zip(list).map(|(run, of)| (of.primitive, tile, run)));
             }
             // A primitive's left run comes before its right one.
             primitives.sort_unstable();
-            out.extend(primitives.iter().map(|&(_, tile, run)| (tile, run)));
+            out.extend(
+                primitives
+                    .iter()
+                    .map(|&(_, tile, run)| Listed { tile, run, part }),
+            );
+        }
+        Interleave::Halves => {
+            let lists = lists.map(|list| -> Vec<(u32, ListEntry)> { (0..).zip(list).collect() });
+            for (half, part) in [Part::Upper, Part::Lower].into_iter().enumerate() {
+                let [left, right] = lists.each_ref().map(|list| {
+                    let inside = list.iter().filter(move |(_, of)| of.in_half[half]);
+                    inside.map(|(run, _)| *run)
+                });
+                alternate(left, right, part, out);
+            }
+        }
+    }
+}
+
+/// One of the left, one of the right, in turn; then the rest of the longer list.
+fn alternate(
+    mut left: impl Iterator<Item = u32>,
+    mut right: impl Iterator<Item = u32>,
+    part: Part,
+    out: &mut Vec<Listed>,
+) {
+    loop {
+        let (l, r) = (left.next(), right.next());
+        out.extend(l.map(|run| Listed { tile: 0, run, part }));
+        out.extend(r.map(|run| Listed { tile: 1, run, part }));
+        if l.or(r).is_none() {
+            break;
         }
     }
 }

@@ -6,6 +6,7 @@
 //! receives the quads: caches without latencies, or the plain lists of tests.
 
 mod cores;
+mod counters;
 mod counts;
 mod distinct;
 mod error;
@@ -32,6 +33,6 @@ pub use feed::{Quad, for_quads};
 pub use hsr::{Shaded, shaded};
 pub use interleave::{Consumer, furthest_behind, interleave};
 pub use line_set::LineSet;
-pub use lines::{Footprint, QuadLines, Tag, TileLines, interleaved};
+pub use lines::{Footprint, ListEntry, Listed, QuadLines, Tag, TileLines, interleaved};
 pub use regroup::{Rendered, rendered};
 pub use source::{MemoryTrace, TileSource};

@@ -51,6 +51,10 @@ impl TileSource for Rendered<'_> {
         self.shaded.records()
     }
 
+    fn tile_px(&self) -> u32 {
+        self.tile_px
+    }
+
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         let Some(tables) = &self.tables else {
             return self.shaded.read_tile(pass, index, tile);

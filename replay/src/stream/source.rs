@@ -3,6 +3,7 @@
 use super::StreamError;
 use formats::textrace::geometry::{Geometry, TileLists};
 use formats::textrace::{Tables, Textrace, Tile};
+use formats::view::TILE_SIZE_PX;
 
 /// A trace that can be read tile by tile.
 pub trait TileSource: Sync {
@@ -11,6 +12,11 @@ pub trait TileSource: Sync {
 
     /// Number of quad records of all tiles, as a measure of work. Includes records that reading leaves out.
     fn records(&self) -> u64;
+
+    /// Width and height of a tile.
+    fn tile_px(&self) -> u32 {
+        TILE_SIZE_PX
+    }
 
     /// Decodes a tile into `tile`, reusing its allocations.
     ///

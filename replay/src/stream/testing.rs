@@ -1,5 +1,6 @@
 //! Small traces for the tests of the engine.
 
+use super::MemoryTrace;
 use super::counts::TileBins;
 use super::lines::{QuadEnd, Tag, TileLines};
 use formats::textrace::{
@@ -131,4 +132,16 @@ pub fn tile_lines(quads: &[&[&[u32]]]) -> TileLines {
         });
     }
     tile
+}
+
+/// The same frame several times over.
+pub fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
+    let mut long = trace.clone();
+    for frame in 1..frames {
+        long.tiles.extend_from_slice(&trace.tiles);
+        let passes = trace.tables.passes.iter().cloned();
+        let passes = passes.map(|pass| formats::textrace::Pass { frame, ..pass });
+        long.tables.passes.extend(passes);
+    }
+    long
 }

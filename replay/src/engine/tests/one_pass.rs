@@ -4,20 +4,20 @@ use super::*;
 use crate::config::Replacement;
 
 /// LRU sets as plain lists, most recently used last.
-struct Twin {
+pub(super) struct Twin {
     sets: Vec<Vec<u32>>,
     ways: usize,
 }
 
 impl Twin {
-    fn new(config: &LevelConfig) -> Self {
+    pub(super) fn new(config: &LevelConfig) -> Self {
         Self {
             sets: vec![Vec::new(); config.sets("", 16).unwrap() as usize],
             ways: config.ways as usize,
         }
     }
 
-    fn access(&mut self, line: u32) -> bool {
+    pub(super) fn access(&mut self, line: u32) -> bool {
         let index = line as usize % self.sets.len();
         let set = &mut self.sets[index];
         let hit = set.contains(&line);
@@ -73,7 +73,7 @@ fn a_thousand_sets_of_configurations_count_as_each_alone() {
     let (mut together, mut missed) = (0, 0);
     for set in 0..1000 {
         let trace = &traces[random.below(3) as usize];
-        let orders: Vec<Order> = Order::all().collect();
+        let orders: Vec<Order> = Order::all().chain(composed()).collect();
         let base = RunConfig {
             order: random.of(&orders),
             cores: random.of(&[1, 2, 2, 3]),

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::config::{Allocation, Assign, TmuConfig};
-use crate::order::Phase;
+use crate::order::{Known, Phase};
 use crate::result::{FirstLookups, TmuResult};
 use crate::stream::for_quads;
 use std::collections::VecDeque;
@@ -170,8 +170,8 @@ impl<'a> PlainFirstMiss<'a> {
     }
 
     fn run(mut self) -> PlainCounts {
-        let order = self.config.order.build(self.config.seed);
-        for phase in order::plan(&*order, &self.trace.tables.passes) {
+        let known = Known::new(&self.config, &self.trace.tables.meta);
+        for phase in order::plan(self.config.order, &known, &self.trace.tables.passes) {
             self.phase(&phase);
         }
         let first = self.counts.first.over(self.useful);
@@ -188,7 +188,7 @@ impl<'a> PlainFirstMiss<'a> {
 
     fn phase(&mut self, phase: &Phase) {
         let cores = self.cores.len();
-        let mut items: Vec<VecDeque<WorkItem>> = match self.config.assign {
+        let mut items: Vec<VecDeque<WorkItem>> = match self.config.dispatch() {
             Assign::FirstIdle => vec![phase.iter().copied().collect()],
             Assign::Static => (0..cores)
                 .map(|core| phase.iter().skip(core).step_by(cores).copied().collect())
@@ -359,7 +359,7 @@ fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
         .generate()
     });
     let mut random = Random(3);
-    let orders: Vec<Order> = Order::all().collect();
+    let orders: Vec<Order> = Order::all().chain(composed()).collect();
     let (mut forwarded, mut merged, mut idle) = (0, 0, 0);
     for step in 0..machines(40) {
         let trace = &traces[random.below(2) as usize];

@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::config::{Allocation, Replacement, TmuConfig};
+use crate::engine::OtherWork;
 use crate::engine::counts::FootprintMisses;
 use crate::memory::{AnyCache, Cache, Caches};
 use crate::result::{MemoryResult, MshrResult, TmuResult};
@@ -290,6 +291,10 @@ impl Machine for PlainTimed {
         Ok(())
     }
 
+    fn lose(&mut self, _other: OtherWork) {
+        unreachable!("not drawn");
+    }
+
     fn flush(&mut self) {
         self.mshrs.iter_mut().for_each(|mshrs| mshrs.fill(0));
         for level in self.l1.iter_mut().chain(&mut self.l2) {
@@ -339,7 +344,7 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
         .generate()
     });
     let mut random = Random(2);
-    let orders: Vec<Order> = Order::all().collect();
+    let orders: Vec<Order> = Order::all().chain(composed()).collect();
     let policies: Vec<Replacement> = Replacement::all().collect();
     let mut loops = 0;
     for step in 0..machines(200) {

@@ -14,7 +14,7 @@ use super::batch::Outcome;
 use super::counts::CacheCounts;
 use crate::access::FrameClients;
 use crate::config::{Allocation, Assign, ConfigError, RunConfig, TmuModel};
-use crate::memory::{Caches, Delay, DelayedFill, MissPath, SecondLevel};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork, SecondLevel};
 use crate::order::Phase;
 use crate::stream::{Cores, StreamError, furthest_behind};
 use first_miss::FirstMiss;
@@ -51,6 +51,9 @@ trait ThreadModel: Send {
 
     /// Empties all caches and drops the lines in flight.
     fn flush(&mut self);
+
+    /// Empties the L1 caches, and other work fills part of each other cache.
+    fn lose(&mut self, other: OtherWork, cycle: u64);
 
     /// The counts until a cycle.
     fn outcome(&self, cycles: u64) -> Outcome;
@@ -91,6 +94,10 @@ impl<M: ThreadModel> Machine for Clocked<M> {
 
     fn flush(&mut self) {
         self.model.flush();
+    }
+
+    fn lose(&mut self, other: OtherWork) {
+        self.model.lose(other, self.cycles);
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
@@ -143,6 +150,12 @@ impl<D: DelayedFill> Shared<D> {
     fn flush(&mut self) {
         self.l1.iter_mut().for_each(D::clear);
         self.l2.clear();
+    }
+
+    fn lose(&mut self, other: OtherWork, cycle: u64) {
+        self.l1.iter_mut().for_each(D::clear);
+        self.l2.lose(other, cycle);
+        self.follow_evictions(cycle);
     }
 }
 

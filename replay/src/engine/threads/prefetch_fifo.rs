@@ -10,7 +10,7 @@ use crate::access::FrameClients;
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::batch::Outcome;
 use crate::engine::counts::{CacheCounts, FootprintMisses};
-use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT, OtherWork};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;
 use std::collections::VecDeque;
@@ -162,6 +162,10 @@ impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
 
     fn flush(&mut self) {
         self.shared.flush();
+    }
+
+    fn lose(&mut self, other: OtherWork, cycle: u64) {
+        self.shared.lose(other, cycle);
     }
 
     fn outcome(&self, cycles: u64) -> Outcome {

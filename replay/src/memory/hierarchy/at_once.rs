@@ -1,6 +1,7 @@
 //! All levels without time (functional mode): a miss fills immediately.
 
 use super::caches::Caches;
+use super::other_work::OtherWork;
 use super::second_level::{MissPath, SecondLevel};
 use crate::config::{ConfigError, RunConfig};
 use crate::memory::{Access, Cache};
@@ -103,6 +104,13 @@ impl<C: Cache> Hierarchy<C> {
     pub fn clear(&mut self) {
         self.l1.iter_mut().for_each(C::clear);
         self.l2.empty();
+    }
+
+    /// Empties the L1 caches, and other work fills part of each other cache.
+    pub fn lose(&mut self, other: OtherWork) {
+        self.l1.iter_mut().for_each(C::clear);
+        self.l2.lose_at_once(other);
+        self.follow_evictions();
     }
 
     /// Counts beside and below the L2.

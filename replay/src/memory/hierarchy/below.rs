@@ -1,6 +1,7 @@
 //! The path of L2 misses: further levels, if configured, then memory.
 
 use super::caches::of_core;
+use super::other_work::OtherWork;
 use crate::config::{ConfigError, Inclusion, RunConfig};
 use crate::memory::dram::{Dram, DramResult};
 use crate::memory::in_flight::{Mshrs, NOT_IN_FLIGHT};
@@ -23,6 +24,8 @@ struct Level {
     name: &'static str,
     /// One cache, or one per core.
     caches: Vec<Filling>,
+    /// Lines of each cache.
+    lines: u64,
     line_bytes: u32,
     /// log2 of its line size over the L2's line size.
     shift: u32,
@@ -65,6 +68,7 @@ impl Below {
             levels.push(Level {
                 name,
                 caches: caches.collect::<Result<_, ConfigError>>()?,
+                lines: level.size_bytes / u64::from(line_bytes),
                 line_bytes,
                 shift: line_bytes.ilog2() - config.line_bytes.ilog2(),
                 inclusion: level.inclusion,
@@ -238,6 +242,20 @@ impl Below {
             for of in &mut level.caches {
                 of.cache.clear();
                 of.in_flight.clear();
+            }
+        }
+    }
+
+    /// Other work fills part of each cache, without being counted.
+    pub fn lose(&mut self, other: OtherWork) {
+        for index in 0..self.levels.len() {
+            let (lines, shift) = (self.levels[index].lines, self.levels[index].shift);
+            for core in 0..self.levels[index].caches.len() {
+                for line in other.lines(lines, shift) {
+                    if !self.levels[index].cache(core).contains(line) {
+                        self.fill_level(core, index, line << shift);
+                    }
+                }
             }
         }
     }

@@ -3,6 +3,7 @@
 use super::below::Below;
 use super::caches::of_core;
 use super::inclusion::Evictions;
+use super::other_work::OtherWork;
 use crate::config::{ConfigError, PrefetchConfig, RunConfig};
 use crate::memory::in_flight::{DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
 use crate::memory::policy::EMPTY;
@@ -100,6 +101,11 @@ impl MissPath {
         let arrival = self.read(core, line, start);
         of_core(&mut self.mshrs, core).enter(arrival);
         arrival
+    }
+
+    /// Other work fills part of each cache below the L2.
+    fn lose_below(&mut self, other: OtherWork) {
+        self.below.iter_mut().for_each(|below| below.lose(other));
     }
 
     /// True if a fetch would wait for an MSHR.
@@ -347,6 +353,21 @@ impl<D: DelayedFill> SecondLevel<D> {
         self.caches.iter_mut().for_each(D::clear);
         self.clear_path();
     }
+
+    /// Other work fills part of each cache. Its lines arrive at `now`.
+    pub fn lose(&mut self, other: OtherWork, now: u64) {
+        for cache in &mut self.caches {
+            for line in other.l2_lines() {
+                if !cache.holds(line, now) {
+                    cache.enter(line, now, now);
+                }
+            }
+        }
+        // Evictions of the L2 enter an exclusive level before other work fills that level.
+        self.follow_evictions(now);
+        self.path.lose_below(other);
+        self.follow_evictions(now);
+    }
 }
 
 /// Operation without time: fetches complete immediately.
@@ -414,6 +435,19 @@ impl<C: Cache> SecondLevel<C> {
     pub fn empty(&mut self) {
         self.caches.iter_mut().for_each(C::clear);
         self.clear_path();
+    }
+
+    /// Other work fills part of each cache.
+    pub fn lose_at_once(&mut self, other: OtherWork) {
+        for cache in &mut self.caches {
+            for line in other.l2_lines() {
+                cache.access(line);
+            }
+        }
+        // Evictions of the L2 enter an exclusive level before other work fills that level.
+        self.follow_evictions_at_once();
+        self.path.lose_below(other);
+        self.follow_evictions_at_once();
     }
 }
 

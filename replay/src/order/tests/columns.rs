@@ -1,13 +1,20 @@
-//! An order that only tests know: with its row in the table it is all that an order takes.
+//! A curve for tests: this file and its row in the table are all that a curve needs.
 
-use crate::order::TileOrder;
+use crate::order::cost::Cost;
+use crate::order::curve::{Ground, Path};
 
+#[derive(Debug)]
 pub struct Columns;
 
-impl TileOrder for Columns {
-    fn curve(&self, [columns, rows]: [u32; 2]) -> Vec<[u32; 2]> {
+impl Path for Columns {
+    fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {
+        let [columns, rows] = ground.grid;
         (0..columns)
             .flat_map(|x| (0..rows).map(move |y| [x, y]))
             .collect()
+    }
+
+    fn cost(&self, _grid: [u32; 2]) -> Cost {
+        Cost::state(4).deciding_in(1)
     }
 }

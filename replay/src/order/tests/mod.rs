@@ -1,13 +1,14 @@
 pub mod columns;
+mod combinations;
 
+use super::curve::Ground;
 use super::*;
 use crate::config::{Mode, RunConfig};
 use crate::engine::replay;
 use crate::stream::synthetic::Synthetic;
 use clap::ValueEnum;
-use formats::textrace::{Pass, PassKind};
-use formats::view::Eye;
-use proptest::prelude::*;
+use formats::textrace::{Pass, PassKind, TraceMeta};
+use formats::view::{Eye, FrameViews};
 use std::path::Path;
 
 fn pass(kind: PassKind, frame: u32, eye: Option<Eye>, tiles: [u32; 2]) -> Pass {
@@ -21,55 +22,41 @@ fn pass(kind: PassKind, frame: u32, eye: Option<Eye>, tiles: [u32; 2]) -> Pass {
     }
 }
 
+const KNOWN: Known<'_> = Known {
+    seed: 7,
+    cores: 2,
+    tile_px: 16,
+    l2_bytes: 128 << 10,
+    line_bytes: 16,
+    meta: None,
+    last: None,
+};
+
 fn visited(order: Order, passes: &[Pass]) -> Vec<TileRef> {
-    plan(&*order.build(7), passes)
+    plan(order, &KNOWN, passes)
         .iter()
         .flatten()
         .flat_map(WorkItem::tiles)
         .collect()
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
-    #[test]
-    fn every_order_is_a_permutation_of_the_tiles_of_all_passes(
-        columns in 1_u32..40, rows in 1_u32..40, other in 1_u32..40, shadow in 1_u32..20,
-    ) {
-        let layer = |layer, eye, tiles| Pass { layer, ..pass(PassKind::Layer, 1, eye, tiles) };
-        let passes = [
-            layer(3, Some(Eye::Left), [columns, rows]),
-            layer(3, Some(Eye::Right), [columns, rows]),
-            layer(0, None, [other, rows]),
-            layer(1, Some(Eye::Right), [other, 1]),
-            layer(1, Some(Eye::Left), [other, 2]),
-            pass(PassKind::Shadow, 0, None, [shadow, shadow]),
-            pass(PassKind::Main, 0, Some(Eye::Left), [columns, rows]),
-            pass(PassKind::Main, 0, Some(Eye::Right), [other, rows]),
-            pass(PassKind::Main, 1, Some(Eye::Right), [columns, rows]),
-        ];
-        let mut expected: Vec<TileRef> = passes
-            .iter()
-            .enumerate()
-            .flat_map(|(i, p)| (0..p.tile_count()).map(move |tile| TileRef { pass: i as u32, tile }))
-            .collect();
-        expected.sort_unstable();
-        for order in Order::all() {
-            let mut found = visited(order, &passes);
-            found.sort_unstable();
-            prop_assert_eq!(&found, &expected, "{}", order.name());
-        }
-    }
+fn cells_of(curve: Curve, grid: [u32; 2], size: u32) -> Vec<[u32; 2]> {
+    curve.path().cells(&Ground {
+        grid,
+        size,
+        seed: 3,
+        frame_bytes: None,
+    })
 }
 
-fn tiles_of(order: Order, tiles: [u32; 2]) -> Vec<[u32; 2]> {
-    order.build(3).curve(tiles)
+fn order(name: &str) -> Order {
+    Order::by_name(name).unwrap_or_else(|why| panic!("{name}: {why:?}"))
 }
 
 #[test]
 fn morton_draws_a_z_and_skips_what_lies_outside() {
     assert_eq!(
-        tiles_of(Order::MORTON, [3, 2]),
+        cells_of(Curve::MORTON, [3, 2], 0),
         [[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [2, 1]]
     );
 }
@@ -77,35 +64,225 @@ fn morton_draws_a_z_and_skips_what_lies_outside() {
 #[test]
 fn zig_zag_turns_at_every_row() {
     assert_eq!(
-        tiles_of(Order::ZIG_ZAG, [2, 2]),
+        cells_of(Curve::ZIG_ZAG, [2, 2], 0),
         [[0, 0], [1, 0], [1, 1], [0, 1]]
     );
 }
 
 #[test]
 fn hilbert_and_zig_zag_step_to_neighbours_only() {
-    for (order, tiles) in [(Order::HILBERT, [16, 16]), (Order::ZIG_ZAG, [7, 5])] {
-        for step in tiles_of(order, tiles).windows(2) {
-            let distance = step[0][0].abs_diff(step[1][0]) + step[0][1].abs_diff(step[1][1]);
-            assert_eq!(distance, 1, "{}: {step:?}", order.name());
+    for (curve, grid) in [(Curve::HILBERT, [16, 16]), (Curve::ZIG_ZAG, [7, 5])] {
+        let steps = far_steps(&cells_of(curve, grid, 0));
+        assert_eq!(steps, 0, "{}", curve.name());
+    }
+}
+
+/// Counts steps that do not go to one of the eight neighbours.
+fn far_steps(cells: &[[u32; 2]]) -> usize {
+    let distance =
+        |step: &[[u32; 2]]| step[0][0].abs_diff(step[1][0]) + step[0][1].abs_diff(step[1][1]);
+    cells.windows(2).filter(|step| distance(step) > 1).count()
+}
+
+#[test]
+fn the_generalised_hilbert_curve_steps_to_neighbours_on_any_grid_but_for_one_diagonal() {
+    for columns in 1..40 {
+        for rows in 1..40 {
+            let cells = cells_of(Curve::GILBERT, [columns, rows], 0);
+            let far = far_steps(&cells);
+            let odd = columns.max(rows) % 2 == 1 && columns.min(rows) % 2 == 0;
+            assert!(far <= usize::from(odd), "{columns}x{rows}: {far}");
+            assert_eq!(cells[0], [0, 0]);
         }
     }
 }
 
 #[test]
+fn strips_are_an_odd_number_and_every_other_one_runs_upwards() {
+    // Four columns with two columns per strip are three strips with one, one and two columns.
+    assert_eq!(
+        cells_of(Curve::STRIP, [4, 2], 2),
+        [
+            [0, 0],
+            [0, 1],
+            [1, 1],
+            [1, 0],
+            [2, 0],
+            [3, 0],
+            [3, 1],
+            [2, 1]
+        ]
+    );
+    assert_eq!(
+        cells_of(Curve::STRIP, [4, 3], 4),
+        cells_of(Curve::ZIG_ZAG, [4, 3], 0)
+    );
+}
+
+#[test]
+fn bands_run_column_by_column_to_and_fro() {
+    assert_eq!(
+        cells_of(Curve::BAND, [2, 3], 2),
+        [[0, 0], [0, 1], [1, 1], [1, 0], [1, 2], [0, 2]]
+    );
+    assert_eq!(
+        cells_of(Curve::BAND, [4, 3], 1),
+        cells_of(Curve::ZIG_ZAG, [4, 3], 0)
+    );
+}
+
+#[test]
+fn rows_that_the_l2_does_not_hold_become_bands_the_lower_the_more_lines_there_are() {
+    let path = Curve::ADAPTIVE.path();
+    let rows_of_first_columns = |frame_kib: Option<u64>| -> Vec<u32> {
+        let cells = path.cells(&Ground {
+            grid: [60, 10],
+            size: 100,
+            seed: 0,
+            frame_bytes: frame_kib.map(|kib| kib << 10),
+        });
+        cells
+            .iter()
+            .take_while(|cell| cell[0] == 0)
+            .map(|cell| cell[1])
+            .collect()
+    };
+    assert_eq!(rows_of_first_columns(None), [0]);
+    // A row of 100 KiB fits into the L2.
+    assert_eq!(rows_of_first_columns(Some(1000)), [0]);
+    // The L2 holds 40, 20 and 6 columns of a row.
+    assert_eq!(rows_of_first_columns(Some(1500)), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(rows_of_first_columns(Some(3000)), [0, 1, 2]);
+    assert_eq!(rows_of_first_columns(Some(10_000)), [0, 1, 2]);
+    assert_eq!(rows_of_first_columns(Some(1001)), [0, 1, 2, 3, 4, 5, 6, 7]);
+}
+
+fn pair_of(tiles: [u32; 2]) -> [Pass; 2] {
+    [Eye::Left, Eye::Right].map(|eye| pass(PassKind::Main, 0, Some(eye), tiles))
+}
+
+#[test]
 fn lrta_takes_left_and_right_tiles_in_turn() {
-    let left = View {
-        pass: 0,
-        tiles: [2, 1],
-    };
-    let right = View {
-        pass: 1,
-        tiles: [2, 1],
-    };
     let tile = |pass, tile| WorkItem::Tile(TileRef { pass, tile });
     assert_eq!(
-        Z2Lrta.stereo(left, right),
-        [tile(0, 0), tile(1, 0), tile(0, 1), tile(1, 1)]
+        plan(Order::Z2_LRTA, &KNOWN, &pair_of([2, 1])),
+        [[tile(0, 0), tile(1, 0), tile(0, 1), tile(1, 1)]]
+    );
+}
+
+/// A display with pictures of 64x32 pixels. A point at infinity lies this many pixels further left in the right
+/// picture.
+fn shifted_by(pixels: f32) -> TraceMeta {
+    let mut views = FrameViews::default();
+    for (eye, side) in views.eyes.iter_mut().zip([1.0, -1.0]) {
+        eye.eye_to_clip[2] = [-side * pixels / 64.0, 0.0, -1.0, -1.0];
+    }
+    TraceMeta {
+        frames: vec![views],
+        ..TraceMeta::default()
+    }
+}
+
+#[test]
+fn tiles_pair_where_infinity_falls_and_those_without_a_partner_keep_their_place() {
+    let meta = shifted_by(17.0);
+    let known = Known {
+        meta: Some(&meta),
+        ..KNOWN
+    };
+    let passes = pair_of([4, 1]);
+    let tile = |pass, tile| TileRef { pass, tile };
+    let pair = |left, right| WorkItem::Pair(tile(0, left), tile(1, right), Interleave::Alternate);
+    let expected = vec![
+        WorkItem::Tile(tile(0, 0)),
+        pair(1, 0),
+        pair(2, 1),
+        pair(3, 2),
+        WorkItem::Tile(tile(1, 3)),
+    ];
+    for name in ["zig-zag+sta+offset", "zig-zag+sta+infinity"] {
+        assert_eq!(
+            plan(order(name), &known, &passes),
+            std::slice::from_ref(&expected),
+            "{name}"
+        );
+    }
+    // Layers have their own projections.
+    let layers = passes.map(|pass| Pass {
+        kind: PassKind::Layer,
+        ..pass
+    });
+    let plans =
+        ["zig-zag+sta+offset", "zig-zag+sta"].map(|name| plan(order(name), &known, &layers));
+    assert_eq!(plans[0], plans[1]);
+}
+
+#[test]
+fn rows_pair_at_the_shifts_that_the_last_frame_had() {
+    let last = Counters {
+        views: vec![ViewCounters {
+            view: View::grid(0, [2, 2]),
+            bytes: 0,
+            primitive_shift: vec![0, 1],
+            line_shift: vec![1, 0],
+        }],
+    };
+    let known = Known {
+        last: Some(&last),
+        ..KNOWN
+    };
+    let pairs = |name| -> Vec<(u32, u32)> {
+        let phases = plan(order(name), &known, &pair_of([2, 2]));
+        let pair = |item: &WorkItem| match *item {
+            WorkItem::Pair(left, right, _) => Some((left.tile, right.tile)),
+            WorkItem::Tile(_) => None,
+        };
+        phases[0].iter().filter_map(pair).collect()
+    };
+    assert_eq!(
+        pairs("scanline+sta+row-primitives"),
+        [(0, 0), (1, 1), (3, 2)]
+    );
+    assert_eq!(pairs("scanline+sta+row-lines"), [(1, 0), (2, 2), (3, 3)]);
+}
+
+#[test]
+fn directions_reverse_frames_or_the_right_view() {
+    let frame = |frame| pair_of([2, 1]).map(|pass| Pass { frame, ..pass });
+    let passes = [frame(0), frame(1)].concat();
+    let tiles = |name| -> Vec<(u32, u32)> {
+        let tiles = visited(order(name), &passes);
+        tiles.iter().map(|at| (at.pass, at.tile)).collect()
+    };
+    assert_eq!(
+        tiles("scanline+boustro"),
+        [
+            (0, 0),
+            (0, 1),
+            (1, 0),
+            (1, 1),
+            (3, 1),
+            (3, 0),
+            (2, 1),
+            (2, 0)
+        ]
+    );
+    assert_eq!(
+        tiles("scanline+right-reversed"),
+        [
+            (0, 0),
+            (0, 1),
+            (1, 1),
+            (1, 0),
+            (2, 0),
+            (2, 1),
+            (3, 1),
+            (3, 0)
+        ]
+    );
+    assert_eq!(
+        tiles("scanline+lrta+boustro")[4..],
+        [(3, 1), (2, 1), (3, 0), (2, 0)]
     );
 }
 
@@ -157,7 +334,7 @@ fn left_and_right_layers_of_a_number_and_size_pair_and_others_run_alone() {
         vec![WorkItem::Tile(tile(5, 0))],
         vec![WorkItem::Tile(tile(6, 0)), WorkItem::Tile(tile(6, 1))],
     ];
-    assert_eq!(plan(&*Order::Z2_STA.build(0), &passes), expected);
+    assert_eq!(plan(Order::Z2_STA, &KNOWN, &passes), expected);
 }
 
 #[test]
@@ -177,19 +354,15 @@ fn monoscopic_passes_come_before_the_stereo_pair_of_their_frame() {
 
 #[test]
 fn the_random_order_follows_its_seed() {
-    assert_eq!(
-        Random { seed: 1 }.curve([9, 9]),
-        Random { seed: 1 }.curve([9, 9])
-    );
-    assert_ne!(
-        Random { seed: 1 }.curve([9, 9]),
-        Random { seed: 2 }.curve([9, 9])
-    );
+    let tiles = |seed| Order::RANDOM.stereo([9, 9], &Known { seed, ..KNOWN });
+    assert_eq!(tiles(1), tiles(1));
+    assert_ne!(tiles(1), tiles(2));
 }
 
 #[test]
 fn a_file_and_a_row_are_all_that_an_order_takes() {
     let order = Order::COLUMNS;
+    assert_eq!(order.parts().curve, Curve::COLUMNS);
     assert_eq!(serde_json::to_value(order).unwrap(), "test-columns");
     assert_eq!(Order::from_str("test-columns", false).unwrap(), order);
     let config: RunConfig =
@@ -207,7 +380,10 @@ fn a_file_and_a_row_are_all_that_an_order_takes() {
     let [ours, theirs] = [config, scanline].map(|config| replay(&trace, &config).unwrap());
     assert_eq!(ours.access_hash, theirs.access_hash);
     assert_ne!(ours.l1.counters, theirs.l1.counters);
-    assert_eq!(tiles_of(order, [2, 2]), [[0, 0], [0, 1], [1, 0], [1, 1]]);
+    assert_eq!(
+        cells_of(Curve::COLUMNS, [2, 2], 0),
+        [[0, 0], [0, 1], [1, 0], [1, 1]]
+    );
 }
 
 #[test]
@@ -228,7 +404,7 @@ fn names_are_unique() {
     }
 }
 
-/// An order that no paper's table needs is named by its own file and its row alone.
+/// Only the file of a curve, its row, and the row of its order mention it.
 #[test]
 fn nothing_outside_the_table_names_an_order() {
     fn scan(folder: &Path, found: &mut Vec<String>) {
@@ -252,5 +428,8 @@ fn nothing_outside_the_table_names_an_order() {
         &mut found,
     );
     found.sort_unstable();
-    assert_eq!(found, ["hilbert.rs", "mod.rs"]);
+    assert_eq!(
+        found,
+        ["generalised_hilbert.rs", "hilbert.rs", "mod.rs", "mod.rs"]
+    );
 }

@@ -4,7 +4,7 @@ use super::model::{PaperReport, TraceInfo};
 use super::tables::busiest;
 use crate::config::Order;
 use crate::experiment::ResultRow;
-use crate::order::{View, WorkItem};
+use crate::order::{Known, WorkItem};
 use crate::paper::z2;
 use crate::report::columns::{Column, pick};
 use crate::report::figures::{figure, number};
@@ -350,8 +350,11 @@ pub fn heat_map(info: &TraceInfo, detail: &ResultRow, measure: TileMeasure) -> O
 /// An order's path over both eyes' grids of `tiles`.
 #[must_use]
 pub fn path(order: Order, seed: u64, tiles: [u32; 2]) -> PathPlot {
-    let view = |pass| View { pass, tiles };
-    let items = order.build(seed).stereo(view(0), view(1));
+    let known = Known {
+        seed,
+        ..Known::default()
+    };
+    let items = order.stereo(tiles, &known);
     let mut stops = Vec::with_capacity(2 * tiles[0] as usize * tiles[1] as usize);
     for item in &items {
         for (i, tile) in item.tiles().enumerate() {

@@ -17,7 +17,7 @@ use crate::config::{Assign, LevelConfig, RunConfig};
 use crate::engine::batch::Outcome;
 use crate::engine::counts::{CacheCounts, CellMisses, TileMisses};
 use crate::engine::{AtOnce, Machine};
-use crate::memory::Forest;
+use crate::memory::{Forest, OtherWork};
 use crate::order::Phase;
 use crate::stream::{Bins, Consumer, Cores, QuadLines, StreamError, Tag, interleave};
 
@@ -27,8 +27,11 @@ pub type Geometry = (u32, u32);
 /// Geometry of both levels.
 pub type LevelGeometry = (Geometry, Geometry);
 
-/// The geometry of a configuration whose caches are all plain LRU.
+/// The geometry of a configuration with a shared L2 whose caches are all plain LRU.
 pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
+    if !config.level.l2.shared {
+        return None;
+    }
     let of = |cache: &LevelConfig, level| {
         let lru = cache.is_plain_lru();
         let sets = cache.sets(level, config.line_bytes).ok()?;
@@ -183,6 +186,16 @@ impl Machine for OnePass {
     fn flush(&mut self) {
         self.forests.iter_mut().for_each(Forest::clear);
         self.under.iter_mut().for_each(|under| under.forest.clear());
+    }
+
+    fn lose(&mut self, other: OtherWork) {
+        self.forests.iter_mut().for_each(Forest::clear);
+        for under in &mut self.under {
+            for (tree, tally) in under.level.tallies.iter().enumerate() {
+                let lines = other.lines(u64::from(tally.sets) * u64::from(tally.depth()), 0);
+                under.forest.access_tree(tree, lines, &mut Vec::new());
+            }
+        }
     }
 
     fn outcome(&self, config: &RunConfig) -> Outcome {

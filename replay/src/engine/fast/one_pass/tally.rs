@@ -72,7 +72,8 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    fn depth(&self) -> u32 {
+    /// The largest associativity.
+    pub(super) fn depth(&self) -> u32 {
         self.ways.last().copied().unwrap_or(0)
     }
 

@@ -12,7 +12,7 @@ use crate::access::FrameClients;
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::batch::Outcome;
 use crate::engine::counts::CacheCounts;
-use crate::memory::{Caches, Delay, DelayedFill, MissPath};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;
 use memory::{Memory, Seen};
@@ -176,6 +176,10 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
 
     fn flush(&mut self) {
         self.memory.flush();
+    }
+
+    fn lose(&mut self, other: OtherWork, cycle: u64) {
+        self.memory.shared().lose(other, cycle);
     }
 
     fn outcome(&self, cycles: u64) -> Outcome {

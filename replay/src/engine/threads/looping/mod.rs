@@ -10,7 +10,7 @@ use crate::access::FrameClients;
 use crate::config::RunConfig;
 use crate::engine::batch::Outcome;
 use crate::engine::counts::CacheCounts;
-use crate::memory::{Caches, Delay, DelayedFill, MissPath};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::{Pipeline, Turn};
 use memory::{Found, Memory};
@@ -120,6 +120,10 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
 
     fn flush(&mut self) {
         self.memory.flush();
+    }
+
+    fn lose(&mut self, other: OtherWork, cycle: u64) {
+        self.memory.shared().lose(other, cycle);
     }
 
     fn outcome(&self, cycles: u64) -> Outcome {

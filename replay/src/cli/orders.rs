@@ -1,0 +1,290 @@
+//! `replay orders`: compares tile orders with each other and with bounds.
+
+use super::ConfigArgs;
+use super::experiment_args::{page_outputs, parse_caches, write_page};
+use super::order_arg::parse_orders;
+use super::subjects::Traces;
+use crate::config::{BetweenFrames, Mode, Order, RunConfig};
+use crate::experiment::frame_count;
+use crate::files::{self, write_atomically};
+use crate::orders_study::learn::learn;
+use crate::orders_study::search::{Method, Schedule};
+use crate::orders_study::{BASELINE, OrderFile, Searched, Study, Subjects, default_orders};
+use crate::report::orders::{LearnedTrace, OrdersReport};
+use anyhow::{Context, Result, bail, ensure};
+use shell::{Output, Progress, is_stdout};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// The default orders of the learner.
+const LEARNER: &str = "adaptive+sta+offset+boustro,zig-zag+sta+offset+boustro,band4+sta+offset+boustro,band8+sta+offset+boustro";
+
+/// Arguments of `replay orders`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  replay orders atrium.textrace
+  replay orders *.textrace --search greedy --bounds --json
+  replay orders a.textrace --orders z2-sta,zig-zag+sta+offset,strip+sta+offset --html orders.html
+  replay orders head.textrace --between keep,lose-50,flush --orders z2-sta,zig-zag+sta+offset+boustro
+  replay orders head.textrace --learn
+  replay orders a.textrace --search anneal --moves 1000000 --save-orders searched
+  replay orders a.textrace --mode timed --dram lpddr4 --orders z2-sta,zig-zag+sta+offset
+docs/models/orders.md explains the parts of an order, docs/results/orders.md has results.")]
+pub struct Args {
+    /// Texture traces
+    #[arg(required = true, value_name = "TRACE")]
+    traces: Vec<PathBuf>,
+    #[command(flatten)]
+    machine: ConfigArgs,
+    /// Orders to compare, comma-separated: names, parts as in strip8+sta+offset, or `all`. z2-sta is always
+    /// included [default: every curve and part]
+    #[arg(long, value_name = "ORDERS")]
+    orders: Option<String>,
+    /// L1/L2 sizes in KiB, comma-separated
+    #[arg(
+        long,
+        value_name = "L1/L2,...",
+        default_value = "8/128,16/128,8/256,16/256"
+    )]
+    caches: String,
+    /// What happens to caches between frames, comma-separated: keep, flush, lose-N
+    #[arg(long, value_name = "CACHES,...", default_value = "keep")]
+    between: String,
+    /// Also search orders for traces of one frame, comma-separated: greedy, greedy-N (with a look-ahead of N
+    /// items), anneal
+    #[arg(long, value_name = "METHODS")]
+    search: Option<String>,
+    /// Number of moves that annealing tries
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    moves: u64,
+    /// Write the searched orders into this folder
+    #[arg(long, value_name = "DIR", requires = "search")]
+    save_orders: Option<PathBuf>,
+    /// Also replay a searched order from a file, with the L2 for which it was searched
+    #[arg(long = "order-file", value_name = "FILE")]
+    order_files: Vec<PathBuf>,
+    /// Also print lower bounds: infinite cache, OPT replacement, windows of uses
+    #[arg(long)]
+    bounds: bool,
+    /// Also let a learner choose one of these orders per frame, comma-separated [default with no value: four
+    /// curves with sta, offset and boustro]
+    #[arg(long, value_name = "ORDERS", num_args = 0..=1, default_missing_value = LEARNER)]
+    learn: Option<String>,
+    /// Print one JSON object (schema replay.orders/1)
+    #[arg(long)]
+    json: bool,
+    /// Also write the rows as CSV; - writes them to standard output instead of the table
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Also write an HTML page with tables and paths, and JSON and CSV files beside it
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    #[command(flatten)]
+    threads: shell::Threads,
+}
+
+/// Runs the subcommand.
+///
+/// # Errors
+/// Invalid arguments, an unreadable trace or order, or an output that cannot be written.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    args.threads.start()?;
+    let study = study(args)?;
+    let prints = check_outputs(args)?;
+    let traces = Traces::open(&args.traces)?;
+    let opened = traces.subjects_by_file();
+    let subjects = Subjects {
+        traces: &opened,
+        files: order_files(
+            &args.order_files,
+            &opened
+                .iter()
+                .map(|s| s.id.checksum.as_str())
+                .collect::<Vec<_>>(),
+        )?,
+    };
+    let replays =
+        opened.len() * study.orders.len() * study.caches_bytes.len() * study.between.len();
+    let progress = Progress::new("replaying", replays as u64, "replays");
+    let (rows, searched, work) = study.run(&subjects, &|done| progress.advance(done))?;
+    drop(progress);
+    shell::note(&work.summary(rows.iter().filter(|row| row.result.is_some()).count()));
+    if let Some(folder) = &args.save_orders {
+        for Searched { source, file } in searched.iter().skip(subjects.files.len()) {
+            write_atomically(&folder.join(source), file.text().as_bytes())?;
+        }
+    }
+    let report = OrdersReport {
+        rows,
+        learned: learned(args, &study, &subjects)?,
+        config: study.base,
+    };
+    write(args, &report, prints)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(args: &Args, report: &OrdersReport<'_>, prints: bool) -> Result<()> {
+    if let Some(path) = &args.csv {
+        write_atomically(path, report.csv().as_bytes())?;
+    }
+    if let Some(path) = &args.html {
+        write_page(path, &report.page()?, &report.json()?, &report.csv())?;
+    }
+    if prints {
+        super::print(&if args.json {
+            report.json()?
+        } else {
+            report.text()
+        })?;
+    }
+    Ok(())
+}
+
+/// Builds the study from the arguments.
+fn study(args: &Args) -> Result<Study> {
+    let usual = RunConfig {
+        mode: Mode::Functional,
+        ..RunConfig::default()
+    };
+    let base = args.machine.resolve_over(usual)?;
+    ensure!(
+        base.order == usual.order,
+        "--order is varied here; use --orders"
+    );
+    ensure!(
+        (base.level.l1.size_bytes, base.level.l2.size_bytes)
+            == (usual.level.l1.size_bytes, usual.level.l2.size_bytes),
+        "--l1 and --l2 are varied here; use --caches"
+    );
+    ensure!(
+        base.between_frames == usual.between_frames,
+        "--between-frames is varied here; use --between"
+    );
+    let named = args.orders.as_deref().map(parse_orders).transpose()?;
+    let mut orders = named.unwrap_or_else(default_orders);
+    if !orders.contains(&BASELINE) {
+        orders.insert(0, BASELINE);
+    }
+    let mut study = Study {
+        base,
+        caches_bytes: parse_caches(&args.caches)?,
+        between: parse_between(&args.between)?,
+        orders,
+        methods: Vec::new(),
+        bounds: args.bounds,
+    };
+    for name in args.search.iter().flat_map(|names| names.split(',')) {
+        let schedule = Schedule::new(args.moves, base.seed);
+        let method = Method::find(name.trim(), &schedule);
+        study.methods.push(method.with_context(|| {
+            format!("--search: expected greedy, greedy-N with a look-ahead of N items, or anneal, found `{name}`")
+        })?);
+    }
+    for &(l1_bytes, l2_bytes) in &study.caches_bytes {
+        let mut config = base;
+        (config.level.l1.size_bytes, config.level.l2.size_bytes) = (l1_bytes, l2_bytes);
+        for &between_frames in &study.between {
+            RunConfig {
+                between_frames,
+                ..config
+            }
+            .validate()?;
+        }
+    }
+    Ok(study)
+}
+
+fn parse_between(text: &str) -> Result<Vec<BetweenFrames>> {
+    let mut between = Vec::new();
+    for name in text.split(',') {
+        let of = name.trim().parse();
+        let of: BetweenFrames = of.map_err(|why: String| anyhow::anyhow!("--between: {why}"))?;
+        if !between.contains(&of) {
+            between.push(of);
+        }
+    }
+    Ok(between)
+}
+
+/// Reads searched orders. Each must belong to one of the traces.
+fn order_files(paths: &[PathBuf], checksums: &[&str]) -> Result<Vec<Searched>> {
+    let read = |path: &PathBuf| {
+        let text = shell::read_settings(path)?;
+        let file = OrderFile::parse(&text).with_context(|| path.display().to_string())?;
+        ensure!(
+            checksums.contains(&file.trace.as_str()),
+            "{}: expected an order of one of the traces ({}), found one of {}",
+            path.display(),
+            checksums.join(", "),
+            file.trace
+        );
+        Ok(Searched {
+            source: path.display().to_string(),
+            file,
+        })
+    };
+    paths.iter().map(read).collect()
+}
+
+/// Runs the learner, if requested.
+fn learned<'a>(
+    args: &Args,
+    study: &Study,
+    subjects: &'a Subjects<'a>,
+) -> Result<Vec<LearnedTrace<'a>>> {
+    let Some(names) = &args.learn else {
+        return Ok(Vec::new());
+    };
+    let orders: Vec<Order> = parse_orders(names)?;
+    let mut learned = Vec::new();
+    for subject in subjects.traces {
+        let frames = u64::from(frame_count(subject.source.tables()));
+        for &between_frames in &study.between {
+            for &(l1_bytes, l2_bytes) in &study.caches_bytes {
+                let mut config = RunConfig {
+                    between_frames,
+                    ..study.base
+                };
+                (config.level.l1.size_bytes, config.level.l2.size_bytes) = (l1_bytes, l2_bytes);
+                let progress = Progress::new("learning", frames, "frames");
+                let found = learn(subject.source, &config, &orders, &|done| {
+                    progress.advance(done)
+                });
+                let found = found.with_context(|| subject.label.clone())?;
+                let Some(found) = found else {
+                    bail!("--learn: expected LRU caches of 4 ways, which the learner counts");
+                };
+                learned.push(LearnedTrace {
+                    label: &subject.label,
+                    config,
+                    learned: found,
+                });
+            }
+        }
+    }
+    Ok(learned)
+}
+
+/// Checks the outputs. Returns true if the table or JSON goes to standard output.
+fn check_outputs(args: &Args) -> Result<bool> {
+    if let Some(folder) = &args.save_orders {
+        shell::check_folder("--save-orders", folder)?;
+    }
+    let mut outputs: Vec<Output> = Vec::new();
+    outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
+    outputs.extend(
+        args.html
+            .iter()
+            .flat_map(|path| page_outputs("--html", path)),
+    );
+    outputs.extend(args.json.then(|| Output::result("--json")));
+    let inputs = args
+        .traces
+        .iter()
+        .chain(&args.order_files)
+        .map(PathBuf::as_path);
+    files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
+    let files = args.csv.iter().chain(&args.html);
+    let taken = |path: &Path| is_stdout(path);
+    Ok(!files.into_iter().any(|path| taken(path)))
+}

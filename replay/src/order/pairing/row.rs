@@ -1,0 +1,53 @@
+//! Shifts each row by its own amount, at which the tiles of the last frame had most in common. Near and distant
+//! surfaces need different shifts.
+
+use super::offset::Offset;
+use super::{Placement, Rule, tiles};
+use crate::order::cost::{Cost, Knows};
+use crate::order::known::ViewCounters;
+use crate::order::{Known, View};
+
+/// Pairs with one shift per row.
+#[derive(Debug)]
+pub struct Row {
+    shifts: fn(&ViewCounters) -> &[i32],
+}
+
+/// Compares primitives.
+pub const PRIMITIVES: Row = Row {
+    shifts: |of| &of.primitive_shift,
+};
+
+/// Compares lines.
+pub const LINES: Row = Row {
+    shifts: |of| &of.line_shift,
+};
+
+impl Rule for Row {
+    fn place(&self, eyes: [View; 2], known: &Known<'_>) -> Placement {
+        let Some(counted) = known.counted(eyes[0]) else {
+            return Offset.place(eyes, known);
+        };
+        let shifts = (self.shifts)(counted);
+        let cells = |eye: usize| -> Vec<[i32; 2]> {
+            let cell = |[x, y]: [u32; 2]| {
+                let shift = if eye == 1 {
+                    shifts.get(y as usize).copied().unwrap_or(0)
+                } else {
+                    0
+                };
+                [x as i32 + shift, y as i32]
+            };
+            tiles(eyes[eye]).map(cell).collect()
+        };
+        Placement::new([cells(0), cells(1)])
+    }
+
+    /// One byte per row.
+    fn cost(&self, [_, rows]: [u32; 2]) -> Cost {
+        Cost::state(4)
+            .with_table(rows.into())
+            .deciding_in(1)
+            .knowing(Knows::LastFrame)
+    }
+}

@@ -1,0 +1,179 @@
+//! Counters of a frame that a GPU can maintain, for the orders of the next frame.
+
+use super::expand::Work;
+use super::{Frame, StreamError, TileLines};
+use crate::order::{Counters, Known, TileRef, View, ViewCounters, Views, views};
+use formats::textrace::Pass;
+
+/// Maximum distance in columns between a row's best shift and the shift of infinity.
+const SHIFTS: i32 = 8;
+
+/// The distinct lines and the primitives of a tile, both ascending.
+#[derive(Default)]
+struct Own {
+    lines: Vec<u32>,
+    primitives: Vec<u32>,
+}
+
+impl Own {
+    fn of(tile: &TileLines) -> Self {
+        // Streams without all lines list the distinct lines of each quad.
+        let mut lines = match tile.lines.is_empty() {
+            true => tile.distinct.clone(),
+            false => tile.lines.clone(),
+        };
+        lines.sort_unstable();
+        lines.dedup();
+        let mut primitives: Vec<u32> = tile.list().map(|of| of.primitive).collect();
+        primitives.sort_unstable();
+        primitives.dedup();
+        Self { lines, primitives }
+    }
+}
+
+/// Counts the common members of two ascending lists without repeats.
+fn common(a: &[u32], b: &[u32]) -> u32 {
+    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
+    let mut count = 0;
+    while let (Some(x), Some(y)) = (a.peek(), b.peek()) {
+        let order = x.cmp(y);
+        count += u32::from(order.is_eq());
+        if order.is_le() {
+            a.next();
+        }
+        if order.is_ge() {
+            b.next();
+        }
+    }
+    count
+}
+
+/// The number of lines of the tiles of a row; a line counts once per tile.
+fn lines_of(row: &[Own]) -> u32 {
+    row.iter().map(|own| own.lines.len() as u32).sum()
+}
+
+fn nothing(view: View) -> ViewCounters {
+    ViewCounters {
+        view,
+        bytes: 0,
+        primitive_shift: Vec::new(),
+        line_shift: Vec::new(),
+    }
+}
+
+impl Frame<'_> {
+    /// Counts the views of a frame.
+    ///
+    /// # Errors
+    /// An unreadable tile.
+    pub fn counters(
+        &self,
+        passes: &[Pass],
+        number: u32,
+        known: &Known<'_>,
+    ) -> Result<Counters, StreamError> {
+        let mut work = self.expander().work();
+        let mut counted = Vec::new();
+        for phase in views(passes, number) {
+            counted.push(match phase {
+                Views::One(view) => self.count_view(view, known, &mut work)?,
+                Views::Pair(left, right) => self.count_pair([left, right], known, &mut work)?,
+            });
+        }
+        Ok(Counters { views: counted })
+    }
+
+    fn count_view(
+        &self,
+        view: View,
+        known: &Known<'_>,
+        work: &mut Work,
+    ) -> Result<ViewCounters, StreamError> {
+        let mut counted = nothing(view);
+        for y in 0..view.tiles[1] {
+            let lines = lines_of(&self.row(view, Some(y), work)?);
+            counted.bytes += u64::from(lines) * u64::from(known.line_bytes);
+        }
+        Ok(counted)
+    }
+
+    fn count_pair(
+        &self,
+        eyes: [View; 2],
+        known: &Known<'_>,
+        work: &mut Work,
+    ) -> Result<ViewCounters, StreamError> {
+        let offset = known.offset(eyes);
+        let rows = eyes[0].tiles[1];
+        let mut counted = nothing(eyes[0]);
+        for y in 0..rows {
+            let other = y.checked_add_signed(-offset[1]);
+            let left = self.row(eyes[0], Some(y), work)?;
+            let right = self.row(eyes[1], other, work)?;
+            let at = |x: usize, shift: i32| right.get(x.checked_add_signed(-shift as isize)?);
+            let agreement = |shift: i32, of: fn(&Own) -> &[u32]| -> u32 {
+                let tiles = left.iter().enumerate();
+                let pairs = tiles.filter_map(|(x, own)| Some((own, at(x, shift)?)));
+                pairs.map(|(l, r)| common(of(l), of(r))).sum()
+            };
+            let best = |of: fn(&Own) -> &[u32]| {
+                let shifts = offset[0] - SHIFTS..=offset[0] + SHIFTS;
+                // If equal, the shift nearest to that of infinity wins, then the larger one, which suits near
+                // surfaces.
+                shifts
+                    .max_by_key(|&shift| {
+                        let far = (shift - offset[0]).abs();
+                        (agreement(shift, of), -far, shift)
+                    })
+                    .unwrap_or(offset[0])
+            };
+            let both = lines_of(&left) + lines_of(&right);
+            let lines = both - agreement(offset[0], |own| &own.lines);
+            counted.bytes += u64::from(lines) * u64::from(known.line_bytes);
+            counted.line_shift.push(best(|own| &own.lines));
+            counted.primitive_shift.push(best(|own| &own.primitives));
+        }
+        Ok(counted)
+    }
+
+    /// The tiles of a row; none outside of the grid.
+    fn row(&self, view: View, y: Option<u32>, work: &mut Work) -> Result<Vec<Own>, StreamError> {
+        let Some(y) = y.filter(|&y| y < view.tiles[1]) else {
+            return Ok(Vec::new());
+        };
+        let mut row = Vec::with_capacity(view.tiles[0] as usize);
+        for x in 0..view.tiles[0] {
+            let at = TileRef {
+                pass: view.pass,
+                tile: y * view.tiles[0] + x,
+            };
+            row.push(match self.kept(at) {
+                Some(tile) => Own::of(tile),
+                None => {
+                    self.expander().expand(at, work)?;
+                    Own::of(&work.lines)
+                }
+            });
+        }
+        Ok(row)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::common;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    proptest! {
+        #[test]
+        fn members_of_both_lists_are_counted(
+            a in prop::collection::btree_set(0_u32..40, 0..30),
+            b in prop::collection::btree_set(0_u32..40, 0..30),
+        ) {
+            let list = |set: &BTreeSet<u32>| set.iter().copied().collect::<Vec<u32>>();
+            prop_assert_eq!(common(&list(&a), &list(&b)) as usize, a.intersection(&b).count());
+        }
+    }
+}
