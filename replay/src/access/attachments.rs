@@ -115,10 +115,9 @@ impl Attachments {
             let [first, bytes] = self.tile(view, base, pixel_bytes, tile);
             traffic.write(client, first, bytes);
         };
-        if machine.machine != FrameMachine::Immediate
-            && machine.store_depth {
-                write(Client::Depth, view.depth, machine.depth_bytes);
-            }
+        if machine.machine != FrameMachine::Immediate && machine.store_depth {
+            write(Client::Depth, view.depth, machine.depth_bytes);
+        }
         if machine.machine == FrameMachine::TileBasedGBuffer {
             write(Client::GBuffer, view.g_buffer, machine.g_buffer_bytes);
             if !machine.store_depth {

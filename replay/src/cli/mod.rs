@@ -13,6 +13,7 @@ pub mod info;
 mod locality;
 mod paper;
 mod parquet_arg;
+mod readings;
 mod report;
 mod reproject;
 mod run;
@@ -90,6 +91,8 @@ enum Command {
     Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
+    /// Set every reading of the SGRT paper's figure 3 beside the paper.
+    Readings(Box<readings::ReadingsArgs>),
     #[command(flatten)]
     Documents(Documents),
 }
@@ -115,6 +118,7 @@ pub fn main() -> ExitCode {
             Command::Techniques(args) => techniques::run(&args),
             Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
+            Command::Readings(args) => readings::run(&args),
             Command::Documents(documents) => documents.run::<Cli>(),
         },
     )

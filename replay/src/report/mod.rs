@@ -14,6 +14,7 @@ mod memory_columns;
 pub mod parquet;
 pub mod picture;
 pub mod plots;
+pub mod readings;
 pub mod run;
 pub mod sgrt;
 pub mod sweep;
