@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques accuracy stress test fuzz faults bench lint build deps golden figures clean
+.PHONY: demo techniques accuracy stress test fuzz faults bench lint build deps golden figures reproduce clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -55,9 +55,14 @@ deps:
 golden: deps build
 	scripts/golden.sh
 
-# Rewrites the tables of the documents from results/; review the diff.
-figures:
-	UPDATE_FIGURES=1 $(CARGO) test --release --locked -p parallax-tests --test figures
+# Rewrites the tables of the documents from results/, and the outputs of the tutorial; review the diff.
+figures: build
+	UPDATE_FIGURES=1 $(CARGO) test --release --locked -p parallax-tests --test figures --test tutorial
+
+# Measures the tables of the documents again and prints what moved (docs/use/real-scenes.md):
+#   make reproduce SCENES=folder SCRIPTS="policies levels"
+reproduce: deps build
+	@OUT="$(OUT)" scripts/reproduce.sh "$(SCENES)" $(SCRIPTS)
 
 clean:
 	$(CARGO) clean

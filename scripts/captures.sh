@@ -1,9 +1,9 @@
-# Sourced by the scripts that measure on real scenes, with the folder of scenes as `$1`: sets `scenes`, `bin` and `results` and works in a
+# Sourced by the scripts that measure on real scenes, with the folder of scenes as `$1`: sets `scenes`, `bin` and `results` (RESULTS, or results/) and works in a
 # temporary folder that is removed at the end.
 scenes=$(cd "${1:?the folder with the real scenes}" && pwd)
 cd "$(dirname "$0")/.."
 bin=$(cd "${CARGO_TARGET_DIR:-target}/release" && pwd)
-results=$PWD/results
+results=${RESULTS:-$PWD/results}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"

@@ -1,6 +1,6 @@
 //! Decoding speed and size of the tile encodings.
 //!
-//! `cargo bench -p formats` uses made-up tiles; `TEXTRACE=file cargo bench -p formats` a trace.
+//! `cargo bench -p formats` uses generated tiles; `TEXTRACE=file cargo bench -p formats` uses a trace.
 
 use criterion::{Criterion, Throughput};
 use formats::textrace::{
@@ -11,7 +11,7 @@ use formats::view::{FovTangents, FrameViews};
 use std::hint::black_box;
 use std::path::Path;
 
-/// Numbers that look random and are the same every time (splitmix64).
+/// Reproducible pseudo-random numbers (splitmix64).
 struct Random(u64);
 
 impl Random {
@@ -34,13 +34,13 @@ struct Plane {
 impl Plane {
     fn at(&self, x: f64, y: f64) -> [f32; 2] {
         let dot = |k: [f64; 3]| k[0] * x + k[1] * y + k[2];
-        // A shader sees f32 coordinates, so their rounding is in the differences, too.
+        // Shaders use f32 coordinates, so the differences include their rounding.
         self.numerators.map(|n| (dot(n) / dot(self.w)) as f32)
     }
 }
 
-/// A tile of a finely tessellated surface: cells of `cell` pixels, two triangles each, every
-/// triangle's plane a little different.
+/// A tile of a finely tessellated surface: cells of `cell` pixels with two triangles each. The planes of
+/// the triangles differ slightly.
 fn made_up_tile(random: &mut Random, cell: f64) -> Tile {
     let base = Plane {
         numerators: [0, 1].map(|_| {
@@ -114,7 +114,7 @@ fn record(plane: &Plane, x: u8, y: u8, mask: u8) -> QuadRecord {
     }
 }
 
-/// A trace of made-up tiles, half of them of small triangles.
+/// A trace of generated tiles, half of them with small triangles.
 fn made_up_trace() -> Textrace {
     let mut meta = TraceMeta::default();
     meta.frames.push(FrameViews::default());

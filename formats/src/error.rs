@@ -1,14 +1,14 @@
-//! Errors that name the file, the place in it, what was expected and what was found.
+//! Errors that name the file, the place, what was expected and what was found.
 
 use crate::container::ChunkTag;
 use std::fmt;
 use std::io;
 use thiserror::Error;
 
-/// Result of everything in this crate that reads or writes traces.
+/// Result of the functions that read or write traces.
 pub type Result<T> = std::result::Result<T, FormatError>;
 
-/// Part of a file that an error points into.
+/// Part of a file that an error refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The fixed header at the start.
@@ -17,7 +17,7 @@ pub enum Place {
     Directory,
     /// A chunk.
     Chunk(ChunkTag),
-    /// All that a file of plain accesses holds.
+    /// The whole content of a file of plain accesses.
     Contents,
     /// A line of text, counted from 1.
     Line(u64),
@@ -41,50 +41,50 @@ impl fmt::Display for Place {
     }
 }
 
-/// Why a trace could not be read or written.
+/// Errors of reading or writing a trace.
 #[derive(Debug, Error)]
 pub enum FormatError {
-    /// The operating system refused.
+    /// An error of the operating system.
     #[error("{file}: cannot {action}")]
     Io {
-        /// File as given.
+        /// File as named by the user.
         file: String,
-        /// What was tried, `open`, `write`, ...
+        /// The action that failed: `open`, `write`, ...
         action: &'static str,
-        /// The system's reason.
+        /// The system's error.
         #[source]
         source: io::Error,
     },
-    /// The bytes are not what the specification asks for.
+    /// Bytes that violate the specification.
     #[error("{file}: {place} at byte {offset}: expected {expected}, found {found}")]
     Malformed {
-        /// File as given.
+        /// File as named by the user.
         file: String,
         /// Part of the file.
         place: Place,
         /// Offset from the start of the file.
         offset: u64,
-        /// What the specification asks for there.
+        /// What the specification requires there.
         expected: String,
-        /// What is there.
+        /// What was found there.
         found: String,
     },
-    /// The caller asked for something that the trace does not have.
+    /// A request for something that the trace does not have.
     #[error("{file}: no {what} {index}, the trace has {count}")]
     OutOfRange {
-        /// File as given.
+        /// File as named by the user.
         file: String,
         /// `pass`, `tile`, ...
         what: &'static str,
-        /// What was asked for.
+        /// Requested index.
         index: u64,
-        /// How many there are.
+        /// Number of available items.
         count: u64,
     },
-    /// The data that should be written breaks an invariant of the format.
+    /// Data to be written that violates an invariant of the format.
     #[error("cannot write {what}: expected {expected}, found {found}")]
     Unwritable {
-        /// What was to be written, `tile record 12`, `draw 3`, ...
+        /// What was to be written: `tile record 12`, `draw 3`, ...
         what: String,
         /// The invariant.
         expected: String,
@@ -102,7 +102,7 @@ impl FormatError {
         }
     }
 
-    /// Offset of the first bad byte, where the error has one.
+    /// Offset of the first bad byte, if the error has one.
     #[must_use]
     pub fn offset(&self) -> Option<u64> {
         match self {
@@ -112,19 +112,19 @@ impl FormatError {
     }
 }
 
-/// A rule of the format that data breaks, whether they are read or about to be written.
+/// A violated rule of the format, in data that were read or are to be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Broken {
-    /// What breaks it: `run 3`, `record 12`, `the display`.
+    /// What violates it: `run 3`, `record 12`, `the display`.
     pub what: String,
     /// The rule.
     pub expected: String,
-    /// What is there instead.
+    /// What was found.
     pub found: String,
 }
 
 impl Broken {
-    /// Something that breaks a rule.
+    /// Describes a violated rule.
     pub fn new(what: impl Into<String>, expected: impl Into<String>, found: impl ToString) -> Self {
         Self {
             what: what.into(),
@@ -133,7 +133,7 @@ impl Broken {
         }
     }
 
-    /// The error of whoever wanted to write it.
+    /// The corresponding error for data to be written.
     #[must_use]
     pub fn unwritable(self) -> FormatError {
         FormatError::Unwritable {

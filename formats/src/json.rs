@@ -1,4 +1,4 @@
-//! The JSON chunks: what both kinds of trace ask of them.
+//! Reads and writes JSON chunks of both kinds of trace.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use crate::container::{ChunkTag, Container};
@@ -8,10 +8,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::HashSet;
 use std::fmt;
 
-/// Writes a value that must read back as it is.
+/// Writes a value that must be unchanged when read back.
 ///
 /// # Errors
-/// It has a number that JSON cannot hold, such as NaN.
+/// The value has a number that JSON cannot hold, such as NaN.
 pub fn write<T: Serialize + DeserializeOwned + PartialEq>(
     what: &str,
     value: &T,
@@ -32,7 +32,7 @@ pub fn write<T: Serialize + DeserializeOwned + PartialEq>(
 /// Reads a chunk.
 ///
 /// # Errors
-/// It is damaged or not the JSON of a `T`; the error names the byte.
+/// The chunk is damaged or not the JSON of a `T`; the error names the byte.
 pub fn read<T: DeserializeOwned>(container: &Container, tag: ChunkTag, what: &str) -> Result<T> {
     let json = container.chunk(tag)?;
     parse(json).map_err(|error| {
@@ -51,8 +51,8 @@ fn parse<T: DeserializeOwned>(json: &[u8]) -> serde_json::Result<T> {
     serde_json::from_slice(json)
 }
 
-/// Any JSON whose objects name no key twice and whose numbers are finite as `f32`: what a type's
-/// own parser lets pass where it skips unknown keys or narrows numbers.
+/// Checks that no JSON object has duplicate keys and that all numbers are finite as `f32`. A type's own
+/// parser does not check skipped keys and narrowed numbers.
 struct Sound;
 
 impl<'de> Deserialize<'de> for Sound {

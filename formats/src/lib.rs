@@ -1,8 +1,8 @@
 //! The Parallax trace files.
 //!
-//! Everything that `tracegen` (scene to trace) and `replay` (trace to answer) share is in this
-//! crate, and the files it describes are the only joint between the two programs. FORMAT.md in
-//! the repository root is the byte-level specification.
+//! This crate contains the code that `tracegen` (scene to trace) and `replay` (trace to results) share. The
+//! two programs communicate only through the files it describes. FORMAT.md in the repository root is the
+//! byte-level specification.
 
 pub mod container;
 pub mod error;

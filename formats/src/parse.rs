@@ -1,4 +1,4 @@
-//! What every nom parser of the crate shares: a located error and checked reads.
+//! Types and functions that all nom parsers of the crate share: a located error and checked reads.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use crate::error::{FormatError, Place};
@@ -6,7 +6,7 @@ use nom::error::{ContextError, ErrorKind, ParseError};
 use nom::{IResult, Parser};
 use std::fmt::Display;
 
-/// A parser's failure: where it stood and why, turned into a `FormatError` by [`locate`].
+/// A parser's failure: its position and reason. [`locate`] turns it into a `FormatError`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault<'a> {
     rest: &'a [u8],
@@ -51,7 +51,7 @@ impl<'a> ContextError<&'a [u8]> for Fault<'a> {
     }
 }
 
-/// Bytes that parsers take from the front, one after the other.
+/// Remaining bytes of an input.
 #[derive(Clone, Copy, Debug)]
 pub struct Cursor<'a>(&'a [u8]);
 
@@ -66,10 +66,10 @@ impl<'a> Cursor<'a> {
         self.0
     }
 
-    /// Runs a parser and moves behind what it took.
+    /// Runs a parser and advances past the bytes it used.
     ///
     /// # Errors
-    /// Those of the parser.
+    /// Errors of the parser.
     #[inline]
     pub fn parse<T>(
         &mut self,
@@ -87,7 +87,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Fails at `at` unless `holds`.
+/// Fails at `at` if `holds` is false.
 pub fn ensure<'a>(
     at: &'a [u8],
     holds: bool,
@@ -101,8 +101,8 @@ pub fn ensure<'a>(
     }
 }
 
-/// A `u32` count of items that take at least `item_bytes` each: refused, before anything is
-/// allocated, when the remaining bytes cannot hold that many.
+/// A `u32` count of items that take at least `item_bytes` each. Counts that the remaining bytes cannot hold
+/// are refused before any allocation.
 pub fn count<'a>(
     what: &'static str,
     item_bytes: usize,
@@ -122,7 +122,7 @@ pub fn count<'a>(
     }
 }
 
-/// Reserved bytes, which must be zero so that a later version can give them a meaning.
+/// Reserved bytes. They must be zero, so that a later version can define them.
 pub fn zero(input: &[u8], bytes: usize) -> Parsed<'_, ()> {
     let (rest, reserved) =
         nom::error::context("reserved bytes", nom::bytes::complete::take(bytes)).parse(input)?;
@@ -135,7 +135,7 @@ pub fn zero(input: &[u8], bytes: usize) -> Parsed<'_, ()> {
     Ok((rest, ()))
 }
 
-/// Runs `parser` over the whole of `bytes`, which start at `offset` of the file.
+/// Runs `parser` over all of `bytes`, which start at `offset` of the file.
 pub fn parse_all<'a, T>(
     file: &str,
     place: Place,
@@ -147,7 +147,7 @@ pub fn parse_all<'a, T>(
         Ok(([], value)) => return Ok(value),
         Ok((rest, _)) => Fault::new(rest, "the end", format_args!("{} more bytes", rest.len())),
         Err(nom::Err::Error(fault) | nom::Err::Failure(fault)) => fault,
-        // Only streaming parsers ask for more, and none is used here.
+        // Only streaming parsers ask for more input, and none is used here.
         Err(nom::Err::Incomplete(_)) => Fault::new(&[], "more bytes", "the end"),
     };
     let consumed = bytes.len().saturating_sub(outcome.rest.len());

@@ -1,5 +1,5 @@
-//! FORMAT.md against the code: sizes, offsets, and the order of the chunks. That the text says all
-//! a reader needs is what `tests/independent/` shows.
+//! Compares FORMAT.md with the code: sizes, offsets, and the order of the chunks. `tests/independent/`
+//! shows that the text is sufficient to write a reader.
 
 use crate::container::{CHUNK_ALIGNMENT_BYTES, DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
 use crate::raytrace::RAY_INDEX_ENTRY_BYTES;
@@ -22,7 +22,7 @@ fn table(heading: &str) -> Vec<Vec<&'static str>> {
         .collect()
 }
 
-/// Size of a structure from its table of offset, type and field; offsets must have no gaps.
+/// Size of a structure from its table of offset, type and field; checks that offsets have no gaps.
 fn size(heading: &str) -> usize {
     let mut end = 0;
     for row in table(heading) {
@@ -39,7 +39,7 @@ fn size(heading: &str) -> usize {
 }
 
 #[test]
-fn documented_sizes_are_the_codes() {
+fn documented_sizes_equal_those_of_the_code() {
     let code = HashMap::from([
         ("header", HEADER_BYTES),
         ("directory entry", DIRECTORY_ENTRY_BYTES),

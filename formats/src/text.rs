@@ -1,18 +1,18 @@
-//! Text from files, made fit for a terminal.
+//! Escapes text from files for terminals.
 
 use std::borrow::Cow;
 
-/// The text with every character escaped that steers a terminal or turns the reading direction:
-/// control characters (C0, DEL, C1), line separators and bidirectional marks.
+/// Escapes every character that controls a terminal or changes the reading direction: control characters
+/// (C0, DEL, C1), line separators and bidirectional marks.
 ///
-/// Names of materials, cameras, files and passes pass through here before they are stored in a
-/// scene or shown in a message.
+/// Names of materials, cameras, files and passes are escaped before they are stored in a scene or shown in
+/// a message.
 #[must_use]
 pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, steers)
 }
 
-/// [`printable`] for whole messages, which may have several lines and tabs.
+/// [`printable`] for whole messages, which may have line breaks and tabs.
 #[must_use]
 pub fn printable_lines(message: &str) -> Cow<'_, str> {
     escaped(message, |c| steers(c) && c != '\n' && c != '\t')
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_steers_a_terminal_is_escaped_and_the_rest_stays() {
+    fn control_characters_are_escaped_and_the_rest_is_unchanged() {
         for (text, expected) in [
             ("Größe 漢字 #25", "Größe 漢字 #25"),
             ("a\x1b[31mb", "a\\u{1b}[31mb"),

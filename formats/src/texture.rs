@@ -1,4 +1,4 @@
-//! The texture table: what a trace says about each texture, independent of any memory layout.
+//! The texture table: properties of each texture, independent of any memory layout.
 
 use serde::{Deserialize, Serialize};
 
@@ -38,7 +38,7 @@ pub enum TexelFormat {
     R32f = 41,
 }
 
-/// How coordinates outside 0..1 are brought back.
+/// Handling of coordinates outside 0..1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
@@ -75,7 +75,7 @@ pub enum MipFilter {
     Linear = 2,
 }
 
-/// A sampler's state as far as it decides which texels are read.
+/// The part of a sampler's state that determines which texels are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sampler {
     /// Wrap mode in u and v.
@@ -89,14 +89,14 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Repeat, trilinear: glTF's usual sampler and the default of every model here.
+    /// Repeat, trilinear: glTF's usual sampler and the default of the models.
     pub const TRILINEAR_REPEAT: Self = Self {
         wrap: [Wrap::Repeat; 2],
         mag: Filter::Linear,
         min: Filter::Linear,
         mip: MipFilter::Linear,
     };
-    /// Clamped, bilinear, without mip levels: a shadow map's.
+    /// Clamped, bilinear, without mip levels, for shadow maps.
     pub const SHADOW: Self = Self {
         wrap: [Wrap::ClampToEdge; 2],
         mag: Filter::Linear,

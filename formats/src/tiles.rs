@@ -1,5 +1,5 @@
-//! The tiles of both kinds of trace: they fill one chunk in the order of an index, and each has
-//! its own checksum, so that it can be read alone.
+//! The tiles of both kinds of trace. They fill one chunk in the order of an index. Each tile has its own
+//! checksum, so that it can be read alone.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use crate::container::{ChunkTag, Container};
@@ -8,7 +8,7 @@ use crate::parse::{Parsed, parse_all};
 use nom::Parser;
 use nom::number::complete::{le_u32, le_u64};
 
-/// Where a tile lies: the first 16 bytes of every index entry.
+/// Position of a tile: the first 16 bytes of every index entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileSpan {
     /// Offset in the chunk of tiles.
@@ -55,12 +55,11 @@ pub struct TileChunk<'a> {
 }
 
 impl TileChunk<'_> {
-    /// Checks that the tiles fill their chunk in index order, so that none overlap and no byte
-    /// is unaccounted for, and the checksums of all chunks. `spans` has every slot of the index,
-    /// `None` where it has no tile.
+    /// Checks that the tiles fill their chunk in index order without overlap or gap, and the checksums of
+    /// all chunks. `spans` has every slot of the index, `None` for slots without tile.
     ///
     /// # Errors
-    /// The first entry out of place; the first damaged tile, or else the damaged chunk.
+    /// The first entry that is out of place; the first damaged tile, or else the damaged chunk.
     pub fn check(&self, spans: impl Iterator<Item = Option<TileSpan>> + Clone) -> Result<()> {
         let Self {
             container, index, ..
@@ -86,7 +85,7 @@ impl TileChunk<'_> {
             return Err(container.malformed(index, 0, expected, found));
         }
         if container.chunk(self.tiles).is_err() {
-            // A tile's own checksum says more closely where the damage is.
+            // The tiles' checksums are checked first, because they locate damage more precisely.
             for span in spans.flatten() {
                 self.bytes(&span)?;
             }
@@ -97,7 +96,7 @@ impl TileChunk<'_> {
     /// The bytes of a tile.
     ///
     /// # Errors
-    /// They are damaged.
+    /// The bytes are damaged.
     fn bytes(&self, span: &TileSpan) -> Result<&[u8]> {
         let chunk = self.container.chunk_unchecked(self.tiles)?;
         // The index was checked against the chunk when the file was opened.
@@ -116,10 +115,10 @@ impl TileChunk<'_> {
             .malformed(self.tiles, span.offset, expected, found))
     }
 
-    /// Runs a parser over the whole of a tile.
+    /// Runs a parser over a complete tile.
     ///
     /// # Errors
-    /// The tile is damaged, or not what the parser expects; the error names the byte.
+    /// The tile is damaged, or rejected by the parser; the error names the byte.
     pub fn parse<T>(
         &self,
         span: &TileSpan,

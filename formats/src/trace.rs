@@ -6,7 +6,7 @@ use crate::raytrace::Raytrace;
 use crate::textrace::Textrace;
 use std::path::Path;
 
-/// An opened trace: everything but what its tiles hold has been checked.
+/// An open trace; everything except the content of its tiles has been checked.
 #[derive(Debug)]
 pub enum Trace {
     /// Texture addresses.
@@ -19,7 +19,7 @@ impl Trace {
     /// Opens a file or a pipe.
     ///
     /// # Errors
-    /// When it cannot be read or is malformed; the error names the place.
+    /// The file cannot be read or is malformed; the error names the place.
     pub fn open(path: &Path) -> Result<Self> {
         Self::from_container(Container::open(path)?)
     }
@@ -27,7 +27,7 @@ impl Trace {
     /// Reads a trace from memory.
     ///
     /// # Errors
-    /// When the bytes are malformed.
+    /// The bytes are malformed.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
         Self::from_container(Container::from_bytes(bytes)?)
     }
@@ -39,7 +39,7 @@ impl Trace {
         })
     }
 
-    /// CRC-32 of the content, which names the trace in results.
+    /// CRC-32 of the content, which identifies the trace in results.
     #[must_use]
     pub fn content_checksum(&self) -> u32 {
         match self {

@@ -1,9 +1,9 @@
-//! Numbers of variable length (LEB128) and differences of either sign (zigzag).
+//! Variable-length numbers (LEB128) and signed differences (zigzag).
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use crate::parse::{Cursor, Fault, Parsed};
 
-/// Appends a number: seven bits a byte, the lowest first; the top bit says that more follow.
+/// Appends a number: seven bits per byte, the lowest first. The top bit marks that more bytes follow.
 pub fn put(mut value: u64, bytes: &mut Vec<u8>) {
     while value >= 0x80 {
         bytes.push(value.to_le_bytes()[0] | 0x80);
@@ -12,7 +12,7 @@ pub fn put(mut value: u64, bytes: &mut Vec<u8>) {
     bytes.push(value.to_le_bytes()[0]);
 }
 
-/// Reads a number below `2^bits` that takes no more bytes than it must.
+/// Reads a number below `2^bits` in its shortest encoding.
 #[inline]
 pub fn take<'a>(what: &'static str, bits: u32, input: &'a [u8]) -> Parsed<'a, u64> {
     let mut value = 0u64;
@@ -34,7 +34,7 @@ pub fn take<'a>(what: &'static str, bits: u32, input: &'a [u8]) -> Parsed<'a, u6
     )))
 }
 
-/// Small numbers of either sign as small numbers: 0, -1, 1, -2, ...
+/// Maps small numbers of either sign to small numbers: 0, -1, 1, -2, ...
 #[inline]
 pub const fn zigzag(value: i64) -> u64 {
     (value << 1 ^ value >> 63).cast_unsigned()
@@ -63,12 +63,12 @@ pub fn put_difference(previous: &mut u32, value: u32, bytes: &mut Vec<u8>) {
     put(zigzag(difference.into()), bytes);
 }
 
-/// Reading numbers one after the other.
+/// Reads consecutive numbers.
 impl<'a> Cursor<'a> {
     /// The next number, below `2^bits`.
     ///
     /// # Errors
-    /// The bytes end, or the number is too large or too long.
+    /// The bytes end, or the number is too large or its encoding too long.
     #[inline]
     pub fn number(&mut self, what: &'static str, bits: u32) -> Result<u64, nom::Err<Fault<'a>>> {
         self.parse(|input| take(what, bits, input))
@@ -77,7 +77,7 @@ impl<'a> Cursor<'a> {
     /// The next number of 32 bits.
     ///
     /// # Errors
-    /// As [`Self::number`].
+    /// See [`Self::number`].
     #[inline]
     pub fn number_u32(&mut self, what: &'static str) -> Result<u32, nom::Err<Fault<'a>>> {
         self.number(what, 32).map(low_u32)
@@ -86,7 +86,7 @@ impl<'a> Cursor<'a> {
     /// The next value of a column by its difference from the one before it.
     ///
     /// # Errors
-    /// As [`Self::number`].
+    /// See [`Self::number`].
     #[inline]
     pub fn difference(
         &mut self,
@@ -106,7 +106,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn numbers_and_differences_come_back(values in prop::collection::vec(any::<u32>(), 1..40)) {
+        fn numbers_and_differences_are_read_as_written(values in prop::collection::vec(any::<u32>(), 1..40)) {
             let mut bytes = Vec::new();
             let mut previous = 0;
             for value in &values {
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_cut_too_long_or_too_large_are_refused() {
+    fn numbers_that_are_incomplete_too_long_or_too_large_are_refused() {
         let refused: [&[u8]; 6] = [
             &[],
             &[0x80],

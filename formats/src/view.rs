@@ -1,4 +1,4 @@
-//! Head-mounted displays, eyes and tiles: how a stereo pair looks at a scene.
+//! Head-mounted displays, eyes and tiles: the views of a stereo pair.
 
 use crate::error::{Broken, ensure};
 use serde::{Deserialize, Serialize};
@@ -8,13 +8,13 @@ pub const TILE_SIZE_PX: u32 = 16;
 
 /// Largest width and height of an eye's image.
 pub const MAX_EYE_SIZE_PX: u32 = 16384;
-/// Largest tangent of a half-angle, to either side.
+/// Largest absolute tangent of a half-angle.
 pub const MAX_TANGENT: f32 = 100.0;
-/// Least sum of the tangents of two opposite half-angles.
+/// Smallest sum of the tangents of two opposite half-angles.
 pub const MIN_TANGENT_SUM: f32 = 1e-4;
-/// Largest distance between the eyes in metres: a scene may be in millimetres or in kilometres.
+/// Largest distance between the eyes in metres; scenes may be in millimetres or in kilometres.
 pub const MAX_IPD_M: f32 = 1e6;
-/// Largest yaw of an eye in degrees, to either side.
+/// Largest absolute yaw of an eye in degrees.
 pub const MAX_CANT_DEG: f32 = 45.0;
 
 /// Which eye a view belongs to. Monoscopic passes (a shadow map) have no eye.
@@ -50,7 +50,7 @@ pub struct FovTangents {
 }
 
 impl FovTangents {
-    /// Checks that the frustum has an inside and that no arithmetic with it overflows.
+    /// Checks that the frustum is not empty and that computations with it do not overflow.
     ///
     /// # Errors
     /// The tangent or sum that is out of range.
@@ -79,20 +79,20 @@ impl FovTangents {
     }
 }
 
-/// The part of an eye's picture that the user sees through the round lens: a circle in the eye's
-/// tangent space (x right, y up, at distance 1 along the viewing direction).
+/// The visible area of an eye's picture behind the round lens: a circle in the eye's tangent space (x
+/// right, y up, at distance 1 along the viewing direction).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lens {
-    /// Tangents of the centre, right and up of straight ahead.
+    /// Tangents of the centre, to the right and up from straight ahead.
     pub center: [f32; 2],
     /// Radius, as a tangent.
     pub radius: f32,
 }
 
 impl Lens {
-    /// Where nothing is known of the lens: a circle around the viewing direction that touches the
-    /// edges of the picture's longer axis (their mean where the two differ). It hides the corners
-    /// of any picture and, of a square and symmetric one, 1 - pi/4 of all pixels.
+    /// The default for an unknown lens: a circle around the viewing direction that touches the edges of the
+    /// picture's longer axis (their mean if the two differ). It hides the corners of any picture; for a
+    /// square and symmetric one, 1 - pi/4 of all pixels.
     #[must_use]
     pub fn of(fov: &FovTangents) -> Self {
         let longer = (fov.left + fov.right).max(fov.up + fov.down);
@@ -102,14 +102,14 @@ impl Lens {
         }
     }
 
-    /// Whether the tangents (right, up) are seen; the circle itself is.
+    /// Whether the direction with these tangents (right, up) is visible; the circle itself is.
     #[must_use]
     pub fn contains(&self, [x, y]: [f32; 2]) -> bool {
         let [dx, dy] = [x - self.center[0], y - self.center[1]].map(f64::from);
         dx * dx + dy * dy <= f64::from(self.radius) * f64::from(self.radius)
     }
 
-    /// Whether a pixel's centre is seen; columns count from the left, rows from the top.
+    /// Whether a pixel's centre is visible; columns count from the left, rows from the top.
     #[must_use]
     pub fn pixel_visible(&self, fov: &FovTangents, size_px: [u32; 2], pixel: [u32; 2]) -> bool {
         let along = |axis: usize, from: f32, to: f32| {
@@ -119,10 +119,10 @@ impl Lens {
         self.contains([along(0, -fov.left, fov.right), along(1, fov.up, -fov.down)])
     }
 
-    /// Checks that there is something to see.
+    /// Checks that the visible area is not empty.
     ///
     /// # Errors
-    /// The figure that is out of range.
+    /// The value that is out of range.
     pub fn check(&self) -> Result<(), Broken> {
         let figures = [self.center[0], self.center[1], self.radius];
         let fits = figures.iter().all(|t| t.abs() <= MAX_TANGENT) && self.radius > 0.0;
@@ -159,9 +159,9 @@ pub(crate) fn check_eye_size(size_px: [u32; 2]) -> Result<(), Broken> {
 pub struct Hmd {
     /// Preset name, or `custom`.
     pub name: String,
-    /// Where the figures come from, or `unverified`.
+    /// Source of the figures, or `unverified`.
     pub source: String,
-    /// Width and height of one eye's image in pixels.
+    /// Width and height of the image of each eye in pixels.
     pub eye_size_px: [u32; 2],
     /// Frustum of the left and of the right eye.
     pub fov: [FovTangents; 2],
@@ -175,7 +175,7 @@ impl Hmd {
     /// Checks that every figure is in its range.
     ///
     /// # Errors
-    /// The first figure that is not, and its range.
+    /// The first figure that is out of range, and its range.
     pub fn check(&self) -> Result<(), Broken> {
         check_eye_size(self.eye_size_px)?;
         for fov in &self.fov {
@@ -205,12 +205,12 @@ pub struct EyeView {
     pub world_to_eye: [[f32; 4]; 4],
     /// Eye space to clip space; depth 0 to 1, y up.
     pub eye_to_clip: [[f32; 4]; 4],
-    /// Eye position in world space, metres; in a trace relative to its `origin_m`.
+    /// Eye position in world space, metres; in a trace, relative to its `origin_m`.
     pub position: [f32; 3],
 }
 
 impl Default for EyeView {
-    /// At the origin, with clip space for a view: what a made-up trace names.
+    /// A view at the origin with clip space as view, for generated traces.
     fn default() -> Self {
         let identity = [
             [1.0, 0.0, 0.0, 0.0],
@@ -240,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_square_pictures_lens_shows_a_circle_of_its_pixels() {
+    fn the_lens_of_a_square_picture_shows_a_circle_of_its_pixels() {
         let fov = FovTangents {
             left: 1.2,
             right: 1.2,
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn an_off_centre_lens_shows_what_lies_on_its_side() {
+    fn an_off_centre_lens_shows_the_pixels_on_its_side() {
         let fov = FovTangents {
             left: 1.0,
             right: 1.0,
@@ -269,7 +269,7 @@ mod tests {
             center: [0.5, 0.5],
             radius: 0.3,
         };
-        // Right and up of the middle: rows count downwards.
+        // To the right of and above the centre; rows count downwards.
         assert!(lens.pixel_visible(&fov, [100, 100], [75, 25]));
         assert!(!lens.pixel_visible(&fov, [100, 100], [75, 75]));
         assert!(!lens.pixel_visible(&fov, [100, 100], [25, 25]));

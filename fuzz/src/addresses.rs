@@ -1,6 +1,6 @@
 //! Plain addresses of every form and compression.
 //!
-//! The first byte of an input chooses the form, the rest is the file.
+//! The first byte of an input selects the form; the rest is the file.
 
 use crate::Change;
 use flate2::read::GzDecoder;
@@ -12,16 +12,16 @@ use replay::addresses::{KindSet, replay};
 use replay::config::RunConfig;
 use std::io::{Read, Write};
 
-/// Bytes that are changed of what an input holds compressed: zeros shrink to a thousandth.
+/// Limit on changed bytes in compressed content, because zeros compress to a thousandth.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// Accesses that are read: compressed, a small file holds any number.
+/// Limit on accesses read, because a small compressed file can hold any number.
 const MOST_ACCESSES: usize = 1 << 20;
 
-/// Bytes that are replayed: each access may be of a megabyte.
+/// Limit on bytes replayed, because an access can have a megabyte.
 const MOST_REPLAYED: u64 = 1 << 24;
 
-/// Hands over few bytes at a time, as pipes do.
+/// Returns few bytes per read, as pipes do.
 struct Dripping<'a>(&'a [u8], usize);
 
 impl Read for Dripping<'_> {
@@ -38,7 +38,7 @@ fn form(bytes: &[u8]) -> (Option<AddressForm>, &[u8]) {
     (AddressForm::ALL.get(usize::from(choice % 8)).copied(), rest)
 }
 
-/// Why a reader stopped.
+/// Reason why a reader stopped.
 #[derive(Debug, PartialEq)]
 struct Stopped(String);
 
@@ -48,13 +48,13 @@ impl From<FormatError> for Stopped {
     }
 }
 
-/// What a reader of accesses saw.
+/// Summary of the accesses of a reader.
 #[derive(Debug, PartialEq)]
 struct Seen {
     found: Found,
-    /// Bytes of all accesses.
+    /// Total size of all accesses.
     bytes: u64,
-    /// Depends on every access and on their order.
+    /// Hash of all accesses in order.
     sum: u64,
 }
 
@@ -98,7 +98,7 @@ fn read(bytes: &[u8], form: Option<AddressForm>, drip: usize) -> Result<Seen, St
     })
 }
 
-/// Bytes behind a compression, as far as they are read.
+/// Decompressed bytes, as far as they are readable.
 fn inflated(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut inside = Vec::new();
     let reader = GzDecoder::new(bytes);
@@ -106,7 +106,7 @@ fn inflated(bytes: &[u8]) -> Option<Vec<u8>> {
     Some(inside)
 }
 
-/// Reads the accesses in large and in small pieces, which must not matter, and replays them.
+/// Reads the accesses in large and in small pieces, compares the results, and replays them.
 pub fn run(bytes: &[u8]) {
     let (form, bytes) = form(bytes);
     let all = read(bytes, form, usize::MAX);
@@ -132,7 +132,7 @@ pub fn run(bytes: &[u8]) {
     }
 }
 
-/// Changes the file, or what is compressed in it.
+/// Changes the file, or its compressed content.
 pub fn mutate(bytes: &[u8], most_bytes: usize, seed: u32, change: Change<'_>) -> Vec<u8> {
     let inside = match bytes {
         [_, rest @ ..] if !seed.is_multiple_of(4) => inflated(rest),

@@ -1,4 +1,4 @@
-//! TOML: configurations and experiments of `replay`, manifests of `tracegen sweep`.
+//! TOML files: configurations and experiments of `replay`, manifests of `tracegen sweep`.
 
 use replay::config::RunConfig;
 use replay::experiment::{ExperimentFile, MOST_POINTS};

@@ -1,4 +1,4 @@
-//! glTF and GLB, with their images, down to the ray tracer's triangles.
+//! glTF and GLB with their images, up to the ray tracer's triangles.
 
 use crate::Change;
 use rays::bvh::Bvh;
@@ -8,7 +8,7 @@ use std::cell::OnceCell;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// Puts files into this thread's folder.
+/// Writes files into this thread's folder.
 pub fn with_files(files: &[(&str, &[u8])], work: impl FnOnce(&Path)) {
     thread_local! {
         static FOLDER: OnceCell<TempDir> = const { OnceCell::new() };
@@ -22,7 +22,7 @@ pub fn with_files(files: &[(&str, &[u8])], work: impl FnOnce(&Path)) {
     });
 }
 
-/// Loads a file as a GLB where it says that it is one, else as text.
+/// Loads a file as GLB if it has the magic number, else as text.
 pub fn run(bytes: &[u8]) {
     let name = match bytes.starts_with(b"glTF") {
         true => "scene.glb",
@@ -35,7 +35,7 @@ pub fn run(bytes: &[u8]) {
     });
 }
 
-/// Loads a scene with its texels and makes triangles and a hierarchy of it.
+/// Loads a scene with its texels and builds its triangles and a hierarchy.
 pub fn load(file: &Path) {
     let loaded = match load_file(file, &LoadOptions::ALL) {
         Ok(loaded) => loaded,
@@ -61,7 +61,7 @@ pub fn load(file: &Path) {
     }
 }
 
-/// What every renderer relies on.
+/// Checks the invariants that renderers rely on.
 fn check(scene: &Scene) {
     for mesh in &scene.meshes {
         let count = mesh.positions.len();
@@ -91,7 +91,7 @@ fn check(scene: &Scene) {
     assert!(!scene.cameras.is_empty() && !scene.lights.is_empty());
 }
 
-/// Changes the text, or one of a GLB's two chunks; the lengths before them follow.
+/// Changes the text, or one of the two chunks of a GLB and the lengths before them.
 pub fn mutate(bytes: &[u8], most_bytes: usize, seed: u32, change: Change<'_>) -> Vec<u8> {
     let chunks = (!seed.is_multiple_of(8))
         .then(|| glb_chunks(bytes))

@@ -1,7 +1,8 @@
-//! The plain kernel of the ray tracer against the AVX2 one and against all triangles one by one.
+//! Compares the portable kernel of the ray tracer with the AVX2 kernel and with tests of all triangles one
+//! by one.
 //!
-//! An input is rays and triangles: a byte that says how numbers are read, a byte with the number of
-//! rays, then numbers, six for a ray and nine for a triangle.
+//! An input has rays and triangles: a byte that selects the form of numbers, a byte with the number of
+//! rays, then numbers, six for each ray and nine for each triangle.
 
 use formats::raytrace::TraversalKind;
 use glam::Vec3;
@@ -10,11 +11,11 @@ use rays::bvh::{AllOpaque, AlphaTest, Bvh, Instructions, RayHit, TraversalStack}
 use rays::ray::{LARGEST_COORDINATE, Ray};
 use rays::reference::brute_force_f32;
 
-/// More would take long without finding more.
+/// More triangles would take longer without finding more.
 const MOST_TRIANGLES: usize = 24;
 const MOST_RAYS: usize = 8;
 
-/// Lets rays pass every other triangle.
+/// Ignores every other triangle.
 struct EveryOther;
 
 impl AlphaTest for EveryOther {
@@ -27,8 +28,8 @@ impl AlphaTest for EveryOther {
 struct Numbers<'a>(&'a [u8], u8);
 
 impl Numbers<'_> {
-    /// The next one: any bits, or small whole numbers (where edges and vertices are hit exactly),
-    /// or these far out or close together.
+    /// The next number: any bits, or small integers (which hit edges and vertices exactly), or such
+    /// integers far from the origin or close together.
     fn next(&mut self) -> Option<f32> {
         match self.1 % 4 {
             0 => {
@@ -65,7 +66,7 @@ fn found(bvh: &Bvh, tree: TraversalKind, ray: &Ray, alpha: &impl AlphaTest) -> F
     (hit, any, counts)
 }
 
-/// Equal hits, to the bit, and equal counts.
+/// Checks that hits are bit-identical and counts are equal.
 pub fn run(bytes: &[u8]) {
     let [way, rays, rest @ ..] = bytes else {
         return;
@@ -105,7 +106,7 @@ pub fn run(bytes: &[u8]) {
     }
 }
 
-/// The nearest of the triangles that the hierarchy keeps.
+/// The nearest hit among the triangles of the hierarchy.
 fn one_by_one(triangles: &[[[f32; 3]; 3]], ray: &Ray) -> Option<(u32, u32)> {
     let fits = |t: &[[f32; 3]; 3]| {
         let numbers = t.as_flattened().iter();

@@ -1,13 +1,13 @@
-//! What a fuzzer runs: every reader of bytes from outside, and both kernels of the ray tracer.
+//! Fuzz targets: every reader of external bytes, and both kernels of the ray tracer.
 //!
-//! `make fuzz` runs the targets under libFuzzer; `tests/corpus.rs` runs the committed corpus, and
-//! changed copies of it, on every `make test`.
+//! `make fuzz` runs the targets with libFuzzer; `tests/corpus.rs` runs the committed corpus, and changed
+//! copies of it, in every `make test`.
 
 pub mod limits;
 
 mod addresses;
 mod kernels;
-// The file alone: the rest of `tracegen` would bring the graphics driver's crates along.
+// Only this file, because the rest of `tracegen` depends on the graphics driver's crates.
 #[path = "../../tracegen/src/captures.rs"]
 #[allow(dead_code)]
 mod captures;
@@ -17,17 +17,17 @@ mod obj;
 mod paths;
 mod traces;
 
-/// Changes bytes a little, within a length.
+/// Changes a few bytes, up to a maximum length.
 pub type Change<'a> = &'a dyn Fn(&mut Vec<u8>, usize);
 
-/// What is fuzzed.
+/// A fuzz target.
 pub struct Target {
-    /// Name, and that of its corpus' folder.
+    /// Name of the target and of its corpus folder.
     pub name: &'static str,
-    /// Does with an input all that the programs do. Panics where an invariant does not hold.
+    /// Processes an input as the programs do. Panics if an invariant is violated.
     pub run: fn(&[u8]),
-    /// A changed copy of an input, at most about so long, from a seed: what encloses the place that
-    /// changes (checksums, lengths, compression) is made right again.
+    /// A changed copy of an input, of about this maximum length, from a seed. Checksums, lengths and
+    /// compression around the change are corrected.
     pub mutate: fn(&[u8], usize, u32, Change<'_>) -> Vec<u8>,
 }
 
@@ -81,14 +81,14 @@ impl Target {
         },
     ];
 
-    /// The target of a name.
+    /// The target with a name.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         Self::ALL.iter().find(|target| target.name == name)
     }
 }
 
-/// The change alone: nothing encloses it.
+/// Applies only the change, for inputs without checksums or lengths.
 fn plain(bytes: &[u8], most_bytes: usize, _: u32, change: Change<'_>) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     change(&mut bytes, most_bytes);

@@ -1,13 +1,13 @@
-//! What one input may take: a second of processor time and a gigabyte of memory.
+//! Limits for one input: a second of processor time and a gigabyte of memory.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Duration;
 
-/// Processor time; the clock's would count what other processes do.
+/// Limit on processor time; wall-clock time would include other processes.
 pub const MOST_TIME: Duration = Duration::from_secs(1);
 
-/// Bytes held at one time beyond those held before.
+/// Limit on additional memory in bytes.
 pub const MOST_BYTES: usize = 1 << 30;
 
 static LIVE_BYTES: AtomicUsize = AtomicUsize::new(0);
@@ -21,7 +21,7 @@ fn count(bytes: usize) {
     PEAK_BYTES.fetch_max(live, Relaxed);
 }
 
-// SAFETY: every call goes on to the system's allocator unchanged; only counters are kept beside it.
+// SAFETY: every call is forwarded to the system's allocator; only counters are added.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size());
@@ -49,19 +49,19 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// What an input took.
+/// Resources used by an input.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Taken {
-    /// Processor time of the calling thread; none where the system does not tell.
+    /// Processor time of the calling thread; zero on systems that do not report it.
     pub time: Duration,
-    /// Most bytes at one time. Counted where [`Counting`] is the allocator.
+    /// Peak memory in bytes, counted if [`Counting`] is the allocator.
     pub bytes: usize,
 }
 
-/// Does something and says what it took.
+/// Runs `work` and returns the resources it used.
 ///
 /// # Errors
-/// It took more than [`MOST_TIME`] or [`MOST_BYTES`].
+/// It used more than [`MOST_TIME`] or [`MOST_BYTES`].
 pub fn held(work: impl FnOnce()) -> Result<Taken, String> {
     let before = LIVE_BYTES.load(Relaxed);
     PEAK_BYTES.store(before, Relaxed);
@@ -79,14 +79,14 @@ pub fn held(work: impl FnOnce()) -> Result<Taken, String> {
     Ok(taken)
 }
 
-/// Makes parallel loops run on the calling thread, so that its time is all there is.
+/// Runs parallel loops on the calling thread, so that its time includes all work.
 pub fn run_on_this_thread_alone() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
-    // It fails where there is a pool already, which then stays.
+    // Fails if there is already a pool, which then stays.
     let _there = pool.use_current_thread().build_global();
 }
 
-/// Time that the processor worked for this thread (Linux).
+/// Processor time of this thread (Linux).
 fn processor_time() -> Duration {
     #[cfg(target_os = "linux")]
     {
@@ -94,7 +94,7 @@ fn processor_time() -> Duration {
             tv_sec: 0,
             tv_nsec: 0,
         };
-        // SAFETY: the pointer is to a `timespec` of this function's own.
+        // SAFETY: the pointer is to a local `timespec`.
         if unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) } == 0 {
             return Duration::new(time.tv_sec as u64, time.tv_nsec as u32);
         }

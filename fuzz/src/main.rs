@@ -28,7 +28,7 @@ fn target() -> &'static Target {
 fuzz_target!(|data: &[u8]| {
     if let Err(why) = limits::held(|| (target().run)(data)) {
         eprintln!("{}: {why}", target().name);
-        // libFuzzer writes the input down and stops.
+        // libFuzzer saves the input and stops.
         std::process::abort();
     }
 });
@@ -41,7 +41,7 @@ fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
         bytes.truncate(length);
     };
     let mutated = (target().mutate)(&data[..size], max_size, seed, &change);
-    // Too long a result would be cut somewhere: the plain mutation is better.
+    // A result that is too long would be truncated, so the plain mutation is used.
     if mutated.len() > max_size {
         return fuzzer_mutate(data, size, max_size);
     }

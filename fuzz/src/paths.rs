@@ -22,14 +22,14 @@ pub fn run(bytes: &[u8]) {
     });
 }
 
-/// An error's text is fit for a terminal and not endless.
+/// Checks that an error's text is fit for a terminal and of limited length.
 pub fn printable(error: &SceneError) {
     let text = error.to_string();
     assert!(!text.contains(char::is_control), "{text:?}");
     assert!(text.len() < 4000, "{} bytes", text.len());
 }
 
-/// Follows a path from both origins; every pose is a place and a rotation.
+/// Follows a path from both origins and checks that every pose is a position and a rotation.
 pub fn follow(spec: &PathSpec) -> Result<(), SceneError> {
     let camera = cameras::default_camera(&Scene::default());
     for origin in [PathOrigin::Camera, PathOrigin::World] {

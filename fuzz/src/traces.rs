@@ -1,4 +1,4 @@
-//! Both kinds of traces: whatever is valid replays, and reads the same when it is written again.
+//! Both kinds of traces: valid ones can be replayed, and are unchanged when written and read again.
 
 use crate::Change;
 use formats::Trace;
@@ -7,7 +7,7 @@ use parallax_tests::exercise::exercise;
 use parallax_tests::repair::{Parts, repair_header};
 use parallax_tests::traces::Random;
 
-/// Reads a trace, replays it, writes it anew.
+/// Reads a trace, replays it and writes it again.
 pub fn run(bytes: &[u8]) {
     if !exercise(bytes.to_vec()) {
         return;
@@ -23,7 +23,7 @@ pub fn run(bytes: &[u8]) {
     }
 }
 
-/// A trace written with an encoding has the same tiles.
+/// Checks that a trace written with an encoding has the same tiles.
 fn rewritten(trace: &Textrace, encoding: Encoding) {
     let tables = trace.tables();
     let mut tile = Tile::default();
@@ -61,7 +61,7 @@ fn rewritten(trace: &Textrace, encoding: Encoding) {
     }
 }
 
-/// Changes a chunk, a tile or the container; offsets, lengths and checksums follow.
+/// Changes a chunk, a tile or the container, and corrects offsets, lengths and checksums.
 pub fn mutate(bytes: &[u8], most_bytes: usize, seed: u32, change: Change<'_>) -> Vec<u8> {
     let mut random = Random(u64::from(seed));
     let parts = match random.below(8) {

@@ -1,4 +1,4 @@
-//! The committed corpus through every target, as it is and changed, on plain stable Rust.
+//! Runs the committed corpus, unchanged and changed, through every target on stable Rust.
 //!
 //! `FUZZ_CASES=n` changes every input n times.
 
@@ -28,7 +28,7 @@ fn inputs(target: &Target) -> Vec<PathBuf> {
     paths
 }
 
-/// Changes a few bytes, or takes some away, or repeats some.
+/// Changes, removes or repeats a few bytes.
 fn change(bytes: &mut Vec<u8>, most: usize, random: &mut Random) {
     for _ in 0..1 + random.below(3) {
         let length = bytes.len() as u32;
@@ -57,7 +57,7 @@ fn held(target: &Target, bytes: &[u8], place: &str) -> limits::Taken {
     }
 }
 
-// One test, since all targets share one thread: only then is its time all that an input took.
+// A single test, because all targets share one thread, whose time then measures one input.
 #[test]
 fn every_input_is_read_or_refused_within_a_second_and_a_gigabyte() {
     limits::run_on_this_thread_alone();

@@ -1,5 +1,5 @@
-//! The traces that the corpus begins with: small ones of every encoding and with everything that the
-//! format has. `UPDATE_CORPUS=1` writes them anew.
+//! The traces at the start of the corpus: small ones of every encoding with every feature of the format.
+//! `UPDATE_CORPUS=1` rewrites them.
 
 use formats::textrace::Encoding;
 use parallax_tests::traces;
@@ -7,7 +7,7 @@ use std::path::Path;
 
 const SIZE_PX: [u32; 2] = [18, 5];
 
-/// Name in the corpus and bytes.
+/// Names in the corpus, and bytes.
 fn seeds() -> Vec<(String, Vec<u8>)> {
     let mut tables = traces::texture_tables();
     tables.meta.hmd.eye_size_px = SIZE_PX;

@@ -1,9 +1,9 @@
-//! The yardstick of `replay run --addresses`: the plainest fast loop that gives the same misses. It
-//! maps a file of 32-bit addresses, drops repeats of the previous line and looks each other line up
-//! in packed tags, the one used last in front: 8 KiB over 128 KiB, four ways.
+//! The yardstick of `replay run --addresses`: the simplest fast loop with the same misses. It maps a file
+//! of 32-bit addresses, drops repeats of the previous line and looks each other line up in packed tags, the
+//! most recently used first: 8 KiB over 128 KiB, four ways.
 //!
-//! `cargo bench -p replay --bench plain_lru -- FILE [LINE_BYTES]`; without a file it makes a stream of
-//! its own. `scripts/addresses_speed.py` compares whole processes.
+//! `cargo bench -p replay --bench plain_lru -- FILE [LINE_BYTES]`; without a file it generates a stream.
+//! `scripts/addresses_speed.py` compares whole processes.
 
 use memmap2::Mmap;
 use std::fs::File;
@@ -12,7 +12,7 @@ use std::time::Instant;
 
 const WAYS: usize = 4;
 
-/// Tags by set, the one used last first.
+/// Tags by set, the most recently used first.
 struct Cache {
     tags: Vec<[u32; WAYS]>,
     mask: u32,
@@ -27,7 +27,7 @@ impl Cache {
         }
     }
 
-    /// True for a miss.
+    /// Returns true for a miss.
     #[inline(always)]
     fn access(&mut self, line: u32) -> bool {
         let set = &mut self.tags[(line & self.mask) as usize];
@@ -72,7 +72,7 @@ fn misses(words: &[[u8; 4]], line_bytes: u32) -> [u64; 2] {
     misses
 }
 
-/// A walk that stays near, jumps now and then, and often repeats: a few million addresses.
+/// A random walk with short steps, occasional jumps and many repeats: a few million addresses.
 fn made_up() -> File {
     let mut bytes = Vec::new();
     let (mut state, mut address) = (1_u64, 0_u32);
@@ -92,7 +92,7 @@ fn made_up() -> File {
 }
 
 fn main() {
-    // Cargo adds --bench.
+    // Cargo adds the argument --bench.
     let mut arguments = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
     let file = match arguments.next() {
         Some(path) => File::open(&path).unwrap_or_else(|error| panic!("{path}: {error}")),
@@ -102,7 +102,7 @@ fn main() {
         .next()
         .map_or(16, |text| text.parse().expect("a line size"));
     let start = Instant::now();
-    // SAFETY: nobody writes to the file meanwhile.
+    // SAFETY: nothing writes to the file while it is mapped.
     let map = unsafe { Mmap::map(&file) }.expect("the file can be mapped");
     let (words, _) = map.as_chunks::<4>();
     let [l1, l2] = misses(words, line_bytes);

@@ -1,11 +1,11 @@
-//! Writes output files whole or not at all, and creates their folders.
+//! Writes output files atomically and creates their folders.
 
 use anyhow::Context;
 use formats::container::AtomicFile;
 use shell::Output;
 use std::path::Path;
 
-/// Writes `bytes` to a temporary file beside `path` and renames it.
+/// Writes `bytes` to a temporary file in the same folder and renames it to `path`.
 ///
 /// # Errors
 /// The folder cannot be made, or the file cannot be written; the message names the path.
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_replaced_whole_and_nothing_else_is_left() {
+    fn a_file_is_replaced_whole_and_no_other_file_is_left() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new/report.html");
         write_atomically(&path, b"one").unwrap();

@@ -19,6 +19,19 @@ pub trait Row: fmt::Debug + Sized + 'static {
     fn names() -> &'static [&'static str];
 }
 
+/// The name most similar to a mistyped one, if any is similar.
+#[must_use]
+pub fn most_similar<'n>(typed: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
+    /// Jaro-Winkler similarity of a suggestion.
+    const LEAST_SIMILARITY: f64 = 0.8;
+    let typed = typed.to_lowercase();
+    names
+        .map(|name| (strsim::jaro_winkler(name, &typed), name))
+        .filter(|(similarity, _)| *similarity > LEAST_SIMILARITY)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
+}
+
 /// A reference to a row, serialized as its name.
 #[derive(Debug)]
 pub struct Named<R: 'static>(&'static R);
@@ -38,6 +51,12 @@ impl<R: Row> Named<R> {
     #[must_use]
     pub fn find(name: &str) -> Option<Self> {
         Self::all().find(|row| row.name() == name)
+    }
+
+    /// The row whose name is most similar to a mistyped one, if any is similar.
+    #[must_use]
+    pub fn similar(name: &str) -> Option<Self> {
+        most_similar(name, R::names().iter().copied()).and_then(Self::find)
     }
 
     /// Name in configurations, results and flags.

@@ -1,4 +1,4 @@
-//! The built program itself: version, help and exit codes.
+//! Tests of the built program: version, help and exit codes.
 
 use std::process::{Command, Output};
 
@@ -30,7 +30,7 @@ fn wrong_use_exits_with_two_and_prints_nothing_on_stdout() {
     }
 }
 
-/// What a wrong use of the program says.
+/// The error message of a wrong use of the program.
 fn refusal(arguments: &[&str]) -> String {
     let output = replay(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}");
@@ -38,7 +38,7 @@ fn refusal(arguments: &[&str]) -> String {
 }
 
 #[test]
-fn a_page_and_a_table_that_would_be_one_file_are_refused_before_any_work() {
+fn a_page_and_a_table_with_the_same_path_are_refused_before_any_work() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
     let (csv, html) = (path("x.csv"), path("x.html"));

@@ -1,5 +1,5 @@
-//! `docs/use/configuration.md` says what the code reads: keys, defaults, values and what they mean come
-//! from the types themselves. `UPDATE_DOCS=1` rewrites the page; review the diff.
+//! Compares `docs/use/configuration.md` with the code. Keys, defaults, values and their meanings come from
+//! the types. `UPDATE_DOCS=1` rewrites the page; review the diff.
 
 use clap::ValueEnum;
 use replay::config::{
@@ -16,24 +16,25 @@ use toml::{Table, Value};
 const INTRODUCTION: &str = "\
 # Configuration of a replay
 
-`replay run --config FILE` reads the keys below as TOML; flags win over the file, and what neither says
-is the Z2 paper's machine. `replay run --print-config` prints the whole configuration. An unknown key is
-refused. Sizes (`size_bytes`) are numbers of bytes or texts such as `\"16KiB\"`; the number of sets is a power of two,
-and all caches of a level together have at most 2^24 lines.
+This page lists every key of a machine and of an experiment file. It is for users of `--config`, `replay sweep` and `--print-config`. It is made from the source; a test compares it.
+
+`replay run --config FILE` reads the keys as TOML. Flags override the file, and the file overrides the defaults, which are the Z2 paper's
+machine. `replay run --print-config` prints the whole configuration. Unknown keys are refused. Sizes (`size_bytes`) are numbers of bytes or
+texts such as `\"16KiB\"`. The number of sets is a power of two, and all caches of a level together have at most 2^24 lines.
 
     order = \"z2-sta\"
     l1.size_bytes = \"16KiB\"          # a key of one level: l1 to l6
     l3.size_bytes = \"4MiB\"           # a level that is added
     l3.line_bytes = 64
 
-Levels are a list of two to six `[[level]]` tables, the L1 first; such a list in a file replaces the levels of the default
-machine, while `l1.KEY` changes one key of one level.
+Levels are a list of two to six `[[level]]` tables, the L1 first. Such a list in a file replaces the default levels;
+`l1.KEY` changes one key of one level.
 
 ## Experiment files
 
 `replay sweep FILE` replays every point of an experiment:
 
-    traces = [\"crytek.textrace\"]      # beside the file; the command line's traces win
+    traces = [\"crytek.textrace\"]      # beside the file; the command line's traces replace them
     [base]                            # any key below
     mode = \"functional\"
     [axes]                            # crossed with one another
@@ -42,9 +43,9 @@ machine, while `l1.KEY` changes one key of one level.
     [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
     layout.block_order = [\"morton\", \"tiled\"]
 
-At most 100000 points; a point that no machine can have is refused before any is replayed. A sweep that was
-stopped goes on where it stopped: each point's result is a row of a file under `points/` in the output folder.
-[many-machines.md](many-machines.md) tells how to split one over machines.
+A sweep has at most 100000 points. An impossible point is refused before any is replayed. A sweep that was stopped continues
+where it stopped: each point's result is a row of a file under `points/` in the output folder.
+[many-machines.md](many-machines.md) shows how to split a sweep over machines.
 
 ## Keys
 ";
@@ -61,7 +62,7 @@ struct Item {
     line: String,
 }
 
-/// The items of `pub struct name` or `pub enum name`, wherever it stands in the sources.
+/// The items of `pub struct name` or `pub enum name`, searched in all sources.
 fn items(sources: &str, name: &str) -> Vec<Item> {
     let head = ["struct", "enum"].map(|kind| format!("pub {kind} {name} {{\n"));
     let start = head.iter().find_map(|h| Some(sources.find(h)? + h.len()));
@@ -102,7 +103,7 @@ fn kebab(variant: &str) -> String {
     out
 }
 
-/// Names and meanings of the values that a type takes; nothing for numbers and flags.
+/// Names and meanings of a type's values; empty for numbers and flags.
 fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
     fn of<T: ValueEnum>() -> Vec<(String, String)> {
         let variants = T::value_variants().iter();
@@ -144,7 +145,7 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
     }
 }
 
-/// The default configuration, with a prefetcher, an L3 and a DRAM below the caches and all clients of memory.
+/// The default configuration, with a prefetcher, an L3, DRAM and all memory clients.
 fn defaults() -> Table {
     let config = RunConfig {
         prefetch: Some(PrefetchConfig::default()),
@@ -173,7 +174,7 @@ fn with(key: &str, value: Value) -> Result<RunConfig, String> {
     table.try_into().map_err(|e: toml::de::Error| e.to_string())
 }
 
-/// What is accepted for a number, in the words of the refusal of one that is not.
+/// The accepted range of a number, from the error for a value outside it.
 fn range(key: &str) -> Option<String> {
     [-1_000_000, 0, 3, 4_000_000_000]
         .into_iter()
@@ -215,7 +216,7 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             describe(sources, "LevelConfig", &format!("{key}."), inner, page);
             continue;
         }
-        // Keys that the written default leaves out.
+        // Keys that the serialised default omits.
         let left_out = match &*key {
             "hsr" => Value::try_from(Hsr::default()).ok(),
             "between_frames" => Value::try_from(BetweenFrames::default()).ok(),
@@ -281,7 +282,7 @@ fn page() -> String {
 }
 
 #[test]
-fn the_page_of_keys_is_what_the_code_reads() {
+fn the_page_of_keys_matches_the_code() {
     let path = root().join("docs/use/configuration.md");
     let page = page();
     if std::env::var_os("UPDATE_DOCS").is_some() {
@@ -290,12 +291,12 @@ fn the_page_of_keys_is_what_the_code_reads() {
     let found = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         found == page,
-        "docs/use/configuration.md is not what the code reads; UPDATE_DOCS=1 rewrites it"
+        "docs/use/configuration.md differs from the code; UPDATE_DOCS=1 rewrites it"
     );
 }
 
 #[test]
-fn every_key_has_a_line_that_says_what_it_is() {
+fn every_key_has_a_line_with_its_meaning() {
     fn count(table: &Table) -> usize {
         let inner = |value: &Value| match value {
             Value::Array(tables) => tables[0].as_table().map_or(1, count),
@@ -308,7 +309,7 @@ fn every_key_has_a_line_that_says_what_it_is() {
         .lines()
         .filter(|line| line.starts_with("| `"))
         .collect();
-    // Three keys have no default, and thirteen are written where they are another.
+    // Three keys have no default, and for thirteen the default is listed elsewhere.
     let written = count(&defaults());
     assert_eq!(keys.len(), written + 16);
     for line in keys {

@@ -1,5 +1,6 @@
-//! Memory of long traces, and with `FRAMES=300 cargo test --release -p replay --test many_frames -- --nocapture`
-//! the time of a frame as well; `TEXTRACE` names the trace whose first frame is repeated.
+//! Measures the memory of long traces.
+//! `FRAMES=300 cargo test --release -p replay --test many_frames -- --nocapture` also prints the time per
+//! frame; `TEXTRACE` names a trace whose first frame is repeated.
 
 use formats::textrace::{Pass, Tables, Textrace, TextraceWriter, Tile};
 use formats::view::FrameViews;
@@ -11,7 +12,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Writes the first frame of a trace so many times; the frames' views repeat with it.
+/// Writes the first frame of a trace `frames` times, with its views.
 fn write(source: &dyn TileSource, frames: u32, path: &Path) {
     let old = source.tables();
     let first = old.passes.iter().map(|pass| pass.frame).min().unwrap();
@@ -47,7 +48,7 @@ fn write(source: &dyn TileSource, frames: u32, path: &Path) {
     writer.finish().unwrap();
 }
 
-/// This process's memory that is not a mapped file, in bytes; none where the system does not say.
+/// Memory of this process without mapped files, in bytes; `None` if the system does not report it.
 fn own_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("RssAnon:"))?;
@@ -55,7 +56,7 @@ fn own_bytes() -> Option<u64> {
     Some(kib << 10)
 }
 
-/// Seconds that `work` takes, and the most memory meanwhile.
+/// Time of `work` in seconds, and the peak memory during it.
 fn watched(work: impl FnOnce()) -> (f64, u64) {
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -144,7 +145,7 @@ fn memory_does_not_grow_with_the_number_of_frames() {
             long.0,
             long_bytes / 1_000_000
         );
-        // The line lists of one frame are about 250 kB: 36 of them kept would show.
+        // The line lists of one frame take about 250 kB, so 36 of them would be detected.
         let most = if asked.is_some() {
             2 * short_bytes + 256_000_000
         } else {
@@ -156,7 +157,7 @@ fn memory_does_not_grow_with_the_number_of_frames() {
             short.0,
             long.0
         );
-        // Time is for a machine on which nothing else runs.
+        // Times are only meaningful on an otherwise idle machine.
         let grows = asked.is_some() && long_ms > 1.5 * short_ms;
         assert!(!grows, "{short_ms} ms, then {long_ms} ms");
     }

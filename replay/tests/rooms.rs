@@ -1,9 +1,10 @@
-//! The rooms of `replay` use each other in one direction: cli, report, experiment, engine, cache.
+//! Checks that the modules of `replay` depend on each other in one direction: cli, report, experiment,
+//! engine, cache.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// From the bottom up. A room may use rooms below it; those on one floor may use each other.
+/// Modules by layer, from the bottom up. A module may use modules of lower layers and of its own layer.
 const FLOORS: [&[&str]; 12] = [
     &["files", "model_version", "palette", "registry", "size"],
     &["config", "memory", "order", "result"],
@@ -19,7 +20,7 @@ const FLOORS: [&[&str]; 12] = [
     &["cli"],
 ];
 
-/// Rooms that know nothing of each other, although one stands above the other.
+/// Pairs of modules that must not use each other, although their layers would allow it.
 const STRANGERS: [(&str, &str); 3] = [
     ("sgrt", "engine"),
     ("sgrt", "stream"),
@@ -37,7 +38,7 @@ fn source_files(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// Files that only tests compile, by their names.
+/// Whether a file is compiled only for tests, by its name.
 fn is_for_tests(path: &Path) -> bool {
     let name = |part: &std::ffi::OsStr| {
         let part = part.to_string_lossy();
@@ -53,9 +54,9 @@ fn is_for_tests(path: &Path) -> bool {
     path.iter().any(name)
 }
 
-/// The rooms that a text names as `crate::room`.
+/// The modules that a text names as `crate::module`.
 fn rooms_used(text: &str) -> Vec<&str> {
-    // What follows is for tests.
+    // The tests at the end of a file are not checked.
     let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
     let code = text
         .lines()
@@ -68,20 +69,20 @@ fn rooms_used(text: &str) -> Vec<&str> {
         .collect()
 }
 
-/// Why a room may not use another, or nothing.
+/// Reason why a module may not use another, if any.
 fn fault(user: &str, used: &str) -> Option<&'static str> {
     let floor = |room: &str| FLOORS.iter().position(|rooms| rooms.contains(&room));
     match (floor(user), floor(used)) {
         _ if user == used => None,
-        (None, _) | (_, None) => Some("a room that no floor lists"),
-        (Some(user), Some(used)) if used > user => Some("a room above it"),
-        _ if STRANGERS.contains(&(user, used)) => Some("a room that it should not know"),
+        (None, _) | (_, None) => Some("a module that no layer lists"),
+        (Some(user), Some(used)) if used > user => Some("a module of a higher layer"),
+        _ if STRANGERS.contains(&(user, used)) => Some("a module that it must not use"),
         _ => None,
     }
 }
 
 #[test]
-fn rooms_use_only_rooms_below_them() {
+fn modules_use_only_modules_of_lower_layers() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut files = Vec::new();
     source_files(&src, &mut files);
@@ -106,7 +107,7 @@ fn rooms_use_only_rooms_below_them() {
 }
 
 #[test]
-fn an_arrow_that_runs_up_is_found() {
+fn a_use_of_a_higher_layer_is_found() {
     let text = "//! Not crate::cli.\nuse crate::report::csv;\nlet x = crate::size::f();\n#[cfg(test)]\nmod tests {\n use crate::cli::x;";
     assert_eq!(rooms_used(text), ["report", "size"]);
     assert!(fault("engine", "report").is_some());

@@ -1,4 +1,4 @@
-//! A trace put through all that the commands do with one.
+//! Runs everything that the commands do with a trace.
 
 use crate::repair::validate;
 use formats::Trace;
@@ -15,10 +15,10 @@ use replay::sgrt::compose::Reuse;
 use replay::sgrt::config::SgrtConfig;
 use replay::sgrt::loaded::LoadedTrace;
 
-/// Reads a file and does with it what the commands do; true if it is valid.
+/// Reads a file and processes it as the commands do; returns whether it is valid.
 ///
 /// # Panics
-/// When a valid trace does not behave as one.
+/// A valid trace does not behave as one.
 #[must_use]
 pub fn exercise(bytes: Vec<u8>) -> bool {
     let Ok(trace) = Trace::from_bytes(bytes) else {
@@ -61,7 +61,7 @@ pub fn exercise(bytes: Vec<u8>) -> bool {
                     },
                     ..RunConfig::default()
                 };
-                // Textures may be too large for a layout, which is an error and no panic.
+                // Textures may be too large for a layout, which must be an error without a panic.
                 let _result = replay::engine::replay(&*trace, &config);
             }
         }
@@ -125,7 +125,7 @@ fn reproject(trace: &Raytrace) {
     };
     for rule in ["none", replay::sgrt::DEFAULT_RULE] {
         let rule = rule.parse().expect("a known rule");
-        // What the model cannot score is an error and no panic.
+        // A trace that the model cannot score must be an error without a panic.
         let _result = loaded.run(&rule, Reuse::Color, &SgrtConfig::default());
     }
 }

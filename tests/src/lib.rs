@@ -19,7 +19,7 @@ pub fn root() -> PathBuf {
 /// A built program (`tracegen` or `replay`) of the same profile as the running test.
 ///
 /// # Panics
-/// When it is not built: `cargo test --workspace` builds it, `-p parallax-tests` alone does not.
+/// The program is not built: `cargo test --workspace` builds it, `-p parallax-tests` does not.
 #[must_use]
 pub fn program(name: &str) -> Command {
     let test = std::env::current_exe().expect("a running test has a path");
@@ -35,15 +35,15 @@ pub fn program(name: &str) -> Command {
         path.display()
     );
     let mut command = Command::new(path);
-    // What a test sees does not hang on what earlier runs have kept.
+    // Results of a test must not depend on earlier runs.
     command.env("PARALLAX_CACHE_SIZE", "0");
     command
 }
 
-/// Runs a command and returns its output; panics with its standard error unless it exits 0.
+/// Runs a command and returns its output.
 ///
 /// # Panics
-/// When the command cannot be started or fails.
+/// The command cannot be started or fails; the message has its standard error.
 pub fn run_ok(command: &mut Command) -> Output {
     let output = command.output().expect("the program starts");
     assert!(
@@ -55,11 +55,11 @@ pub fn run_ok(command: &mut Command) -> Output {
     output
 }
 
-/// Runs a command that has to refuse its input: exit code 2, no panic, and a message with every
-/// one of the `expected` parts.
+/// Runs a command that must refuse its input: exit code 2, no panic, and a message with all `expected`
+/// parts.
 ///
 /// # Panics
-/// When it does anything else.
+/// The command does anything else.
 pub fn refuse(command: &mut Command, expected: &[&str]) -> Output {
     let output = command.output().expect("the program starts");
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -74,10 +74,10 @@ pub fn refuse(command: &mut Command, expected: &[&str]) -> Output {
     output
 }
 
-/// Names of the encodings that a texture trace's tiles have.
+/// Names of the encodings in a texture trace.
 ///
 /// # Panics
-/// When `replay info` does not read it.
+/// `replay info` fails.
 #[must_use]
 pub fn encodings(trace: &Path) -> Vec<String> {
     let info = run_ok(program("replay").args(["info", "--json"]).arg(trace)).stdout;
@@ -90,7 +90,8 @@ pub fn encodings(trace: &Path) -> Vec<String> {
         .collect()
 }
 
-/// Prints why a test is skipped. The line passes by libtest's capture, and `scripts/test.sh` lists it at the end.
+/// Prints why a test is skipped. The line bypasses libtest's capture, and `scripts/test.sh` lists it at the
+/// end.
 #[macro_export]
 macro_rules! skipped {
     ($($reason:tt)*) => {
@@ -101,8 +102,8 @@ macro_rules! skipped {
     };
 }
 
-/// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout),
-/// or `None`, with a line on stderr that says so.
+/// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` next to the checkout), or
+/// `None` with a line on stderr.
 #[must_use]
 pub fn real_scene(relative: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("PARALLAX_SCENES")

@@ -1,5 +1,5 @@
-//! Traces taken apart into chunks and put together again with every checksum right, so that a
-//! test can change what lies behind the checksums.
+//! Splits traces into chunks and reassembles them with correct checksums, so that tests can change data
+//! behind the checksums.
 
 use formats::Trace;
 use formats::container::{ChunkTag, Container, ContainerWriter, Kind};
@@ -7,28 +7,28 @@ use formats::raytrace::RayTile;
 use formats::textrace::Tile;
 use formats::view::Eye;
 
-/// A trace as its chunks, in file order.
+/// The chunks of a trace, in file order.
 #[derive(Clone, Debug)]
 pub struct Parts {
-    /// What it holds.
+    /// Kind of trace.
     pub kind: Kind,
-    /// Minor version that it needs.
+    /// Required minor version.
     pub minor: u16,
     /// Tag and bytes of each chunk.
     pub chunks: Vec<([u8; 4], Vec<u8>)>,
 }
 
 impl Parts {
-    /// Takes a sound trace apart.
+    /// Splits a valid trace.
     ///
     /// # Panics
-    /// When it is not a container.
+    /// The bytes are not a container.
     #[must_use]
     pub fn of(bytes: &[u8]) -> Self {
         Self::read(bytes).expect("a sound container")
     }
 
-    /// Takes a container apart.
+    /// Splits a container.
     ///
     /// # Errors
     /// Its header, directory or a chunk is damaged.
@@ -45,7 +45,7 @@ impl Parts {
         })
     }
 
-    /// Bytes of a chunk; empty where there is none.
+    /// Bytes of a chunk; empty if there is none.
     pub fn chunk(&mut self, tag: &[u8; 4]) -> &mut Vec<u8> {
         let at = self.chunks.iter().position(|(other, _)| other == tag);
         let at = at.unwrap_or_else(|| {
@@ -58,7 +58,7 @@ impl Parts {
     /// Writes a number into a chunk.
     ///
     /// # Panics
-    /// When the chunk is too short.
+    /// The chunk is too short.
     pub fn put(&mut self, tag: &[u8; 4], at: usize, bytes: &[u8]) {
         self.chunk(tag)[at..at + bytes.len()].copy_from_slice(bytes);
     }
@@ -66,7 +66,7 @@ impl Parts {
     /// Changes the value of a JSON chunk.
     ///
     /// # Panics
-    /// When the chunk is no JSON.
+    /// The chunk is not JSON.
     pub fn edit(&mut self, tag: &[u8; 4], change: impl FnOnce(&mut serde_json::Value)) {
         let chunk = self.chunk(tag);
         let mut value = serde_json::from_slice(chunk).expect("a JSON chunk");
@@ -77,7 +77,7 @@ impl Parts {
     /// Replaces text in a JSON chunk, once.
     ///
     /// # Panics
-    /// When the text is not there.
+    /// The text is not in the chunk.
     pub fn replace(&mut self, tag: &[u8; 4], from: &str, to: &str) {
         let chunk = self.chunk(tag);
         let text = String::from_utf8(chunk.clone()).expect("JSON is UTF-8");
@@ -93,7 +93,7 @@ impl Parts {
         }
     }
 
-    /// The bytes of every slot of the index, as far as they are there.
+    /// The bytes of every slot of the index, as far as they exist.
     #[must_use]
     pub fn tiles(&mut self) -> Vec<Vec<u8>> {
         let (tiles, index, entry_bytes) = self.tiles_and_index();
@@ -107,7 +107,7 @@ impl Parts {
         entries.map(of).collect()
     }
 
-    /// Puts other tiles in place: the index's offsets, sizes and checksums follow, its counts stay.
+    /// Replaces the tiles. Offsets, sizes and checksums in the index are updated; its counts are not.
     pub fn set_tiles(&mut self, tiles: &[Vec<u8>]) {
         let (tag, index, entry_bytes) = self.tiles_and_index();
         let mut offset = 0u64;
@@ -123,7 +123,7 @@ impl Parts {
         *self.chunk(&tag) = tiles.concat();
     }
 
-    /// Makes the checksums of the tiles right, wherever the index says that they lie.
+    /// Corrects the checksums of the tiles at the positions in the index.
     pub fn repair_tiles(&mut self) {
         let (_, index, entry_bytes) = self.tiles_and_index();
         let crc32s: Vec<u32> = self.tiles().iter().map(|tile| crc32(tile)).collect();
@@ -136,7 +136,8 @@ impl Parts {
         self.repair_lists();
     }
 
-    /// Makes the sizes and checksums of primitive lists right, where there are any: the last list takes what the chunk has.
+    /// Corrects the sizes and checksums of primitive lists, if any: the last list gets the rest of the
+    /// chunk.
     fn repair_lists(&mut self) {
         let has = |tag: &[u8; 4]| self.chunks.iter().any(|(other, _)| other == tag);
         if !has(b"PLST") || !has(b"PLIX") {
@@ -159,8 +160,8 @@ impl Parts {
         }
     }
 
-    /// The file, with the checksums of chunks, directory and header made anew. A chunk whose tag
-    /// was there before is left out, since no container can have it twice.
+    /// The file with new checksums of chunks, directory and header. Chunks with a duplicate tag are left
+    /// out, because no container can have them.
     #[must_use]
     pub fn sealed(&self) -> Vec<u8> {
         let mut writer = ContainerWriter::in_memory(self.kind).expect("in memory");
@@ -174,7 +175,7 @@ impl Parts {
     }
 }
 
-/// A little-endian number of some bytes.
+/// Reads a little-endian number.
 fn number(bytes: &[u8], at: usize, size: usize) -> usize {
     let of = bytes.get(at..at + size).unwrap_or_default();
     of.iter()
@@ -182,7 +183,7 @@ fn number(bytes: &[u8], at: usize, size: usize) -> usize {
         .fold(0, |n, byte| n << 8 | usize::from(*byte))
 }
 
-/// CRC-32 of zlib and PNG, byte by byte: independent of the library that the traces use.
+/// CRC-32 as in zlib and PNG, computed byte by byte, independent of the library used by the traces.
 #[must_use]
 pub fn crc32(bytes: &[u8]) -> u32 {
     const TABLE: [u32; 256] = crc32_table();
@@ -190,7 +191,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, step)
 }
 
-/// What each byte does to the checksum, bit by bit.
+/// The effect of each byte on the checksum, computed bit by bit.
 const fn crc32_table() -> [u32; 256] {
     let mut table = [0; 256];
     let mut byte = 0;
@@ -207,7 +208,7 @@ const fn crc32_table() -> [u32; 256] {
     table
 }
 
-/// Makes the checksums of directory and header right, if these are where the header says.
+/// Corrects the checksums of directory and header, if they are at the positions in the header.
 pub fn repair_header(bytes: &mut [u8]) {
     let at = number(bytes, 16, 8);
     if let Some(directory) = bytes.get(at..) {
@@ -222,10 +223,10 @@ pub fn repair_header(bytes: &mut [u8]) {
     }
 }
 
-/// Reads a whole trace as `replay validate` does.
+/// Reads a complete trace as `replay validate` does.
 ///
 /// # Errors
-/// The first thing that breaks a rule.
+/// The first violated rule.
 pub fn validate(trace: &Trace) -> formats::Result<()> {
     match trace {
         Trace::Texture(trace) => {

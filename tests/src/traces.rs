@@ -1,4 +1,4 @@
-//! Small made-up traces of both kinds that use everything that the format has.
+//! Small generated traces of both kinds that use every feature of the format.
 
 use formats::container::Kind;
 use formats::raytrace::camera::sample_position_px;
@@ -15,10 +15,10 @@ use formats::textrace::{
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
 use formats::view::{Eye, FovTangents, FrameViews, Hmd};
 
-/// Width and height of an eye's image: neither is a multiple of a tile's.
+/// Width and height of an eye's image; neither is a multiple of the tile size.
 const EYE_SIZE_PX: [u32; 2] = [39, 21];
 
-/// Numbers that look random and are the same for a seed (splitmix64).
+/// Reproducible pseudo-random numbers (splitmix64).
 #[derive(Clone, Debug)]
 pub struct Random(pub u64);
 
@@ -32,7 +32,7 @@ impl Random {
         z ^ z >> 31
     }
 
-    /// Below a bound above 0.
+    /// A number below a positive bound.
     pub fn below(&mut self, bound: u32) -> u32 {
         (self.bits() % u64::from(bound)) as u32
     }
@@ -164,7 +164,7 @@ fn texture_tile(tables: &Tables, random: &mut Random) -> Tile {
         }
         let draw = primitive / 1000;
         let groups = tables.draws[draw as usize].groups.len() as u32;
-        // Small numbers mostly, as a picture has them; any at all now and then.
+        // Mostly small numbers, as in captures, and sometimes any number.
         let wild = random.below(4) == 0;
         let mut number = |range: u32| match wild {
             true => random.bits() as i32,
@@ -199,7 +199,7 @@ fn texture_tile(tables: &Tables, random: &mut Random) -> Tile {
     tile
 }
 
-/// A texture trace; about a tile in three is untouched.
+/// A texture trace; about one tile in three is untouched.
 #[must_use]
 pub fn texture_trace(encoding: Encoding, seed: u64) -> Vec<u8> {
     texture_trace_of(&texture_tables(), encoding, seed)
@@ -335,7 +335,7 @@ pub fn ray_tables(samples_per_px: u32, has_visits: bool) -> RaytraceTables {
                 vertices: [
                     [i as f32, 0.0, -5.0],
                     [i as f32 + 0.7, 0.1, -5.5],
-                    // One has no area.
+                    // One triangle has no area.
                     [i as f32, 0.9 * (i % 5) as f32, -5.25],
                 ],
             })
@@ -343,7 +343,7 @@ pub fn ray_tables(samples_per_px: u32, has_visits: bool) -> RaytraceTables {
     }
 }
 
-/// A material that does nothing.
+/// A material without effects.
 fn ray_material() -> RayMaterial {
     RayMaterial {
         name: String::new(),
@@ -400,7 +400,7 @@ fn ray_tile(tables: &RaytraceTables, eye: Eye, number: u32, random: &mut Random)
     tile
 }
 
-/// The rays of the last pixel.
+/// Adds the rays of the last pixel.
 fn push_rays(tile: &mut RayTile, random: &mut Random) {
     let Some(pixel) = tile.pixels.last() else {
         return;
@@ -452,7 +452,8 @@ pub fn ray_trace_of(tables: &RaytraceTables, seed: u64) -> Vec<u8> {
     writer.into_bytes(tables).expect("sound tables")
 }
 
-/// One of each: both kinds, every encoding, with visits and without, one sample a pixel and more.
+/// Traces of both kinds, with every encoding, with and without visits, and with one or more samples per
+/// pixel.
 #[must_use]
 pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
     let textures = Encoding::ALL.map(|encoding| {

@@ -1,4 +1,4 @@
-//! The commands that write files, small, for tests that stop them or take their disk away.
+//! Commands that write files, for tests that kill them or fill their disk.
 
 use crate::{program, root, run_ok};
 use std::collections::BTreeMap;
@@ -6,19 +6,19 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// A command that writes into a folder of its own.
+/// A command that writes into its own folder.
 pub struct Writer {
-    /// For messages.
+    /// Name in messages.
     pub name: &'static str,
-    /// The command, from what it reads and what it writes into.
+    /// The command, for a folder of inputs and a folder of outputs.
     pub command: fn(inputs: &Path, folder: &Path) -> Command,
-    /// It measures times, so that only the form of its JSON files can be foretold.
+    /// Whether it measures times, so that only the form of its JSON files is predictable.
     pub measures: bool,
-    /// It needs the driver.
+    /// Whether it needs the driver.
     pub draws: bool,
 }
 
-/// Every one; the first [`QUICK`] take a fraction of a second and need no driver.
+/// All writers; the first [`QUICK`] take a fraction of a second and need no driver.
 pub const ALL: &[Writer] = &[
     Writer {
         name: "tracegen rays",
@@ -134,7 +134,7 @@ pub const ALL: &[Writer] = &[
     },
 ];
 
-/// How many of [`ALL`] every test run can afford.
+/// Number of entries of [`ALL`] that every test run uses.
 pub const QUICK: usize = 3;
 
 fn tracegen(arguments: &[&str]) -> Command {
@@ -165,10 +165,10 @@ pub fn sweep(inputs: &Path, folder: &Path) -> Command {
     command
 }
 
-/// Writes what the writers read.
+/// Writes the inputs of the writers.
 ///
 /// # Panics
-/// The folder cannot be written.
+/// The folder is not writable.
 pub fn write_inputs(inputs: &Path) {
     let experiment = "[base]\nmode = \"functional\"\n[axes]\norder = [\"morton\", \"z2-sta\"]\n\
         l1.size_bytes = [\"4KiB\", \"8KiB\"]\n[one-at-a-time]\nl2.replacement = [\"fifo\"]\n";
@@ -179,10 +179,10 @@ pub fn write_inputs(inputs: &Path) {
     }
 }
 
-/// Runs a writer to its end; what is printed is not looked at.
+/// Runs a writer to its end and ignores its output.
 ///
 /// # Panics
-/// It fails.
+/// The writer fails.
 pub fn run_to_the_end(mut command: Command) {
     run_ok(command.stdout(Stdio::null()));
 }
@@ -190,9 +190,9 @@ pub fn run_to_the_end(mut command: Command) {
 /// A folder's files by their paths in it.
 #[derive(Debug, Default)]
 pub struct Files {
-    /// Those under a final name.
+    /// Files with final names.
     pub finished: BTreeMap<String, Vec<u8>>,
-    /// Names of those that were being written.
+    /// Names of unfinished files.
     pub unfinished: Vec<String>,
 }
 
@@ -200,7 +200,7 @@ impl Files {
     /// Reads all files below a folder.
     ///
     /// # Panics
-    /// It cannot be read.
+    /// The folder is unreadable.
     #[must_use]
     pub fn below(folder: &Path) -> Self {
         let mut files = Self::default();
@@ -210,7 +210,8 @@ impl Files {
                 continue;
             };
             let name = name.to_string_lossy();
-            // The rows of a sweep's points are a log: each row has a checksum, and a cut last one is replayed.
+            // The rows of a sweep's points are a log: each row has a checksum, and an incomplete last row
+            // is replayed.
             if name == "points" {
                 continue;
             }
@@ -231,10 +232,10 @@ impl Files {
         files
     }
 
-    /// Holds every finished file against that of an undisturbed run.
+    /// Compares every finished file with that of an undisturbed run.
     ///
     /// # Panics
-    /// One is not the same, or of a writer that measures, no JSON.
+    /// A file differs, or the JSON of a writer that measures is invalid.
     pub fn assert_part_of(&self, whole: &Self, writer: &Writer, place: &str) {
         for (name, bytes) in &self.finished {
             let expected = whole.finished.get(name);

@@ -1,4 +1,5 @@
-//! The examples of `docs/use/analysis.md` print what the page says, and Parquet holds what CSV does.
+//! Checks that the examples of `docs/use/analysis.md` print what the page says, and that Parquet has the
+//! data of CSV.
 
 use parallax_tests::{program, root, run_ok};
 use std::fs;
@@ -17,7 +18,7 @@ fn blocks(page: &str) -> Vec<Block> {
         .collect()
 }
 
-/// True where Python has all that a program imports; a line on stderr says what is missing.
+/// Whether Python has all modules that a program imports; prints a line on stderr if not.
 fn can_run(program: &str) -> bool {
     let imports = program.lines().filter(|line| line.starts_with("import "));
     // pandas reads Parquet through pyarrow.
@@ -85,7 +86,7 @@ fn the_examples_print_what_the_page_says() {
 }
 
 #[test]
-fn parquet_holds_what_csv_does_with_types() {
+fn parquet_has_the_data_of_csv_with_types() {
     const SCRIPT: &str = "\
 import csv
 import pyarrow.parquet

@@ -1,11 +1,11 @@
-//! OSMesa beside lavapipe: the same fragments, what it refuses, and a machine without it.
+//! Compares OSMesa with lavapipe: equal fragments, refused options, and machines without the library.
 
 use formats::textrace::{Textrace, Tile};
 use parallax_tests::{program, real_scene, refuse, run_ok};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Captures a scene; `None`, with a line on stderr that says so, where the library is absent.
+/// Captures a scene; `None`, with a line on stderr, if the library is absent.
 fn capture(folder: &Path, backend: &str, driver: &str, arguments: &[&str]) -> Option<PathBuf> {
     let trace = folder.join(format!("{backend}-{driver}.textrace"));
     let mut command = program("tracegen");
@@ -27,11 +27,11 @@ fn capture(folder: &Path, backend: &str, driver: &str, arguments: &[&str]) -> Op
     Some(trace)
 }
 
-/// What a lane of a quad samples in a group: where it is (pass, tile, quad and lane, primitive, group), and the
-/// quad's coordinates.
+/// A sample of a lane: its position (pass, tile, quad and lane, primitive, group), and the quad's
+/// coordinates.
 type Sampled = ((usize, usize, [u8; 2], u32, u32, u8), [[i32; 2]; 4]);
 
-/// What a trace's lanes sample, in order, and the name of its driver.
+/// The samples of a trace's lanes, in order, and the name of its driver.
 fn sampled(path: &Path) -> (Vec<Sampled>, String) {
     let trace = Textrace::open(path).expect("a trace");
     let mut found = Vec::new();
@@ -52,7 +52,7 @@ fn sampled(path: &Path) -> (Vec<Sampled>, String) {
     (found, trace.tables().meta.driver.clone())
 }
 
-/// Fragments of both over fragments of either.
+/// Fragments of both over fragments of at least one.
 fn overlap(a: &[Sampled], b: &[Sampled]) -> f64 {
     let places = |of: &[Sampled]| -> HashSet<_> { of.iter().map(|(place, _)| *place).collect() };
     let (a, b) = (places(a), places(b));
@@ -65,8 +65,8 @@ fn mesa(driver: &str) -> &str {
     version.split(' ').next().unwrap_or_default()
 }
 
-/// Holds OSMesa's llvmpipe against lavapipe's: what every lane samples is the same to the last bit where both
-/// come from one version of Mesa.
+/// Compares OSMesa's llvmpipe with lavapipe's: every lane has bit-identical samples if both are from the
+/// same version of Mesa.
 fn hold_llvmpipe(arguments: &[&str]) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(ours) = capture(folder.path(), "osmesa", "llvmpipe", arguments) else {
@@ -95,7 +95,7 @@ fn osmesa_samples_what_lavapipe_samples_to_the_last_bit() {
     hold_llvmpipe(&["atrium-shadows", "--size", "96x80", "--views", "left"]);
 }
 
-/// Writes a slanted floor whose texture is turned, scaled and moved by KHR_texture_transform.
+/// Writes a slanted floor whose texture is rotated, scaled and moved by KHR_texture_transform.
 fn write_turned_floor(folder: &Path) -> PathBuf {
     let positions = [
         [-4.0, -1.0, 1.0],
@@ -169,7 +169,7 @@ fn osmesa_samples_what_lavapipe_samples_in_a_real_scene() {
     let Some(scene) = real_scene("stk-cocoa-temple/stk-cocoa-temple.gltf") else {
         return;
     };
-    // Its grass lies on its ground: ties of depth that a last bit decides.
+    // Its grass lies on its ground, so the last bit decides between equal depths.
     hold_llvmpipe(&[&scene.to_string_lossy(), "--size", "128x128"]);
 }
 
@@ -180,7 +180,7 @@ fn softpipe_draws_almost_the_same_fragments() {
     let Some(softpipe) = capture(folder.path(), "osmesa", "softpipe", &arguments) else {
         return;
     };
-    // Against the reference, its quads without cross terms are the cause of what differs.
+    // Differences from the reference are caused by its quads without cross terms.
     let mut verify = program("tracegen");
     verify.args(["verify", "teapot", "--json", "--trace"]);
     let report = run_ok(verify.arg(&softpipe)).stdout;
@@ -235,7 +235,7 @@ fn osmesa_refuses_techniques() {
 #[test]
 fn without_the_library_its_file_and_package_are_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // The loader takes the first file of the name, and this one is none.
+    // The loader takes the first file with that name, and this one is not a library.
     std::fs::write(folder.path().join("libOSMesa.so.8"), "").expect("a file");
     let command = |backend: &str| {
         let mut command = program("tracegen");
@@ -246,7 +246,7 @@ fn without_the_library_its_file_and_package_are_named() {
     };
     let named = ["libOSMesa.so.8", "apt-get install libosmesa6"];
     refuse(&mut command("osmesa"), &named);
-    // Where there is no Vulkan driver either, both are named.
+    // Without a Vulkan driver, both are named.
     let mut auto = command("auto");
     auto.env("VK_DRIVER_FILES", folder.path())
         .env("VK_ICD_FILENAMES", folder.path());

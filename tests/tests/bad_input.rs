@@ -1,4 +1,4 @@
-//! Bad input: exit code 2, one clear message, no panic, nothing left under the final name.
+//! Bad input: exit code 2, one clear message, no panic, no file under the final name.
 
 use parallax_tests::{program, refuse, root};
 use std::fs;
@@ -21,7 +21,7 @@ fn a_missing_trace_is_named() {
 }
 
 #[test]
-fn a_cut_trace_is_refused_by_every_reader() {
+fn a_truncated_trace_is_refused_by_every_reader() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for keep in [0, 7, 63, 1000] {
         let path = damaged(folder.path(), |bytes| bytes.truncate(keep));
@@ -48,7 +48,7 @@ fn a_flipped_bit_in_the_quads_is_refused() {
 }
 
 #[test]
-fn a_text_file_is_no_trace() {
+fn a_text_file_is_not_a_trace() {
     refuse(
         program("replay").arg("run").arg(root().join("Cargo.toml")),
         &["Cargo.toml"],
@@ -56,7 +56,7 @@ fn a_text_file_is_no_trace() {
 }
 
 #[test]
-fn a_cache_whose_sets_are_no_power_of_two_is_refused() {
+fn a_cache_whose_number_of_sets_is_not_a_power_of_two_is_refused() {
     let trace = root().join("traces/atrium-shadows.textrace");
     refuse(
         program("replay")
@@ -68,7 +68,7 @@ fn a_cache_whose_sets_are_no_power_of_two_is_refused() {
 }
 
 #[test]
-fn caches_that_no_memory_holds_are_refused() {
+fn caches_that_exceed_the_memory_are_refused() {
     let trace = root().join("traces/atrium-shadows.textrace");
     let huge = ["--l1-ways", "255", "--l1", "65280MiB", "--cores", "64"];
     for command in ["run", "locality"] {
@@ -83,7 +83,7 @@ fn caches_that_no_memory_holds_are_refused() {
 }
 
 #[test]
-fn an_unknown_order_is_refused_with_the_known_ones() {
+fn an_unknown_order_is_refused_with_the_list_of_known_orders() {
     let trace = root().join("traces/atrium-shadows.textrace");
     refuse(
         program("replay")
@@ -106,7 +106,7 @@ fn an_unknown_key_in_a_sweep_is_refused() {
 }
 
 #[test]
-fn a_missing_scene_leaves_no_trace_behind() {
+fn a_missing_scene_leaves_no_trace_file() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (subcommand, out) in [("raster", "out.textrace"), ("rays", "out.raytrace")] {
         refuse(
@@ -155,7 +155,7 @@ fn a_scene_with_a_nan_position_names_the_place() {
 }
 
 #[test]
-fn a_path_with_a_nan_pose_is_refused_by_every_command_that_follows_one() {
+fn a_path_with_a_nan_pose_is_refused_by_every_command_with_a_path() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("path.csv");
     let header = "time_s,x_m,y_m,z_m,qx,qy,qz,qw";
@@ -192,7 +192,7 @@ fn a_path_with_a_nan_pose_is_refused_by_every_command_that_follows_one() {
 }
 
 #[test]
-fn culling_that_the_display_cannot_have_is_refused() {
+fn culling_options_that_do_not_fit_the_display_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("out.textrace");
     let wide: &[&str] = &["--hfov", "100", "--cant", "42"];

@@ -1,4 +1,4 @@
-//! `tracegen sweep`: the captures of a manifest.
+//! Tests of `tracegen sweep`, which makes the captures of a manifest.
 
 use parallax_tests::{encodings, program, refuse, run_ok};
 use std::fs;
@@ -40,7 +40,7 @@ impl Captures {
         command
     }
 
-    /// Runs and tells the closing line.
+    /// Runs the sweep and returns the last line of its output.
     fn run(&self, out: &str, flags: &[&str]) -> String {
         let output = run_ok(&mut self.command(out, flags));
         String::from_utf8_lossy(&output.stderr).trim().to_owned()
@@ -56,7 +56,7 @@ impl Captures {
 }
 
 #[test]
-fn shards_capture_what_the_command_line_does_and_only_once() {
+fn shards_make_the_same_captures_as_the_command_line_and_only_once() {
     let captures = Captures::new(MANIFEST);
     let told = captures.run("out", &["--shard", "2/2"]);
     assert!(
@@ -74,7 +74,7 @@ fn shards_capture_what_the_command_line_does_and_only_once() {
         .collect();
     assert_eq!(captures.names("out"), names);
 
-    // A trace is what its recipe makes by hand.
+    // The recipe of a trace makes the same trace by hand.
     let recipe = captures.path("out/chess-vive.raytrace.recipe");
     let recipe = fs::read_to_string(recipe).expect("a recipe");
     let (recipe, checksum) = recipe.split_once('\n').expect("two lines");
@@ -94,7 +94,7 @@ fn shards_capture_what_the_command_line_does_and_only_once() {
     let told = info["checksum"].as_str().expect("a checksum");
     assert_eq!(checksum, format!("# content checksum {told}\n"));
 
-    // Another recipe under the same name is captured again, and so is a trace that has none.
+    // A changed recipe and a missing recipe cause a new capture.
     fs::write(captures.path("m.toml"), MANIFEST.replace("16x24", "24x16")).expect("temporary file");
     assert!(captures.run("out", &[]).contains("4 made"));
     fs::remove_file(captures.path("out/teapot-vive.raytrace.recipe")).expect("removed");
@@ -102,7 +102,7 @@ fn shards_capture_what_the_command_line_does_and_only_once() {
 }
 
 #[test]
-fn other_settings_of_the_rays_of_a_scene_recapture_the_rays_alone() {
+fn changed_settings_of_rays_recapture_only_the_rays() {
     let manifest = |raster: &str, rays: &str| {
         format!(
             "[[captures]]\nscene = \"teapot\"\nno-plain = true\nsize = \"{raster}\"\n\
@@ -131,7 +131,7 @@ fn other_settings_of_the_rays_of_a_scene_recapture_the_rays_alone() {
 }
 
 #[test]
-fn a_truncated_or_a_foreign_trace_beside_its_recipe_is_captured_again() {
+fn a_truncated_or_foreign_trace_with_a_recipe_is_captured_again() {
     let captures = Captures::new(MANIFEST);
     captures.run("out", &[]);
     let path = |name: &str| captures.path(&format!("out/{name}.raytrace"));
@@ -150,7 +150,7 @@ fn a_truncated_or_a_foreign_trace_beside_its_recipe_is_captured_again() {
 
 #[cfg(unix)]
 #[test]
-fn a_pipe_in_the_place_of_a_recipe_or_a_trace_is_refused() {
+fn a_pipe_instead_of_a_recipe_or_a_trace_is_refused() {
     let captures =
         Captures::new("[[captures]]\ncommand = \"rays\"\nscene = \"teapot\"\nsize = \"16x24\"\n");
     for name in ["teapot.raytrace", "teapot.raytrace.recipe"] {
@@ -164,7 +164,7 @@ fn a_pipe_in_the_place_of_a_recipe_or_a_trace_is_refused() {
 }
 
 #[test]
-fn captures_are_packed_as_the_manifest_says() {
+fn captures_have_the_encoding_of_the_manifest() {
     let captures = Captures::new(
         "[base]\nsize = \"32x24\"\nno-plain = true\n[[captures]]\nscene = \"teapot\"\n\
          encoding = [\"delta\", \"planes\"]\n",
@@ -184,7 +184,7 @@ fn captures_are_packed_as_the_manifest_says() {
 }
 
 #[test]
-fn the_plan_tells_recipes_costs_and_what_is_done() {
+fn the_plan_lists_recipes_costs_and_finished_captures() {
     let captures = Captures::new(MANIFEST);
     let text = run_ok(&mut captures.command("out", &["--plan"])).stdout;
     let text = String::from_utf8(text).expect("text");
@@ -205,12 +205,12 @@ fn the_plan_tells_recipes_costs_and_what_is_done() {
         .map(|c| &c["done"])
         .collect();
     assert_eq!(done, [true, true, false, false]);
-    // Samples, and the teapot's triangles at ten samples each.
+    // Samples, and ten samples for each of the teapot's triangles.
     assert_eq!(plan["captures"][0]["cost"], 2 * 16 * 24 + 10 * 14_972);
 }
 
 #[test]
-fn a_slurm_script_captures_a_shard_a_task() {
+fn a_slurm_script_captures_one_shard_per_task() {
     let captures = Captures::new(MANIFEST);
     let script = run_ok(&mut captures.command("it's out", &["--emit-slurm", "2"])).stdout;
     fs::write(captures.path("job.sh"), script).expect("temporary file");
@@ -225,7 +225,7 @@ fn a_slurm_script_captures_a_shard_a_task() {
 }
 
 #[test]
-fn bad_captures_are_refused_before_the_first_and_failures_are_named_after_the_last() {
+fn bad_captures_are_refused_before_the_first_and_failures_are_listed_after_the_last() {
     let scene = |line: &str| {
         let usual = if line.starts_with("scene") {
             ""

@@ -1,11 +1,12 @@
-//! What the programs say: versions, completions, manuals, messages.
+//! Tests of versions, completions, manual pages and messages of the programs.
 
 use parallax_tests::{program, refuse, root, run_ok};
+use std::collections::BTreeSet;
 use std::process::Command;
 
 const PROGRAMS: [&str; 2] = ["tracegen", "replay"];
 
-/// The subcommands that a program's help lists.
+/// The subcommands in a program's help.
 fn subcommands(name: &str) -> Vec<String> {
     let help = run_ok(program(name).arg("--help")).stdout;
     let help = String::from_utf8(help).expect("UTF-8");
@@ -24,6 +25,26 @@ fn subcommands(name: &str) -> Vec<String> {
     names
 }
 
+/// Commands of a program that the page of commands names: the word after the program's in `code`.
+fn commands_of_the_page(page: &str, name: &str) -> BTreeSet<String> {
+    let codes = page.split('`').skip(1).step_by(2);
+    let of_program = codes.filter_map(|code| code.strip_prefix(name)?.strip_prefix(' '));
+    of_program
+        .filter_map(|rest| rest.split_whitespace().next())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn the_page_of_commands_lists_those_of_both_programs_and_no_other() {
+    let page = root().join("docs/use/commands.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    for name in PROGRAMS {
+        let expected: BTreeSet<String> = subcommands(name).into_iter().collect();
+        assert_eq!(commands_of_the_page(&page, name), expected, "{name}");
+    }
+}
+
 #[test]
 fn versions_name_the_formats() {
     for name in PROGRAMS {
@@ -37,7 +58,7 @@ fn versions_name_the_formats() {
 }
 
 #[test]
-fn completions_of_every_shell_know_every_subcommand() {
+fn completions_of_every_shell_contain_every_subcommand() {
     for name in PROGRAMS {
         for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
             let script = run_ok(program(name).args(["completions", shell])).stdout;
@@ -79,7 +100,7 @@ fn terminal_escapes_in_names_are_not_printed_raw() {
         );
         assert!(!output.stderr.contains(&0x1b), "{arguments:?}");
     }
-    // An argument that the parser itself refuses.
+    // An argument that the parser refuses.
     let output = refuse(
         program("replay").args(["run", "--no\u{7}-such"]),
         &["-such"],
@@ -88,7 +109,7 @@ fn terminal_escapes_in_names_are_not_printed_raw() {
 }
 
 #[test]
-fn an_error_is_told_once() {
+fn an_error_is_printed_once() {
     let output = refuse(program("replay").args(["run", "no-such.textrace"]), &[]);
     let text = String::from_utf8(output.stderr).expect("UTF-8");
     for part in ["no-such.textrace", "No such file", "error"] {
@@ -102,7 +123,7 @@ fn an_error_is_told_once() {
 }
 
 #[test]
-fn quiet_prints_the_result_alone() {
+fn quiet_prints_only_the_result() {
     let trace = root().join("traces/atrium-shadows.textrace");
     let run = |quiet: &[&str]| run_ok(program("replay").arg("run").arg(&trace).args(quiet));
     let (told, quiet) = (run(&[]), run(&["--quiet"]));
@@ -115,7 +136,7 @@ fn quiet_prints_the_result_alone() {
 
 #[cfg(unix)]
 #[test]
-fn a_log_that_cannot_be_written_is_no_reason_to_fail_and_a_result_is() {
+fn an_unwritable_log_is_ignored_and_an_unwritable_result_is_an_error() {
     let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else {
         parallax_tests::skipped!("there is no /dev/full");
         return;
@@ -128,7 +149,7 @@ fn a_log_that_cannot_be_written_is_no_reason_to_fail_and_a_result_is() {
         command
     };
     let told = run_ok(&mut run(&["run"]));
-    assert!(!told.stderr.is_empty(), "it tells of the run");
+    assert!(!told.stderr.is_empty(), "it prints figures about the run");
     let untold = run_ok(run(&["run"]).stderr(full()));
     assert_eq!(untold.stdout, told.stdout);
     for arguments in [&["run", "no-such"][..], &["run", "--no\u{7}-such"]] {
@@ -145,7 +166,7 @@ fn a_log_that_cannot_be_written_is_no_reason_to_fail_and_a_result_is() {
 }
 
 #[test]
-fn flags_that_say_nothing_about_what_is_converted_are_refused() {
+fn flags_without_effect_on_the_conversion_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = root().join("traces/atrium-shadows.textrace");
     for (arguments, expected) in [
@@ -163,21 +184,24 @@ fn flags_that_say_nothing_about_what_is_converted_are_refused() {
         ),
         (
             "--to textrace --order morton -o a",
-            "--order: a trace holds records",
+            "--order: it has no effect on a trace",
         ),
         (
             "--to textrace --texel-format bc7 -o a",
-            "--texel-format: a trace holds records",
+            "--texel-format: it has no effect on a trace",
         ),
         (
             "--to u32 --compress zstd -o a.gz",
-            "--compress zstd: expected gzip, which the name a.gz asks for",
+            "--compress zstd: expected gzip, because the output is named a.gz",
         ),
         (
             "--to textrace --compress gzip -o a",
-            "--compress: a trace is not",
+            "--compress: a trace cannot be compressed",
         ),
-        ("--to textrace -o a.gz", "--output a.gz: a trace is not"),
+        (
+            "--to textrace -o a.gz",
+            "--output a.gz: a trace cannot be compressed",
+        ),
     ] {
         let mut command = program("replay");
         command
@@ -193,7 +217,7 @@ fn flags_that_say_nothing_about_what_is_converted_are_refused() {
 }
 
 #[test]
-fn orders_are_not_for_addresses_and_tables_go_to_a_folder() {
+fn orders_are_refused_for_addresses_and_tables_go_to_a_folder() {
     let trace = root().join("traces/atrium-shadows.textrace");
     let mut command = program("replay");
     command.args(["locality", "--addresses", "a.u32", "--orders", "all"]);
@@ -204,7 +228,7 @@ fn orders_are_not_for_addresses_and_tables_go_to_a_folder() {
 }
 
 #[test]
-fn a_capture_that_sees_nothing_warns_with_bounds_and_camera() {
+fn a_capture_without_visible_triangles_warns_with_bounds_and_camera() {
     let away = [
         "--eye", "0,100,0", "--target", "0,200,1", "--size", "32x32", "-q", "-o", "-",
     ];
@@ -225,7 +249,7 @@ fn a_capture_that_sees_nothing_warns_with_bounds_and_camera() {
 }
 
 #[test]
-fn frames_are_offered_where_a_trace_holds_several() {
+fn frames_are_listed_if_a_trace_has_several() {
     refuse(
         program("tracegen").args(["rays", "teapot", "--frames", "2", "-o", "-"]),
         &["--frames"],
@@ -236,7 +260,7 @@ fn frames_are_offered_where_a_trace_holds_several() {
 
 #[cfg(unix)]
 #[test]
-fn a_path_that_is_no_text_is_no_panic() {
+fn a_path_that_is_not_utf8_causes_no_panic() {
     use std::os::unix::ffi::OsStrExt;
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder

@@ -1,4 +1,4 @@
-//! The same input gives the same bytes, whatever the thread count and the run.
+//! The same input gives the same bytes for any number of threads and in every run.
 
 use parallax_tests::repair::Parts;
 use parallax_tests::{program, root, run_ok};
@@ -48,19 +48,19 @@ fn fragments_recorded_one_by_one_give_the_same_traces_as_quads() {
     for name in ["atrium-shadows", "jungle"] {
         let recipe = root().join(format!("traces/{name}.recipe"));
         let recipe = fs::read_to_string(recipe).expect("a golden trace has a recipe");
-        // Vectors of 128 bits hold one quad, and ballots are unsound.
+        // Vectors of 128 bits hold one quad, and their ballots are unreliable.
         let capture = |bits: &str| {
             let path = folder.path().join(format!("{name}-{bits}.textrace"));
             let mut command = program("tracegen");
             command.args(recipe.split_whitespace()).arg("-o").arg(&path);
-            // tracegen chooses the same where vectors are narrow.
+            // tracegen makes the same choice for narrow vectors.
             command.env("GALLIUM_OVERRIDE_CPU_CAPS", "sse4.1");
             let output = run_ok(command.env("LP_NATIVE_VECTOR_WIDTH", bits));
             let told = String::from_utf8_lossy(&output.stderr).contains("recorded one by one");
             assert_eq!(told, bits == "128");
             let bytes = fs::read(&path).expect("a trace");
             let mut chunks = Parts::of(&bytes).chunks;
-            // It names the driver.
+            // The description names the driver.
             chunks.retain(|(tag, _)| tag != b"META");
             chunks
         };

@@ -1,4 +1,5 @@
-//! `replay run --dram`: every line that leaves the last cache is read once, and nothing else of the result changes.
+//! Tests of `replay run --dram`: every line that leaves the last cache is read once, and other results do
+//! not change.
 
 use parallax_tests::{program, root};
 use serde_json::Value;
@@ -38,7 +39,7 @@ fn every_line_that_leaves_the_caches_is_read_once_in_every_mode() {
                 assert_eq!(with, without, "{place}, {device}");
                 let lines = count(&with["external_bytes"]) / 16;
                 assert_eq!(count(&dram["requests"]), lines, "{place}, {device}");
-                // A line of 16 bytes takes a burst, which is larger in every device.
+                // A line of 16 bytes needs a burst, which is larger in every device.
                 assert_eq!(count(&dram["reads"]), lines, "{place}, {device}");
                 let kinds =
                     ["row_hits", "row_empty", "row_conflicts"].map(|kind| count(&dram[kind]));

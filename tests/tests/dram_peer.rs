@@ -1,4 +1,5 @@
-//! The DRAM model beside Ramulator (`tests/peers/ramulator`), which cmake builds in about three minutes: with PARALLAX_PEERS=1.
+//! Compares the DRAM model with Ramulator (`tests/peers/ramulator`). Runs with PARALLAX_PEERS=1, because
+//! cmake takes about three minutes to build it.
 
 use parallax_tests::{root, skipped};
 use std::process::Command;
@@ -8,7 +9,7 @@ fn succeeds(command: &mut Command) -> bool {
 }
 
 #[test]
-fn row_hits_and_latencies_are_ramulators() {
+fn row_hits_and_latencies_match_those_of_ramulator() {
     if std::env::var_os("PARALLAX_PEERS").is_none() {
         skipped!("no comparison with Ramulator: PARALLAX_PEERS is not set");
         return;

@@ -1,5 +1,5 @@
-//! Where a scene stands and how large it is changes neither picture nor trace; eyes in one place
-//! see the same.
+//! Position and size of a scene change neither picture nor trace, and eyes at the same place have the same
+//! view.
 
 use formats::textrace::{Textrace, Tile};
 use parallax_tests::{program, real_scene, refuse, run_ok};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 const SIZE: &str = "128x128";
 
-/// A unit sphere, its vertices multiples of 2^-20: at 10^7 they still are numbers of 64 bits.
+/// A unit sphere whose vertices are multiples of 2^-20, so that they are exact 64-bit numbers even at 10^7.
 struct Sphere {
     vertices: Vec<[f64; 3]>,
     triangles: Vec<[usize; 3]>,
@@ -43,7 +43,7 @@ impl Sphere {
         }
     }
 
-    /// With the place in the vertices.
+    /// With the position in the vertices.
     fn obj(&self, at: [f64; 3], scale: f64) -> String {
         let mut obj = String::new();
         for v in &self.vertices {
@@ -56,7 +56,7 @@ impl Sphere {
         obj
     }
 
-    /// With the place in the node.
+    /// With the position in the node.
     fn gltf(&self, at: [f64; 3], scale: f64) -> String {
         let positions = self.vertices.iter().flatten().map(|&v| v as f32);
         let indices = self.triangles.iter().flatten().map(|&v| v as u32);
@@ -90,8 +90,8 @@ fn list([x, y, z]: [f64; 3]) -> String {
     format!("{x},{y},{z}")
 }
 
-/// Writes the scene, captures it seen from 3.25 half extents away (or as `view` says), and returns
-/// the trace's tiles.
+/// Writes the scene, captures it from a distance of 3.25 half extents (or with the flags in `view`), and
+/// returns the trace's tiles.
 fn capture(folder: &Path, file: &str, text: &str, view: &[String]) -> Vec<Tile> {
     let [scene, trace] = [file, "a.textrace"].map(|name| folder.join(name));
     std::fs::write(&scene, text).expect("writable");
@@ -123,7 +123,7 @@ fn quads(tiles: &[Tile]) -> usize {
     tiles.iter().map(|tile| tile.records.len()).sum()
 }
 
-/// `--eye` and `--target` of a head before a sphere of this place and size.
+/// `--eye` and `--target` for a head in front of a sphere with this position and size.
 fn before(at: [f64; 3], scale: f64) -> Vec<String> {
     let [x, y, z] = at;
     let eye = [x + 0.5 * scale, y + 0.25 * scale, z + 3.25 * scale];
@@ -139,7 +139,7 @@ const PLACES: [[f64; 3]; 5] = [
 ];
 
 #[test]
-fn a_sphere_gives_the_same_records_from_zero_to_ten_million() {
+fn a_sphere_has_the_same_records_from_zero_to_ten_million() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let sphere = Sphere::new();
     let node = |at| {
@@ -168,7 +168,7 @@ fn a_sphere_gives_the_same_records_from_zero_to_ten_million() {
 }
 
 #[test]
-fn a_head_on_a_path_far_out_gives_the_same_records() {
+fn a_head_on_a_path_far_from_the_origin_has_the_same_records() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let sphere = Sphere::new();
     let along = |at: [f64; 3]| {
@@ -194,12 +194,12 @@ fn a_head_on_a_path_far_out_gives_the_same_records() {
 }
 
 #[test]
-fn a_sphere_of_any_size_gives_the_same_records() {
+fn a_sphere_of_any_size_has_the_same_records() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let sphere = Sphere::new();
     let of = |scale: f64, text: String, name: &str, flags: &[&str]| {
         let mut view = before([0.0; 3], scale);
-        // Eyes as far apart, in radii.
+        // Eye distance in proportion to the radius.
         view.extend(["--ipd".into(), (64.0 * scale).to_string()]);
         view.extend(flags.iter().map(|&flag| flag.to_owned()));
         capture(folder.path(), name, &text, &view)
@@ -208,20 +208,20 @@ fn a_sphere_of_any_size_gives_the_same_records() {
     let baked = |scale: f64| of(scale, sphere.obj([0.0; 3], scale), "a.obj", &[]);
     let same = [node(1.0), baked(1.0)];
     for exponent in [-20, 20] {
-        // Powers of two round as 1 does.
+        // Powers of two round like 1.
         let scale = 2f64.powi(exponent);
         assert!(same[0] == node(scale), "by its node at 2^{exponent}");
         assert!(same[1] == baked(scale), "by its vertices at 2^{exponent}");
     }
     for scale in [1e-6, 1e6] {
         for (same, other) in same.iter().zip([node(scale), baked(scale)]) {
-            // A vertex may fall on the next of 1/256 of a pixel.
+            // A vertex may round to the next multiple of 1/256 pixel.
             let [a, b] = [quads(same), quads(&other)];
             assert!(a.abs_diff(b) * 500 <= a, "{a} quads, at {scale} {b}");
         }
     }
-    // Shadow cascades are fitted in steps of 1/16 m to scenes as large as buildings, and in steps of
-    // their own size to much smaller and much larger ones.
+    // Shadow cascades are fitted in steps of 1/16 m for scenes as large as buildings, and in steps relative
+    // to their size for much smaller and larger ones.
     let shadows = |exponent: i32| {
         let scale = 2f64.powi(exponent);
         of(scale, sphere.obj([0.0; 3], scale), "a.obj", &["--shadows"])
@@ -234,7 +234,7 @@ fn a_sphere_of_any_size_gives_the_same_records() {
 }
 
 #[test]
-fn a_trace_from_far_out_tells_where_and_a_camera_without_direction_is_refused() {
+fn a_trace_far_from_the_origin_records_its_origin_and_a_camera_without_direction_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let at = PLACES[4];
     let flags = before(at, 1.0);
@@ -267,8 +267,8 @@ fn a_trace_from_far_out_tells_where_and_a_camera_without_direction_is_refused() 
     );
 }
 
-/// External bytes of a trace in an order; the caches hold what a pair of tiles needs, and not what
-/// a picture does.
+/// External bytes of a trace in an order. The caches hold the lines of a pair of tiles, but not those of a
+/// picture.
 fn external_bytes(trace: &Path, order: &str, caches: [&str; 4]) -> f64 {
     let [l1, l1_ways, l2, l2_ways] = caches;
     let run = run_ok(
@@ -283,8 +283,8 @@ fn external_bytes(trace: &Path, order: &str, caches: [&str; 4]) -> f64 {
     run["result"]["external_bytes"].as_f64().expect("a number")
 }
 
-/// Both eyes in one place: pictures and records are the same, and of Morton's external bytes Z2 STA
-/// needs one half.
+/// With both eyes at the same place, pictures and records are equal, and Z2 STA needs half of Morton's
+/// external bytes.
 fn check_eyes_in_one_place(scene: &str, size: &str, caches: [&str; 4]) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let [trace, picture]: [PathBuf; 2] =
@@ -321,7 +321,7 @@ fn check_eyes_in_one_place(scene: &str, size: &str, caches: [&str; 4]) {
 }
 
 #[test]
-fn eyes_in_one_place_see_the_same_and_z2_sta_needs_half_of_the_bytes() {
+fn eyes_at_the_same_place_have_equal_records_and_z2_sta_needs_half_of_the_bytes() {
     check_eyes_in_one_place("atrium", "128x128", ["2KiB", "16", "8KiB", "64"]);
     if let Some(scene) = real_scene("crytek-sponza/sponza.gltf") {
         let scene = scene.to_string_lossy();

@@ -1,4 +1,5 @@
-//! Figures in documents are those of the results files in `results/`. `make figures` writes the tables anew.
+//! Checks that the figures in documents are those of the results files in `results/`. `make figures`
+//! rewrites the tables.
 
 use parallax_tests::figures::{Results, documents, typed_tables, with_tables};
 use parallax_tests::root;
@@ -6,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 #[test]
-fn every_marked_table_is_that_of_its_results_file() {
+fn every_marked_table_equals_its_results_file() {
     let writes = std::env::var_os("UPDATE_FIGURES").is_some();
     let mut shown = BTreeSet::new();
     for file in documents() {
@@ -32,7 +33,7 @@ fn every_marked_table_is_that_of_its_results_file() {
 }
 
 #[test]
-fn every_results_file_says_how_it_was_made_and_a_document_refers_to_it() {
+fn every_results_file_names_its_command_and_is_used_by_a_document() {
     let texts: Vec<String> = (documents().iter())
         .map(|file| fs::read_to_string(file).expect("a document"))
         .collect();

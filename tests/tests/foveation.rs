@@ -1,4 +1,4 @@
-//! What is saved and what is lost by masking and foveating real scenes: fragments against the prediction, and
+//! Savings and image errors of masking and foveating real scenes: fragments against the prediction, and
 //! image error against the picture at full rate.
 
 use formats::view::{FovTangents, Lens};
@@ -13,7 +13,7 @@ struct Shot {
     picture: Picture,
     fragments: u64,
     quads: u64,
-    /// Share of the pixels that may be shaded.
+    /// Share of the pixels that are not masked.
     predicted: Option<f64>,
 }
 
@@ -62,7 +62,7 @@ fn shoot(folder: &Path, scene: &str, options: &[&str]) -> Shot {
     }
 }
 
-/// The display that `--size` asks for.
+/// The display that `--size` sets.
 fn fov() -> FovTangents {
     let horizontal = 50.0_f32.to_radians().tan();
     let vertical = horizontal * SIZE_PX[1] as f32 / SIZE_PX[0] as f32;
@@ -74,8 +74,8 @@ fn fov() -> FovTangents {
     }
 }
 
-/// What settings shade and how far their pictures are from the one without: all settings, or those
-/// that tell most.
+/// Measures fragments and picture errors with settings against the picture without: all settings, or the
+/// most informative ones.
 fn measure(scene: &str, all: bool) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let whole = shoot(folder.path(), scene, &[]);
@@ -98,7 +98,7 @@ fn measure(scene: &str, all: bool) {
             error.psnr_db,
             error.ssim
         );
-        // Where much lies behind each other, and where the sky is, fragments are not spread evenly.
+        // Deep scenes and sky have unevenly distributed fragments.
         assert!(
             (share - predicted).abs() < 0.2,
             "{name}: {share} {predicted}"
@@ -129,7 +129,7 @@ fn measure(scene: &str, all: bool) {
         assert!(pair[0].1 > pair[1].1, "{pair:?}");
     }
     let (rings, _) = row("rings 15,25,35,45", &["--foveate", "rings"]);
-    // Coarser only in the periphery: less than the coarsest rate everywhere.
+    // Coarser only in the periphery, so the error is less than with the coarsest rate everywhere.
     assert!(0.0 < rings.flip_mean && rings.flip_mean < coarsest);
     if !all {
         return;
@@ -145,13 +145,14 @@ fn measure(scene: &str, all: bool) {
 }
 
 #[test]
-fn coarser_rates_shade_less_and_err_more_on_a_built_in_scene() {
+fn coarser_rates_shade_fewer_fragments_and_have_larger_errors_on_a_built_in_scene() {
     measure("chess", true);
 }
 
 #[test]
-fn coarser_rates_shade_less_and_err_more_on_crytek_sponza_and_the_black_forest() {
-    // `FOVEATION=all` measures every setting there, too.
+fn coarser_rates_shade_fewer_fragments_and_have_larger_errors_on_crytek_sponza_and_the_black_forest()
+ {
+    // With `FOVEATION=all`, every setting is measured there, too.
     let all = std::env::var_os("FOVEATION").is_some();
     for scene in [
         "crytek-sponza/sponza.gltf",

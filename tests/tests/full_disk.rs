@@ -1,7 +1,7 @@
-//! A disk that is full at every size of the outputs, or that cannot be written: exit code 2 and a
-//! message, whole files or none, nothing unfinished left behind.
+//! Disks that become full at any size of the outputs, or are read-only: exit code 2 and a message, complete
+//! files or none, no unfinished files.
 //!
-//! `make faults` tries every writer at many sizes (`STEPS=n`); `make test` a few at some.
+//! `make faults` tries every writer at many sizes (`STEPS=n`); `make test` tries a few at some sizes.
 #![cfg(unix)]
 
 use parallax_tests::writers::{self, Files, Writer, run_to_the_end};
@@ -10,7 +10,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Sizes between nothing and what the outputs need.
+/// Number of sizes between nothing and the size of the outputs.
 fn steps() -> u64 {
     std::env::var("STEPS").map_or(2, |n| n.parse().expect("STEPS: a number"))
 }
@@ -22,13 +22,13 @@ fn writers() -> &'static [Writer] {
     }
 }
 
-/// A file system in memory, as root can make one.
+/// A file system in memory, which only root can mount.
 struct MemoryDisk {
     place: tempfile::TempDir,
 }
 
 impl MemoryDisk {
-    /// Nothing, with a line that says so, where this user may not mount.
+    /// `None`, with a line on stderr, if this user may not mount.
     fn new(size_bytes: u64) -> Option<Self> {
         let place = tempfile::tempdir().expect("a temporary folder");
         let mut command = Command::new("mount");
@@ -60,7 +60,7 @@ impl Drop for MemoryDisk {
     }
 }
 
-/// Runs a writer that has to fail for one of the reasons.
+/// Runs a writer that must fail for one of these reasons.
 fn fails(mut command: Command, reasons: &[&str], place: &str) {
     let output = command.stdout(Stdio::null()).output().expect("it starts");
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -70,20 +70,20 @@ fn fails(mut command: Command, reasons: &[&str], place: &str) {
     assert!(told, "{place}: none of {reasons:?} in {message}");
 }
 
-/// What each writer writes when there is room.
+/// The files that each writer writes on a large disk.
 fn whole(writer: &Writer, inputs: &Path) -> Files {
     let folder = tempfile::tempdir().expect("a temporary folder");
     run_to_the_end((writer.command)(inputs, folder.path()));
     Files::below(folder.path())
 }
 
-/// Pages that a file takes on a file system in memory.
+/// Size of a file in pages of a file system in memory.
 fn in_pages(bytes: usize) -> u64 {
     (bytes as u64).next_multiple_of(4096)
 }
 
 #[test]
-fn a_full_disk_is_told_whatever_its_size() {
+fn a_full_disk_is_reported_at_every_size() {
     let inputs = tempfile::tempdir().expect("a temporary folder");
     writers::write_inputs(inputs.path());
     let mut tries = 0;
@@ -95,7 +95,7 @@ fn a_full_disk_is_told_whatever_its_size() {
         }
         let steps = steps().min(needed / 4096);
         for step in 0..steps {
-            // At least a page for the folder; a size of 0 would be no limit.
+            // At least one page for the folder, because a size of 0 means no limit.
             let size = (needed * step / steps).next_multiple_of(4096).max(4096);
             if size >= needed {
                 continue;
@@ -120,11 +120,11 @@ fn a_full_disk_is_told_whatever_its_size() {
 }
 
 #[test]
-fn files_that_may_not_grow_are_told_at_every_size() {
+fn files_beyond_a_size_limit_are_reported_at_every_size() {
     let inputs = tempfile::tempdir().expect("a temporary folder");
     writers::write_inputs(inputs.path());
     let mut tries = 0;
-    // The driver keeps its memory in files, too.
+    // The driver also keeps its memory in files.
     for writer in writers().iter().filter(|writer| !writer.draws) {
         let whole = whole(writer, inputs.path());
         let largest = whole.finished.values().map(Vec::len).max();
@@ -157,13 +157,13 @@ fn files_that_may_not_grow_are_told_at_every_size() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_told() {
+fn an_unwritable_folder_is_reported() {
     let inputs = tempfile::tempdir().expect("a temporary folder");
     writers::write_inputs(inputs.path());
     let folder = tempfile::tempdir().expect("a temporary folder");
     let read_only = fs::Permissions::from_mode(0o555);
     fs::set_permissions(folder.path(), read_only).expect("permissions");
-    // Root may write it all the same, but not on a disk that is read only.
+    // Root can write to it, but not to a read-only disk.
     let disk = match fs::write(folder.path().join("try"), "") {
         Err(_) => None,
         Ok(()) => match MemoryDisk::new(1 << 20) {
@@ -190,7 +190,7 @@ fn a_folder_that_cannot_be_written_is_told() {
 }
 
 #[test]
-fn a_result_that_is_printed_on_a_full_disk_is_an_error() {
+fn a_result_printed_to_a_full_disk_is_an_error() {
     let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
         parallax_tests::skipped!("there is no /dev/full");
         return;

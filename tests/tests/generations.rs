@@ -1,7 +1,7 @@
 //! Two generations of Mesa capture the same records.
 //!
-//! `PARALLAX_SECOND_VK_DRIVER` names the Vulkan driver file (ICD, JSON) of another Mesa beside the installed one;
-//! without it the tests say so and pass. Libraries are looked for beside the driver's own first.
+//! `PARALLAX_SECOND_VK_DRIVER` names the Vulkan driver file (ICD, JSON) of a second Mesa version. Without
+//! it, the tests print a line and pass. Libraries are first searched next to the driver's own.
 
 use formats::textrace::{Tables, Textrace, Tile};
 use parallax_tests::{program, real_scene, run_ok};
@@ -16,7 +16,7 @@ struct Driver {
     libraries: PathBuf,
 }
 
-/// The second driver; `None`, with a line on stderr that says so, where none is named.
+/// The second driver; `None`, with a line on stderr, if none is named.
 fn second() -> Option<Driver> {
     let Some(file) = std::env::var_os(VARIABLE).map(PathBuf::from) else {
         parallax_tests::skipped!("no second generation of Mesa: {VARIABLE} is not set");
@@ -33,7 +33,7 @@ fn second() -> Option<Driver> {
     Some(Driver { file, libraries })
 }
 
-/// A capture of a scene through the installed driver or another one.
+/// Captures a scene with the installed driver or another one.
 fn capture(folder: &Path, scene: &str, driver: Option<&Driver>) -> Textrace {
     let trace = folder.join(if driver.is_some() { "second" } else { "first" });
     let trace = trace.with_extension("textrace");
@@ -50,7 +50,7 @@ fn capture(folder: &Path, scene: &str, driver: Option<&Driver>) -> Textrace {
     Textrace::open(&trace).expect("a trace")
 }
 
-/// A trace's tables but for its description.
+/// A trace's tables without its description.
 fn without_meta(tables: &Tables) -> Tables {
     Tables {
         meta: Default::default(),

@@ -1,8 +1,9 @@
-//! Golden traces: what `replay` prints for each is compared byte for byte with the committed JSON.
-//! `UPDATE_GOLDEN=1` rewrites the JSON instead; review the diff.
+//! Golden traces: compares the output of `replay` for each of them with the committed JSON, byte for byte.
+//! `UPDATE_GOLDEN=1` rewrites the JSON; review the diff.
 //!
-//! `traces/golden.digests` holds the model version and a digest of every golden result's counts. Where counts of an
-//! unchanged trace change, the model version must change too: `UPDATE_GOLDEN` does not rewrite a digest otherwise.
+//! `traces/golden.digests` has the model version and a digest of the counts of every golden result. If
+//! counts of an unchanged trace change, the model version must change, too: otherwise `UPDATE_GOLDEN` does
+//! not rewrite the digest.
 
 use parallax_tests::{program, root, run_ok};
 use replay::model_version::MODEL_VERSION;
@@ -116,7 +117,7 @@ fn replay_all(
     }
 }
 
-/// What a golden result was counted from, and its counts.
+/// The trace and the counts of a golden result.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Digest {
     /// Checksum of the trace's content.
@@ -125,7 +126,7 @@ struct Digest {
     counts: String,
 }
 
-/// The digests of all golden results under one model version.
+/// The digests of all golden results of one model version.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Digests {
     model_version: u32,
@@ -133,7 +134,7 @@ struct Digests {
     results: BTreeMap<String, Digest>,
 }
 
-/// Keys of a result that hold no counts.
+/// Keys of a result that are not counts.
 const NO_COUNTS: [&str; 6] = [
     "schema",
     "tool",
@@ -198,7 +199,7 @@ impl Digests {
         digests
     }
 
-    /// Results of the same trace whose counts differ from those that the model version gave before.
+    /// Results of the same trace whose counts differ from the earlier ones of this model version.
     fn changed_since<'a>(&'a self, before: &Self) -> Vec<&'a str> {
         if self.model_version > before.model_version {
             return Vec::new();
@@ -212,7 +213,7 @@ impl Digests {
     }
 }
 
-/// What is known of the figures' errors was measured elsewhere and comes last: it is cut off.
+/// Removes the known errors of the figures, which were measured separately and come last.
 fn without_errors(json: &[u8]) -> Vec<u8> {
     let text = String::from_utf8_lossy(json);
     match text.split_once(",\n  \"errors\": [") {

@@ -1,5 +1,5 @@
-//! Hidden-surface removal on captured scenes, against pixels counted from the trace's records and
-//! scenes whose depth complexity is known.
+//! Hidden-surface removal on captured scenes, compared with pixels counted from the trace's records, and on
+//! scenes with a known depth complexity.
 
 use formats::textrace::{PassKind, Textrace, Tile};
 use parallax_tests::{program, real_scene, refuse, root, run_ok};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Width and height of an eye's picture.
 const SIZE_PX: [u64; 2] = [160, 180];
 
-/// Captures a scene with its picture beside the trace; the scene's own draws decide what hides what.
+/// Captures a scene with its picture next to the trace.
 fn capture_as(scene: &str, folder: &Path, hsr: &str) -> PathBuf {
     let trace = folder.join(format!("{hsr}.textrace"));
     let size = format!("{}x{}", SIZE_PX[0], SIZE_PX[1]);
@@ -26,7 +26,7 @@ fn capture(scene: &str, folder: &Path) -> PathBuf {
     capture_as(scene, folder, "early-z")
 }
 
-/// What a replay counts.
+/// The counts of a replay.
 fn replayed(trace: &Path, hsr: &str) -> Value {
     let mut command = program("replay");
     command.arg("run").arg(trace);
@@ -36,12 +36,12 @@ fn replayed(trace: &Path, hsr: &str) -> Value {
     json["result"].clone()
 }
 
-/// Fragments that a replay shades.
+/// Fragments shaded by a replay.
 fn fragments(trace: &Path, hsr: &str) -> u64 {
     replayed(trace, hsr)["lanes"].as_u64().expect("a count")
 }
 
-/// Pixels that opaque draws cover, and fragments of the other draws.
+/// Pixels covered by opaque draws, and fragments of the other draws.
 fn counted(path: &Path) -> (u64, u64) {
     let trace = Textrace::open(path).expect("a trace");
     let tables = trace.tables();
@@ -87,7 +87,7 @@ fn deferred_shading_shades_each_pixel_of_opaque_draws_once() {
 }
 
 #[test]
-fn deferred_shading_of_a_real_scene_leaves_what_is_seen() {
+fn deferred_shading_of_a_real_scene_shades_only_visible_fragments() {
     let Some(scene) = real_scene("crytek-sponza/sponza.gltf") else {
         return;
     };
@@ -101,7 +101,7 @@ fn deferred_shading_of_a_real_scene_leaves_what_is_seen() {
 }
 
 #[test]
-fn what_a_trace_does_not_hold_is_refused() {
+fn removals_that_need_data_missing_in_the_trace_are_refused() {
     let golden = root().join("traces/atrium.textrace");
     let run = |hsr: &str, expected: &str| {
         let mut command = program("replay");
@@ -114,7 +114,7 @@ fn what_a_trace_does_not_hold_is_refused() {
     run("none", "capture with --hsr none");
 }
 
-/// Walls across the whole view at some distances, in the order in which they are drawn.
+/// Walls across the whole view at some distances, in drawing order.
 fn walls(folder: &Path, distances_m: &[f32]) -> PathBuf {
     let mut text = String::new();
     for (number, z) in distances_m.iter().enumerate() {
@@ -130,9 +130,9 @@ fn walls(folder: &Path, distances_m: &[f32]) -> PathBuf {
 }
 
 #[test]
-fn each_wall_behind_another_counts_as_often_as_the_removal_lets_it() {
+fn walls_behind_each_other_are_counted_as_the_removal_determines() {
     let pixels = 2 * SIZE_PX[0] * SIZE_PX[1];
-    // How many of the walls lie before all that were drawn before them.
+    // Number of walls that are in front of all walls drawn before them.
     for (distances_m, nearer) in [([5.0, 7.0, 9.0], 1), ([9.0, 5.0, 7.0], 2)] {
         let folder = tempfile::tempdir().expect("a folder");
         let scene = walls(folder.path(), &distances_m);
@@ -153,7 +153,7 @@ fn each_wall_behind_another_counts_as_often_as_the_removal_lets_it() {
 }
 
 #[test]
-fn each_step_of_removal_leaves_fewer_quads_and_bytes_and_the_same_picture() {
+fn each_stronger_removal_leaves_fewer_quads_and_bytes_and_the_same_picture() {
     let folder = tempfile::tempdir().expect("a folder");
     let [all, tested] =
         ["none", "early-z"].map(|hsr| capture_as("atrium-plain", folder.path(), hsr));
@@ -183,7 +183,7 @@ fn each_step_of_removal_leaves_fewer_quads_and_bytes_and_the_same_picture() {
 }
 
 #[test]
-fn a_capture_of_every_fragment_refuses_techniques_that_leave_some_out_by_depth() {
+fn a_capture_of_every_fragment_refuses_techniques_that_skip_fragments_by_depth() {
     let folder = tempfile::tempdir().expect("a folder");
     let trace = folder.path().join("none.textrace");
     for (flags, expected) in [

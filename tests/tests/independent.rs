@@ -1,6 +1,5 @@
-//! The readers in `tests/independent/`, written in Python from FORMAT.md alone, against
-//! `replay dump` and `replay info`: every table and every record of every golden trace and of
-//! traces that are made here.
+//! Compares the readers in `tests/independent/`, written in Python from FORMAT.md only, with `replay dump`
+//! and `replay info`: every table and every record of every golden trace and of generated traces.
 
 use parallax_tests::{program, root, run_ok, traces};
 use serde_json::Value;
@@ -9,7 +8,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
-/// False, with a line on stderr, where there is no Python; `scripts/test.sh` says so, too.
+/// False, with a line on stderr, if there is no Python; `scripts/test.sh` prints it, too.
 fn has_python() -> bool {
     let found = Command::new("python3").arg("--version").output();
     let found = found.is_ok_and(|output| output.status.success());
@@ -33,8 +32,7 @@ fn parse(line: Option<std::io::Result<String>>) -> Option<Value> {
     Some(serde_json::from_str(&line).unwrap_or_else(|error| panic!("{error}: {line}")))
 }
 
-/// Compares what Python read with what replay read; keys that only replay has are its own
-/// additions unless `exact`.
+/// Compares the values read by Python and by replay. Additional keys of replay are allowed unless `exact`.
 fn compare(place: &str, python: &Value, replay: &Value, exact: bool) {
     match (python, replay) {
         (Value::Object(a), Value::Object(b)) => {
@@ -55,9 +53,9 @@ fn compare(place: &str, python: &Value, replay: &Value, exact: bool) {
         (Value::Number(a), Value::Number(b)) if a != b => {
             let both = a.as_f64().zip(b.as_f64());
             let (a, b) = both.expect("numbers are finite");
-            // Python prints an f32 with all the digits of its f64.
+            // Python prints an f32 with all digits of its f64.
             let same = a as f32 == b as f32
-                // The one figure that the text leaves to rounding.
+                // The only figure whose rounding FORMAT.md does not define.
                 || place.contains("geometric_normal") && (a - b).abs() < 1e-6;
             assert!(same, "{place}: {a} and {b}");
         }
@@ -65,12 +63,12 @@ fn compare(place: &str, python: &Value, replay: &Value, exact: bool) {
     }
 }
 
-/// Reads a trace both ways; returns the number of records.
+/// Reads a trace with both; returns the number of records.
 fn check(path: &Path) -> u64 {
     check_with(path, &[])
 }
 
-/// Reads a trace both ways, with more options for both readers; returns the number of lines.
+/// Reads a trace with both, with additional options; returns the number of lines.
 fn check_with(path: &Path, options: &[&str]) -> u64 {
     let name = path.display().to_string();
     let kind = path
@@ -134,7 +132,7 @@ fn python_reads_every_golden_ray_trace_as_replay_does() {
 }
 
 #[test]
-fn python_reads_made_up_traces_as_replay_does() {
+fn python_reads_generated_traces_as_replay_does() {
     if !has_python() {
         return;
     }
@@ -225,7 +223,7 @@ fn python_reads_fresh_rays_with_visits_and_several_samples_as_replay_does() {
 }
 
 #[test]
-fn python_refuses_what_is_damaged() {
+fn python_refuses_damaged_traces() {
     if !has_python() {
         return;
     }

@@ -1,5 +1,5 @@
-//! `replay convert` feeds other simulators, and `replay run --addresses` takes what they write: independent
-//! readings must agree with what `replay run` counts on the same trace.
+//! `replay convert` writes traces for other simulators, and `replay run --addresses` reads theirs.
+//! Independent readers must find the counts of `replay run` on the same trace.
 
 use formats::textrace::Encoding;
 use parallax_tests::{program, refuse, root, run_ok, traces};
@@ -11,7 +11,7 @@ use std::process::Command;
 
 const LINE_BYTES: u64 = 16;
 
-/// Addresses of a din text: `LABEL HEXADDR` a line, label 0 = read.
+/// Addresses of a din text: `LABEL HEXADDR` per line, label 0 for reads.
 fn parse_din(text: &str) -> Vec<u64> {
     text.lines()
         .map(|line| {
@@ -54,7 +54,7 @@ fn run(options: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).expect("one JSON object")
 }
 
-/// Misses of a set-associative LRU cache, the plainest way.
+/// Misses of a set-associative LRU cache, in the simplest implementation.
 fn lru_misses(addresses: &[u64], size_bytes: u64, ways: usize) -> u64 {
     let sets = size_bytes / LINE_BYTES / ways as u64;
     let mut cache: Vec<VecDeque<u64>> = vec![VecDeque::new(); sets as usize];
@@ -89,7 +89,7 @@ fn texel_addresses_touch_the_same_lines() {
 }
 
 #[test]
-fn a_plain_lru_cache_fed_with_din_misses_as_often_as_run() {
+fn a_plain_lru_cache_with_din_input_has_the_misses_of_run() {
     let addresses = convert("line");
     for (l1_kib, ways) in [(8, 4_usize), (16, 4), (8, 1), (4, 8)] {
         let result = &run(&[
@@ -110,7 +110,8 @@ fn a_plain_lru_cache_fed_with_din_misses_as_often_as_run() {
     }
 }
 
-/// Misses of both levels, look-ups and distinct lines of a result of `run`, or of one of `--addresses`.
+/// Misses of both levels, look-ups and distinct lines of a result of `run`, with a trace or with
+/// `--addresses`.
 fn figures(result: &Value) -> [u64; 4] {
     let number = |value: &Value| value.as_u64().expect("a count");
     let point = result["points"].get(0);
@@ -131,7 +132,7 @@ fn golden(name: &str) -> PathBuf {
     root().join(format!("traces/{name}.textrace"))
 }
 
-/// `replay run` of a trace with one core, without latencies.
+/// Runs `replay run` on a trace with one core, without latencies.
 fn run_trace(name: &str, options: &[&str]) -> Value {
     let alone = ["--mode", "functional", "--cores", "1", "--json"];
     let output = run_ok(
@@ -166,7 +167,7 @@ fn run_addresses(file: &Path, options: &[&str]) -> Value {
 }
 
 #[test]
-fn every_form_and_compression_gives_the_figures_of_run() {
+fn every_form_and_compression_has_the_figures_of_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let caches = ["--l1", "8KiB", "--l2", "32KiB"];
     let expected = figures(&run_trace("atrium-shadows", &caches));
@@ -177,7 +178,7 @@ fn every_form_and_compression_gives_the_figures_of_run() {
             convert_to("atrium-shadows", form, &file, &[]);
             let result = run_addresses(&file, &caches);
             assert_eq!(figures(&result), expected, "{form}{end}");
-            // From a pipe, and without a name that tells.
+            // From a pipe, and without an informative name.
             let piped = run_ok(
                 program("replay")
                     .args(["run", "--json", "--addresses", "-", "--address-form", form])
@@ -192,7 +193,7 @@ fn every_form_and_compression_gives_the_figures_of_run() {
 }
 
 #[test]
-fn goldens_count_the_same_as_traces_and_as_addresses() {
+fn golden_traces_have_the_same_counts_as_traces_and_as_addresses() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, options) in [
         ("atrium", &["--order", "z2-sta"][..]),
@@ -237,7 +238,7 @@ fn goldens_count_the_same_as_traces_and_as_addresses() {
 }
 
 #[test]
-fn several_caches_in_one_pass_count_as_each_alone() {
+fn several_caches_in_one_pass_have_the_same_counts_as_each_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("a.u64");
     convert_to("jungle", "u64", &file, &["--order", "z2-sta"]);
@@ -249,7 +250,7 @@ fn several_caches_in_one_pass_count_as_each_alone() {
     }
 }
 
-/// Runs the reader in `tests/independent/`; nothing, with a line on stderr, where there is no Python.
+/// Runs the reader in `tests/independent/`; `None`, with a line on stderr, if there is no Python.
 fn independently(form: &str, file: &Path) -> Option<Vec<(String, u64, u64)>> {
     let script = root().join("tests/independent/addresses.py");
     let Ok(output) = Command::new("python3")
@@ -280,7 +281,7 @@ fn independently(form: &str, file: &Path) -> Option<Vec<(String, u64, u64)>> {
     )
 }
 
-/// Converts a trace that is made here to a file named after the form.
+/// Converts a generated trace to a file named after the form.
 fn convert_made(trace: &Path, folder: &Path, form: &str, options: &[&str]) -> PathBuf {
     let file = folder.join(form);
     let to = form.trim_end_matches(".gz");
@@ -323,7 +324,7 @@ fn every_form_is_read_independently() {
 }
 
 #[test]
-fn rays_become_addresses_of_every_form() {
+fn rays_are_converted_to_addresses_of_every_form() {
     let folder = tempfile::tempdir().expect("a folder");
     let trace = folder.path().join("r.raytrace");
     fs::write(&trace, traces::ray_trace(1, true, 7)).expect("room");
@@ -346,7 +347,7 @@ fn rays_become_addresses_of_every_form() {
     }
 }
 
-/// Standard input to output of a compressor of the system, where it is there.
+/// Output of one of the system's compressors, if installed.
 fn piped_through(tool: &str, options: &[&str], input: &Path) -> Option<Vec<u8>> {
     let file = fs::File::open(input).expect("it was written");
     let Ok(output) = Command::new(tool).args(options).stdin(file).output() else {
@@ -358,7 +359,7 @@ fn piped_through(tool: &str, options: &[&str], input: &Path) -> Option<Vec<u8>> 
 }
 
 #[test]
-fn gzip_and_zstd_of_the_system_read_and_write_the_same() {
+fn gzip_and_zstd_of_the_system_read_and_write_the_same_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let plain = folder.path().join("a.u32");
     convert_to("atrium-shadows", "u32", &plain, &[]);
@@ -383,10 +384,11 @@ fn gzip_and_zstd_of_the_system_read_and_write_the_same() {
 }
 
 #[test]
-fn straddles_and_writes_are_counted_as_documented() {
+fn accesses_of_two_lines_and_writes_are_counted_as_documented() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("a.din");
-    // A read of two lines, a write to the second, a fetch elsewhere, a read without size at a line's end.
+    // A read of two lines, a write to the second one, a fetch elsewhere, a read without size at the end of
+    // a line.
     fs::write(&file, "r 1c 8\nw 20 4\ni 1000 4\n0 3f\n").expect("room");
     let result = run_addresses(&file, &["--line", "32"]);
     let of = &result["accesses"];
@@ -410,7 +412,7 @@ fn straddles_and_writes_are_counted_as_documented() {
 }
 
 #[test]
-fn input_that_is_no_addresses_is_refused() {
+fn input_without_addresses_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);

@@ -1,8 +1,8 @@
-//! The arrows between the rooms: who depends on whom, as `cargo tree` tells.
+//! Checks the dependencies between the crates with `cargo tree`.
 
 use std::process::Command;
 
-/// Names of the packages that `package` is built from, itself first.
+/// Names of all dependencies of `package`, itself first.
 fn tree(package: &str) -> Vec<String> {
     let arguments = ["tree", "-p", package, "-e", "normal", "--prefix", "none"];
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
@@ -41,7 +41,7 @@ fn replay_depends_neither_on_tracegen_nor_on_a_gpu() {
 }
 
 #[test]
-fn of_our_crates_record_knows_formats_alone() {
+fn record_depends_only_on_formats() {
     let names = tree("record");
     assert!(names.iter().any(|n| n == "formats"));
     let others = [
@@ -62,7 +62,7 @@ fn rays_are_traced_without_a_gpu() {
 }
 
 #[test]
-fn only_raster_knows_the_driver() {
+fn only_raster_depends_on_the_driver() {
     for package in ["scene", "scenes", "textures", "visibility", "techniques"] {
         assert_free_of(package, &["wgpu", "naga", "raster", "rays"]);
     }

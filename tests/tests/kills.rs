@@ -1,7 +1,8 @@
-//! Programs that are killed at random moments: nothing incomplete under a final name, and another
-//! run ends with the bytes of one that nobody disturbed.
+//! Programs killed at random moments: no incomplete file under a final name, and another run completes with
+//! the bytes of an undisturbed run.
 //!
-//! `make faults` kills 200 times; `KILLS=n` says how often. A kill counts only if it came in time.
+//! `make faults` kills 200 times; `KILLS=n` sets the number. A kill counts only if the program was still
+//! running.
 #![cfg(unix)]
 
 use parallax_tests::traces::Random;
@@ -13,7 +14,7 @@ use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// Without `KILLS`: as many as seconds allow, of the quick writers.
+/// Number of kills without `KILLS`, with the quick writers only.
 const FEW: u32 = 6;
 
 fn kills() -> Option<u32> {
@@ -21,14 +22,14 @@ fn kills() -> Option<u32> {
     Some(kills.parse().expect("KILLS: a number"))
 }
 
-/// Starts a program with a group of its own, in which its children are as well.
+/// Starts a program with its own process group, which includes its children.
 fn start(mut command: Command) -> Child {
     let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
     quiet.process_group(0).spawn().expect("the program starts")
 }
 
-/// Waits and sends a signal to a program and its children, as terminals and clusters do; nothing
-/// where it has ended before.
+/// Waits and sends a signal to a program and its children, as terminals and clusters do; `None` if it has
+/// already ended.
 fn signal_after(child: &mut Child, moment: Duration, signal: &str) -> Option<ExitStatus> {
     std::thread::sleep(moment);
     if child.try_wait().expect("a child").is_some() {
@@ -37,15 +38,15 @@ fn signal_after(child: &mut Child, moment: Duration, signal: &str) -> Option<Exi
     let kill = format!("kill -{signal} -{}", child.id());
     let sent = Command::new("sh").args(["-c", &kill]).status();
     let status = child.wait().expect("it ends");
-    // It may have come to its end between the two.
+    // It may have ended between the two.
     (sent.expect("a shell").success() && !status.success()).then_some(status)
 }
 
-/// A writer, what it writes undisturbed, and how long that takes.
+/// A writer, its undisturbed output, and its run time.
 struct Undisturbed<'a> {
     writer: &'a Writer,
     files: Files,
-    /// Adjusted to how fast the machine is meanwhile, so that one kill in six comes too late.
+    /// Adapted to the current speed of the machine, so that one kill in six comes too late.
     time: Duration,
 }
 
@@ -66,7 +67,7 @@ impl<'a> Undisturbed<'a> {
 }
 
 #[test]
-fn what_was_killed_leaves_nothing_incomplete_and_ends_with_the_same_bytes_the_next_time() {
+fn killed_writers_leave_nothing_incomplete_and_complete_with_the_same_bytes_the_next_time() {
     let inputs = tempfile::tempdir().expect("a temporary folder");
     writers::write_inputs(inputs.path());
     let wanted = kills();
@@ -87,7 +88,7 @@ fn what_was_killed_leaves_nothing_incomplete_and_ends_with_the_same_bytes_the_ne
         } in &mut whole
         {
             let folder = tempfile::tempdir().expect("a temporary folder");
-            // The second kill meets what the first has left.
+            // The second kill finds the remains of the first one.
             for round in 0..2 {
                 let signal = ["KILL", "TERM", "QUIT"][random.below(3) as usize];
                 let moment = time.mul_f64(f64::from(random.below(1000)) / 1000.0);
@@ -133,7 +134,7 @@ fn what_was_killed_leaves_nothing_incomplete_and_ends_with_the_same_bytes_the_ne
 }
 
 #[test]
-fn a_sharded_sweep_of_which_a_worker_is_killed_merges_to_one_machines_bytes() {
+fn a_sharded_sweep_with_a_killed_worker_merges_to_the_bytes_of_one_machine() {
     let inputs = tempfile::tempdir().expect("a temporary folder");
     writers::write_inputs(inputs.path());
     let sweep = |folder: &Path, flags: &[&str]| {
@@ -169,13 +170,13 @@ fn a_sharded_sweep_of_which_a_worker_is_killed_merges_to_one_machines_bytes() {
     println!("{killed} workers of {rounds} sweeps killed in time");
 }
 
-/// As `kill` and `timeout` do, which know nothing of children.
+/// Signals only the process itself, as `kill` and `timeout` do.
 #[test]
-fn a_signal_to_a_sweep_of_captures_alone_ends_the_capture_that_it_runs() {
+fn a_signal_to_only_the_sweep_of_captures_ends_the_running_capture() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let manifest = folder.path().join("captures.toml");
     let out = folder.path().join("out");
-    // Minutes, were nobody to end it.
+    // Would take minutes if it were not ended.
     let long = "[[captures]]\ncommand = \"rays\"\nscene = \"atrium\"\nsize = \"4096x4096\"\n";
     fs::write(&manifest, long).expect("writable");
     let mut sweep = parallax_tests::program("tracegen");
@@ -197,7 +198,7 @@ fn a_signal_to_a_sweep_of_captures_alone_ends_the_capture_that_it_runs() {
     let status = sweep.wait().expect("it ends");
     assert_eq!(status.signal(), Some(15));
     assert_eq!(unfinished(), [""; 0]);
-    // The pipe ends when nobody has it any more.
+    // The pipe closes when the last process that holds it ends.
     let mut rest = String::new();
     let mut pipe = sweep.stderr.take().expect("a pipe");
     pipe.read_to_string(&mut rest).expect("text");

@@ -1,4 +1,4 @@
-//! Frames of several layers, from the command line to the replay's counts.
+//! Frames with several layers, from the command line to the replay's counts.
 
 use parallax_tests::{program, refuse, run_ok};
 use serde_json::Value;
@@ -27,7 +27,7 @@ fn json(arguments: &[&str], trace: &Path) -> Value {
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
-/// Quads of a trace, by the lines of its dump: a primitive's records at one place are one quad.
+/// Number of quads in the dump of a trace: the records of a primitive at one position are one quad.
 fn dumped_quads(trace: &Path) -> u64 {
     let output = run_ok(program("replay").arg("dump").arg(trace));
     let text = String::from_utf8(output.stdout).expect("UTF-8");
@@ -49,7 +49,7 @@ fn every_order_replays_all_quads_of_all_layers() {
         let info = json(&["info", "--json"], &trace);
         let passes = info["passes"].as_array().expect("passes");
         let layers = match kind {
-            // Nothing of the lens lies beyond the last ring, so its rate has no layer.
+            // The visible area of the lens does not extend beyond the last ring, so its rate has no layer.
             "rings" => 8,
             "multi-resolution" => 18,
             _ => 2,
@@ -87,7 +87,7 @@ fn every_order_replays_all_quads_of_all_layers() {
 }
 
 #[test]
-fn a_masked_trace_has_the_version_and_the_passes_of_a_whole_one_and_fewer_quads() {
+fn a_masked_trace_has_the_version_and_passes_of_a_whole_one_and_fewer_quads() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let whole = captured(&folder, "whole.textrace", &[]);
     let masked = captured(&folder, "masked.textrace", &["--hidden-area-mask"]);
@@ -104,7 +104,7 @@ fn a_masked_trace_has_the_version_and_the_passes_of_a_whole_one_and_fewer_quads(
 }
 
 #[test]
-fn settings_that_cannot_be_are_told() {
+fn impossible_settings_are_reported() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let refused = |options: &[&str], expected: &[&str]| {
         let (mut command, path) = capture(folder.path(), "refused.textrace", options);
@@ -149,7 +149,7 @@ fn a_gaze_path_moves_the_rings_from_frame_to_frame() {
     let info = json(&["info", "--json"], &trace);
     let passes = info["passes"].as_array().expect("passes");
     assert_eq!(passes.len(), 20);
-    // Columns of the tiles at full rate that hold anything, by frame.
+    // Columns of the non-empty tiles at full rate, by frame.
     let output = run_ok(program("replay").arg("dump").arg(&trace));
     let text = String::from_utf8(output.stdout).expect("UTF-8");
     let mut columns = [BTreeSet::new(), BTreeSet::new()];

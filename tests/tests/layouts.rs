@@ -1,4 +1,5 @@
-//! What the memory layout does to the figures of a trace, and what warns of figures that are easily taken for others.
+//! Effects of the memory layout on the figures of a trace, and warnings about figures that are easily
+//! misread.
 
 use parallax_tests::{program, root, run_ok};
 use std::process::Output;
@@ -29,7 +30,7 @@ fn modes_agree_on_bytes_unless_shadow_maps_are_linear() {
 }
 
 #[test]
-fn a_linear_shadow_map_is_a_choice_in_the_file_too() {
+fn a_linear_shadow_map_can_also_be_set_in_the_file() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("linear.toml");
     let text = "mode = \"functional\"\nlayout.shadow_map_order = \"linear\"\n";
@@ -39,20 +40,20 @@ fn a_linear_shadow_map_is_a_choice_in_the_file_too() {
     let functional = ["--mode", "functional"];
     let by_flag = external_bytes(&[&functional[..], &["--shadow-map-order", "linear"]].concat());
     assert_eq!(by_file, by_flag);
-    // Every row of such a map falls into the same L1 sets.
+    // All rows of such a map use the same L1 sets.
     assert!(by_file > 1.5 * external_bytes(&functional));
 }
 
-/// Misses in flight that take ways leave fewer to others.
+/// With allocation on a miss, misses in flight occupy ways.
 #[test]
-fn allocation_on_a_miss_costs_bytes_where_sets_are_crowded() {
+fn allocation_on_a_miss_increases_traffic_if_sets_are_crowded() {
     let linear = ["--shadow-map-order", "linear", "--allocation"];
     let of = |allocation| external_bytes(&[&linear[..], &[allocation]].concat());
     assert!(of("on-miss") > 1.02 * of("on-fill"));
 }
 
 #[test]
-fn bytes_of_the_first_miss_model_come_with_a_warning_outside_the_papers_preset() {
+fn bytes_of_the_first_miss_model_have_a_warning_outside_the_papers_preset() {
     let stderr = |subcommand, arguments: &[&str]| {
         let output = replay(subcommand, &[arguments, &["-q"]].concat());
         String::from_utf8_lossy(&output.stderr).into_owned()

@@ -1,4 +1,4 @@
-//! Links in the documents lead somewhere, every page is in the index, and pages stay short.
+//! Checks that links in the documents resolve, that every page is in the index, and that pages are short.
 
 use parallax_tests::figures::documents;
 use parallax_tests::root;
@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 
 const MOST_LINES: usize = 250;
 
-/// The text outside of fenced code blocks.
+/// The text outside fenced code blocks.
 fn prose(text: &str) -> String {
     text.split("```").step_by(2).collect()
 }
 
-/// Targets of the links and pictures of a page, without those on the web.
+/// Targets of the links and pictures of a page, without web addresses.
 fn targets(text: &str) -> Vec<String> {
     let prose = prose(text);
     let links = prose.split("](").skip(1);
@@ -23,7 +23,7 @@ fn targets(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Anchors of a page, as GitHub makes them of headings.
+/// Anchors of a page, as GitHub derives them from headings.
 fn anchors(text: &str) -> BTreeSet<String> {
     let prose = prose(text);
     let headings = prose.lines().filter_map(|line| {
@@ -42,7 +42,7 @@ fn anchors(text: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// What is wrong with a link of a page, if anything.
+/// The problem of a link, if any.
 fn fault(page: &Path, text: &str, target: &str) -> Option<String> {
     let (path, anchor) = target.split_once('#').unwrap_or((target, ""));
     let file = if path.is_empty() {
@@ -70,7 +70,7 @@ fn fault(page: &Path, text: &str, target: &str) -> Option<String> {
 }
 
 #[test]
-fn every_link_of_a_document_leads_somewhere() {
+fn every_link_of_a_document_resolves() {
     let (mut faults, mut links) = (Vec::new(), 0);
     for page in documents().into_iter().chain([root().join("FORMAT.md")]) {
         let text = fs::read_to_string(&page).expect("a document");
@@ -111,7 +111,7 @@ fn every_page_is_in_the_index_and_stays_short() {
     }
 }
 
-/// Source files below a folder, without what git or Cargo made.
+/// Source files below a folder, without files made by git or Cargo.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -120,7 +120,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
             if !name.starts_with('.') && !name.starts_with("target") && name != "out" {
                 sources(&path, found);
             }
-        } else if [".rs", ".sh", ".py", ".toml", ".csv"]
+        } else if [".rs", ".wgsl", ".sh", ".py", ".toml", ".csv"]
             .iter()
             .any(|end| name.ends_with(end))
         {
@@ -130,7 +130,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn documents_that_the_sources_name_exist() {
+fn documents_named_in_the_sources_exist() {
     let mut files = vec![root().join("Makefile")];
     sources(&root(), &mut files);
     let mut names = 0;
@@ -144,7 +144,7 @@ fn documents_that_the_sources_name_exist() {
             let Some(name) = at.map(|at| &word[at..]) else {
                 continue;
             };
-            // This file's own example of a page that does not exist.
+            // The name of a missing page in this file.
             if name == "docs/no-such-page.md" {
                 continue;
             }
@@ -157,4 +157,77 @@ fn documents_that_the_sources_name_exist() {
         }
     }
     assert!(names > 20, "found {names} names of documents");
+}
+
+#[test]
+fn the_glossary_has_each_term_once_in_alphabetical_order() {
+    let text = fs::read_to_string(root().join("docs/glossary.md")).expect("the glossary");
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| "));
+    let terms: Vec<String> = rows
+        .filter_map(|row| Some(row.split_once(" | ")?.0.to_lowercase()))
+        .skip(1)
+        .filter(|term| !term.starts_with("---"))
+        .collect();
+    assert!(terms.len() > 50, "found {} terms", terms.len());
+    let wrong = terms.windows(2).find(|pair| pair[0] >= pair[1]);
+    assert!(wrong.is_none(), "expected alphabetical order: {wrong:?}");
+}
+
+#[test]
+fn source_files_that_the_documents_name_exist() {
+    let mut files = Vec::new();
+    sources(&root(), &mut files);
+    let (mut names, mut faults) = (0, Vec::new());
+    for page in documents() {
+        let text = prose(&fs::read_to_string(&page).expect("a document"));
+        for code in text.split('`').skip(1).step_by(2) {
+            let is_path = code
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || "/-_.".contains(c));
+            let is_source = [".rs", ".wgsl", ".py", ".sh"]
+                .iter()
+                .any(|end| code.ends_with(end));
+            // `order/NAME.rs` is a file that the reader writes.
+            if !is_path || !is_source || code.contains("NAME") {
+                continue;
+            }
+            names += 1;
+            if !files.iter().any(|file| file.ends_with(code)) {
+                faults.push(format!("{}: no file {code}", page.display()));
+            }
+        }
+    }
+    assert!(names > 50, "found {names} names of source files");
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Text with every run of white space as one space.
+fn words(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn code_that_the_documents_quote_is_in_the_sources() {
+    let mut files = Vec::new();
+    sources(&root(), &mut files);
+    let texts: Vec<String> = (files.iter())
+        .filter_map(|file| Some(words(&fs::read_to_string(file).ok()?)))
+        .collect();
+    let mut quoted = 0;
+    for page in documents() {
+        let text = fs::read_to_string(&page).expect("a document");
+        let fences = text.split("```").skip(1).step_by(2);
+        for block in fences.filter_map(|fence| fence.strip_prefix("rust\n")) {
+            for part in block.split("\n\n") {
+                let part = words(part);
+                quoted += 1;
+                assert!(
+                    texts.iter().any(|text| text.contains(&part)),
+                    "{}: no source file has: {part}",
+                    page.display()
+                );
+            }
+        }
+    }
+    assert!(quoted > 4, "found {quoted} quotes");
 }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// The command below a limit in MiB.
+/// The command with a limit in MiB.
 fn limited(command: &Command, limit_mib: u32) -> Command {
     let mut shell = Command::new("sh");
     let script = format!("ulimit -v {}; exec \"$@\"", limit_mib * 1024);
@@ -15,14 +15,14 @@ fn limited(command: &Command, limit_mib: u32) -> Command {
     shell
 }
 
-/// Names in a folder but for temporary ones, which an abort leaves as SIGKILL does.
+/// Names in a folder without temporary files, which an abort leaves like SIGKILL.
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("a folder").flatten();
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     names.filter(|name| !name.ends_with(".part")).collect()
 }
 
-/// Runs a command that writes into the folder below each limit; true where one of them was too little.
+/// Runs a command that writes into the folder with each limit; returns whether one of them was too low.
 fn tell(command: &Command, folder: &Path, limits_mib: &[u32]) -> bool {
     let mut refused = false;
     for limit_mib in limits_mib {

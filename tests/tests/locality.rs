@@ -1,4 +1,5 @@
-//! `replay locality` against plain caches fed with what `replay convert` writes, and its outputs.
+//! Compares `replay locality` with plain caches whose input is written by `replay convert`, and tests its
+//! outputs.
 
 use parallax_tests::{program, refuse, root, run_ok};
 use serde_json::Value;
@@ -6,7 +7,7 @@ use std::collections::HashSet;
 
 const LINE_BYTES: u64 = 16;
 
-/// One core, and caches so small that all kinds of misses occur.
+/// One core, with caches so small that all kinds of misses occur.
 const MACHINE: [&str; 8] = [
     "--orders", "z2-sta", "--cores", "1", "--l1", "4KiB", "--l2", "16KiB",
 ];
@@ -15,7 +16,7 @@ fn trace() -> std::path::PathBuf {
     root().join("traces/atrium-shadows.textrace")
 }
 
-/// The lines of the trace in that order.
+/// The lines of the trace in replay order.
 fn lines() -> Vec<u64> {
     let output = run_ok(
         program("replay")
@@ -27,7 +28,7 @@ fn lines() -> Vec<u64> {
     text.lines().map(line).collect()
 }
 
-/// An LRU cache: a list a set, most recent first.
+/// An LRU cache: one list per set, most recently used first.
 struct Lru {
     sets: Vec<Vec<u64>>,
     ways: usize,
@@ -56,12 +57,12 @@ impl Lru {
     }
 }
 
-/// A level beside a fully associative one of its size and an infinite one.
+/// A cache, with a fully associative one of the same size and an infinite one.
 struct Level {
     own: Lru,
     full: Lru,
     seen: HashSet<u64>,
-    /// Compulsory, capacity, conflict, spared.
+    /// Compulsory, capacity and conflict misses, and avoided misses (`spared`).
     counts: [u64; 4],
 }
 
@@ -93,7 +94,7 @@ impl Level {
 }
 
 #[test]
-fn the_causes_of_misses_are_those_of_plain_caches_fed_with_din() {
+fn causes_of_misses_equal_those_of_plain_caches_with_din_input() {
     let output = run_ok(
         program("replay")
             .arg("locality")
@@ -120,7 +121,7 @@ fn the_causes_of_misses_are_those_of_plain_caches_fed_with_din() {
 }
 
 #[test]
-fn addresses_that_a_trace_was_converted_to_have_its_locality() {
+fn addresses_converted_from_a_trace_have_its_locality() {
     let folder = tempfile::tempdir().expect("a folder");
     let addresses = folder.path().join("a.u32.gz");
     run_ok(
@@ -171,7 +172,7 @@ fn addresses_that_a_trace_was_converted_to_have_its_locality() {
 }
 
 #[test]
-fn outputs_are_the_same_whatever_the_number_of_threads() {
+fn outputs_do_not_depend_on_the_number_of_threads() {
     let folder = tempfile::tempdir().expect("a folder");
     let outputs = ["1", "2"].map(|threads| {
         let at = |name: &str| folder.path().join(format!("{threads}-{name}"));
@@ -207,10 +208,14 @@ fn outputs_are_the_same_whatever_the_number_of_threads() {
     });
     assert!(outputs[0] == outputs[1]);
     let page = String::from_utf8(outputs[0][1].clone()).expect("a page");
-    for text in ["Miss ratio by size", "all cores as one", "LRU above OPT"] {
+    for text in [
+        "Miss ratio by size",
+        "all cores as one",
+        "LRU misses over OPT",
+    ] {
         assert!(page.contains(text), "{text}");
     }
-    // The exact distances add up to the reuses.
+    // The counts of the exact distances add up to the number of reuses.
     let distances = String::from_utf8(outputs[0][6].clone()).expect("CSV");
     let of_row = |line: &str| -> u64 {
         let counts = line.split(',').skip(5);

@@ -1,4 +1,4 @@
-//! `replay run --l3` and `[[level]]` tables, as a user gives them.
+//! Tests of `replay run --l3` and of `[[level]]` tables.
 
 use parallax_tests::{program, root};
 use serde_json::Value;
@@ -27,7 +27,7 @@ fn write(folder: &Path, text: &str) -> String {
 }
 
 #[test]
-fn a_flag_and_a_table_give_the_same_l3() {
+fn a_flag_and_a_table_configure_the_same_l3() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for mode in ["--mode=functional", "--tmu=looping", "--tmu=first-miss"] {
         let flag = result(&[mode, "--l3", "1MiB"]);
@@ -49,7 +49,7 @@ fn a_flag_and_a_table_give_the_same_l3() {
 }
 
 #[test]
-fn each_level_looks_up_what_the_one_above_misses() {
+fn each_level_looks_up_the_misses_of_the_level_above() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let text = "l3 = {size_bytes = \"64KiB\", line_bytes = 32}\nl4.size_bytes = \"256KiB\"\nl4.line_bytes = 64\nl4.hit_cycles = 120\nl4.replacement = \"srrip\"\n[dram]\n";
     let found = result(&["--config", &write(folder.path(), text)]);
@@ -62,7 +62,7 @@ fn each_level_looks_up_what_the_one_above_misses() {
 }
 
 #[test]
-fn what_cannot_be_simulated_is_refused() {
+fn levels_that_cannot_be_simulated_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let level = "[[level]]\nsize_bytes = \"1MiB\"\n";
     let trace = root().join("traces/atrium.textrace");

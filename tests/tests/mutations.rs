@@ -1,7 +1,8 @@
-//! Thousands of traces with something changed and every checksum right again: each is refused or
-//! read, and whatever is valid can be replayed. Nothing panics, takes ten seconds or a gigabyte.
+//! Thousands of changed traces with correct checksums. Each is refused or read, and every valid one can be
+//! replayed. None may panic, take ten seconds or use a gigabyte.
 //!
-//! `MUTATIONS=100000 MUTATIONS_FROM=5000 cargo test --release -p parallax-tests --test mutations` tries others, and more.
+//! `MUTATIONS=100000 MUTATIONS_FROM=5000 cargo test --release -p parallax-tests --test mutations` tries
+//! more and different ones.
 
 use parallax_tests::exercise::exercise;
 use parallax_tests::repair::{Parts, repair_header};
@@ -11,23 +12,23 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Cases for all traces together, unless `MUTATIONS` says otherwise.
+/// Number of cases over all traces, unless `MUTATIONS` sets it.
 const CASES: u64 = 5000;
 const MOST_TIME: Duration = Duration::from_secs(10);
 const MOST_BYTES: usize = 1 << 30;
 
-/// Counts the bytes that are allocated, and the most there were at once.
+/// Counts the allocated bytes and their maximum.
 struct Counting;
 
 static LIVE_BYTES: AtomicUsize = AtomicUsize::new(0);
 static PEAK_BYTES: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: every call goes to the system's allocator as it is; only counters are kept beside it.
+// SAFETY: every call is forwarded to the system's allocator; only counters are added.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, block: Block) -> *mut u8 {
         let live = LIVE_BYTES.fetch_add(block.size(), Ordering::Relaxed) + block.size();
         PEAK_BYTES.fetch_max(live, Ordering::Relaxed);
-        // SAFETY: the caller's promises are those that the system asks for.
+        // SAFETY: the caller meets the contract, which is the same.
         unsafe { System.alloc(block) }
     }
 
@@ -48,7 +49,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Numbers at which arithmetic and checks turn.
+/// Numbers at the limits of arithmetic and checks.
 const EXTREMES: [u64; 14] = [
     0,
     1,
@@ -66,7 +67,7 @@ const EXTREMES: [u64; 14] = [
     u64::MAX,
 ];
 
-/// What a number or another value in JSON is replaced with.
+/// Replacements of numbers and other values in JSON.
 const JSON_VALUES: [&str; 18] = [
     "0",
     "-0.0",
@@ -88,7 +89,7 @@ const JSON_VALUES: [&str; 18] = [
     "\"\"",
 ];
 
-/// Changes a trace in one of many ways; what was done is in the text.
+/// Changes a trace in one of many ways; the text describes the change.
 fn mutate(bytes: &[u8], other: &[u8], random: &mut Random) -> (Vec<u8>, String) {
     let mut parts = Parts::of(bytes);
     let way = random.below(10);
@@ -131,7 +132,7 @@ fn set_integer(parts: &mut Parts, random: &mut Random) -> String {
     let size = 1usize << random.below(4);
     let value = EXTREMES[random.below(EXTREMES.len() as u32) as usize];
     let places = (chunk.len() / size).max(1) as u32;
-    // Tables have fields at odd places, too.
+    // Fields of tables may be at odd positions.
     let at = random.below(places) as usize * size + random.below(2) as usize * 2;
     if let Some(field) = chunk.get_mut(at..at + size) {
         field.copy_from_slice(&value.to_le_bytes()[..size]);
@@ -143,7 +144,7 @@ fn set_integer(parts: &mut Parts, random: &mut Random) -> String {
     what
 }
 
-/// Starts and ends of the values of a JSON text: numbers, strings that are no keys, brackets.
+/// Positions of the values in a JSON text: numbers, strings that are not keys, brackets.
 fn json_values(text: &str) -> Vec<(usize, usize)> {
     let bytes = text.as_bytes();
     let mut found = Vec::new();
@@ -190,7 +191,7 @@ fn edit_json(parts: &mut Parts, random: &mut Random) -> String {
     let values = json_values(&text);
     let (start, end) = values[random.below(values.len() as u32) as usize];
     let new = match random.below(4) {
-        // Another value of the same text: the types often fit.
+        // Another value from the same text often has the right type.
         0 => {
             let (start, end) = values[random.below(values.len() as u32) as usize];
             &text[start..end]
@@ -202,7 +203,7 @@ fn edit_json(parts: &mut Parts, random: &mut Random) -> String {
     what
 }
 
-/// Puts a piece of another trace's chunk into the chunk of the same tag.
+/// Copies a piece of another trace's chunk into the chunk with the same tag.
 fn splice(parts: &mut Parts, other: &mut Parts, random: &mut Random) -> String {
     let (tag, _) = *pick(parts, random);
     let donor = other.chunk(&tag).clone();
@@ -219,7 +220,7 @@ fn splice(parts: &mut Parts, other: &mut Parts, random: &mut Random) -> String {
     what
 }
 
-/// Cuts, lengthens or swaps tiles; the index follows.
+/// Truncates, extends or swaps tiles and updates the index.
 fn edit_tile(parts: &mut Parts, random: &mut Random) -> String {
     let mut tiles = parts.tiles();
     let full: Vec<usize> = (0..tiles.len()).filter(|i| !tiles[*i].is_empty()).collect();
@@ -240,7 +241,7 @@ fn edit_tile(parts: &mut Parts, random: &mut Random) -> String {
             format!("a byte less in tile {index} at {at}")
         }
         3 => {
-            // A number as long as numbers get, or longer.
+            // A number of maximum length, or longer.
             let length = 1 + random.below(11) as usize;
             let end = tile.len().min(at + length);
             tile[at..end].fill(0xff);
@@ -340,6 +341,6 @@ fn changed_traces_with_valid_checksums_neither_panic_nor_hang_nor_fill_memory() 
         largest = largest.max(bytes);
     }
     println!("{cases} cases, {valid} valid; slowest {slowest:?}, most {largest} bytes at once");
-    // Deep code is reached: many changes leave a valid file.
+    // Many changes leave a valid file, so code behind the checks is also tested.
     assert!(valid > cases / 20, "{valid} of {cases} are valid");
 }

@@ -1,11 +1,11 @@
-//! Both renderers light a scene alike: the same sun, sky, ground, exposure.
+//! Checks that both renderers light a scene in the same way: the same sun, sky, ground and exposure.
 
 use parallax_tests::{program, run_ok};
 use std::f32::consts::PI;
 use std::fmt::Write;
 use std::path::Path;
 
-/// A unit sphere around the origin, smooth, without material.
+/// A smooth unit sphere around the origin, without material.
 fn sphere() -> String {
     const COLUMNS: u32 = 64;
     const ROWS: u32 = 32;
@@ -50,12 +50,12 @@ fn luminance(path: &Path, size: u32) -> Vec<f64> {
 }
 
 #[test]
-fn a_lone_sphere_in_a_file_without_lights_looks_alike_in_raster_and_rays() {
+fn a_single_sphere_in_a_file_without_lights_looks_the_same_in_raster_and_rays() {
     const SIZE: u32 = 128;
     let folder = tempfile::tempdir().expect("a temporary folder");
     let obj = folder.path().join("sphere.obj");
     std::fs::write(&obj, sphere()).expect("writable");
-    // From the side, so that the lit and the unlit half are both in view.
+    // From the side, so that the lit and the unlit half are visible.
     let pictures = ["raster", "rays"].map(|command| {
         let image = folder.path().join(format!("{command}.png"));
         run_ok(
@@ -71,7 +71,7 @@ fn a_lone_sphere_in_a_file_without_lights_looks_alike_in_raster_and_rays() {
         luminance(&image, SIZE)
     });
 
-    // The sphere covers the middle: above its equator it is lit, below the sun does not reach it.
+    // The sphere covers the middle. Above its equator it is lit; below, the sun does not reach it.
     let half = |picture: &[f64], rows: std::ops::Range<u32>| {
         let inside: Vec<f64> = rows
             .flat_map(|y| (44..84).map(move |x| (y * SIZE + x) as usize))
@@ -86,7 +86,7 @@ fn a_lone_sphere_in_a_file_without_lights_looks_alike_in_raster_and_rays() {
     let difference = (ratios[0] / ratios[1] - 1.0).abs();
     assert!(difference < 0.03, "lit to unlit half: {ratios:?}");
 
-    // Pixel by pixel, background and outline included; edges differ by a pixel here and there.
+    // Pixel by pixel, including background and outline; some edges differ by a pixel.
     let [raster, rays] = &pictures;
     let apart = raster
         .iter()

@@ -1,5 +1,5 @@
-//! What the programs write: never over anything but regular files, never over an input, whole or
-//! not at all.
+//! Outputs of the programs: only regular files are replaced, never an input, and files are complete or
+//! absent.
 #![cfg(unix)]
 
 use parallax_tests::{program, refuse, root, run_ok};
@@ -15,14 +15,14 @@ fn golden(name: &str) -> PathBuf {
     root().join("traces").join(name)
 }
 
-/// `tracegen rays` of a small picture, which needs no driver.
+/// `tracegen rays` with a small picture, which needs no driver.
 fn rays() -> Command {
     let mut command = program("tracegen");
     command.args(["rays", "teapot", "--size", "96x96", "--quiet"]);
     command
 }
 
-/// The commands that write a file, each without the path, which comes last.
+/// The commands that write a file, without the path, which comes last.
 fn writers() -> Vec<Command> {
     let missing = "no-such.textrace";
     let with = |mut command: Command, arguments: &[&str]| {
@@ -53,7 +53,7 @@ fn writers() -> Vec<Command> {
 }
 
 #[test]
-fn only_regular_files_and_new_names_are_written_and_that_is_told_before_the_work() {
+fn only_regular_files_and_new_names_are_written_which_is_checked_before_the_work() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("folder")).expect("a folder");
@@ -82,7 +82,7 @@ fn only_regular_files_and_new_names_are_written_and_that_is_told_before_the_work
         ("new/", "the name of a file"),
     ] {
         for mut writer in writers() {
-            // The missing trace would be told first if the work came first.
+            // Checking outputs first reports them before the missing trace.
             refuse(writer.arg(at(name)), &["cannot write", name, found]);
         }
     }
@@ -91,9 +91,9 @@ fn only_regular_files_and_new_names_are_written_and_that_is_told_before_the_work
 }
 
 #[test]
-fn a_folder_that_does_not_exist_is_told_before_the_work() {
+fn a_missing_folder_is_reported_before_the_work() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // Reports make their folder; traces, pictures and accesses do not.
+    // Reports create their folder; traces, pictures and accesses do not.
     for mut writer in writers().into_iter().take(5) {
         let path = folder.path().join("none/file");
         refuse(
@@ -104,8 +104,8 @@ fn a_folder_that_does_not_exist_is_told_before_the_work() {
 }
 
 #[test]
-fn a_folder_that_may_not_be_written_is_told_before_the_work() {
-    // Nobody, not even root, may make files there.
+fn an_unwritable_folder_is_reported_before_the_work() {
+    // No user, not even root, can create files there.
     if Path::new("/proc/self").exists() {
         for mut writer in writers() {
             refuse(
@@ -256,7 +256,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_program_that_is_stopped_at_any_moment_leaves_a_whole_file_or_none() {
+fn a_program_stopped_at_any_moment_leaves_a_complete_file_or_none() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("a.raytrace");
     let start = Instant::now();
@@ -280,7 +280,7 @@ fn a_program_that_is_stopped_at_any_moment_leaves_a_whole_file_or_none() {
             let status = child.wait().expect("ends");
             let mut left = names(folder.path());
             if signal == "KILL" {
-                // Nothing can be cleaned up then; what is left is no final name.
+                // Cleaning up is impossible then, but the remains have no final name.
                 left.retain(|name| !(name.starts_with('.') && name.ends_with(".part")));
             }
             assert!(
@@ -313,9 +313,9 @@ fn a_signal_that_the_parent_ignores_is_ignored() {
 }
 
 #[test]
-fn a_full_disk_is_told_and_leaves_nothing() {
+fn a_full_disk_is_reported_and_leaves_no_file() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // A limit on the size of files stands for the disk.
+    // A limit on the size of files simulates the full disk.
     let limited = |command: &Command| {
         let mut shell = Command::new("sh");
         shell.args(["-c", "ulimit -f 2; exec \"$0\" \"$@\""]);
@@ -341,7 +341,7 @@ fn a_full_disk_is_told_and_leaves_nothing() {
 }
 
 #[test]
-fn a_result_that_standard_output_does_not_take_is_an_error() {
+fn a_result_that_cannot_be_written_to_standard_output_is_an_error() {
     let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
         parallax_tests::skipped!("there is no /dev/full");
         return;
@@ -370,11 +370,11 @@ fn a_result_that_standard_output_does_not_take_is_an_error() {
 }
 
 #[test]
-fn a_reader_that_leaves_is_no_error() {
+fn a_closed_output_pipe_is_not_an_error() {
     for (arguments, trace) in [
         (&["dump"][..], "jungle.textrace"),
         (&["convert", "--to", "din"], "jungle.textrace"),
-        // The page is larger than a pipe holds.
+        // The page is larger than the buffer of a pipe.
         (&["reproject", "--html", "-"], "teapot-rays.raytrace"),
     ] {
         let mut command = program("replay");
@@ -391,7 +391,7 @@ fn a_reader_that_leaves_is_no_error() {
 }
 
 #[test]
-fn a_page_whose_picture_is_none_is_refused_before_the_replays() {
+fn an_invalid_picture_for_a_page_is_refused_before_the_replays() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let at = |name: &str| folder.path().join(name);
     fs::write(at("text.png"), "no picture").expect("a file");

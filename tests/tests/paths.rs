@@ -1,4 +1,4 @@
-//! Paths of the head and scenes that move, from the command line to the trace.
+//! Head paths and moving scenes, from the command line to the trace.
 
 use formats::Trace;
 use parallax_tests::{program, refuse, run_ok};
@@ -24,7 +24,7 @@ fn raster(folder: &Path, name: &str, flags: &[&str]) -> (Vec<u8>, Trace) {
 }
 
 #[test]
-fn a_pose_from_a_file_is_the_pose_from_flags() {
+fn a_pose_from_a_file_equals_the_pose_from_flags() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("path.csv");
     let header = "time_s,x_m,y_m,z_m,qx,qy,qz,qw";
@@ -36,7 +36,7 @@ fn a_pose_from_a_file_is_the_pose_from_flags() {
     let world = ["--path", &file, "--path-origin", "world"];
     let (poses, _) = raster(folder.path(), "poses", &[&size[..], &world].concat());
     assert!(flags == poses);
-    // From the camera, whatever the file says of the place.
+    // Relative to the camera; the position in the file has no effect.
     let (camera, _) = raster(folder.path(), "camera", &size);
     let (moved, _) = raster(
         folder.path(),
@@ -47,12 +47,12 @@ fn a_pose_from_a_file_is_the_pose_from_flags() {
 }
 
 #[test]
-fn a_plant_is_captured_along_a_head_s_path_while_it_moves() {
+fn a_moving_plant_is_captured_along_a_head_path() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let flags = [
         "plant", "--size", "64x48", "--path", "head", "--fps", "4", "--frames", "3",
     ];
-    // The capture checks that its pictures are those of the plain rendering.
+    // The capture compares its pictures with those of the plain rendering.
     let (_, trace) = raster(folder.path(), "plant", &flags);
     let Trace::Texture(trace) = trace else {
         panic!("a texture trace");

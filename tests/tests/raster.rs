@@ -1,4 +1,5 @@
-//! `tracegen raster`: what its summary counts, passes of scenes that move, what is left out and what is refused.
+//! Tests of `tracegen raster`: counts in its summary, passes of moving scenes, skipped geometry, and
+//! refusals.
 
 use parallax_tests::{program, run_ok};
 use std::fs;
@@ -11,7 +12,7 @@ fn raster(options: &[&str], trace: &Path) -> Command {
     command
 }
 
-/// What the command says on stderr.
+/// The command's text on stderr.
 fn summary(options: &[&str]) -> String {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = run_ok(&mut raster(options, &folder.path().join("a.textrace")));
@@ -53,8 +54,9 @@ fn each_stage_counts_its_own_draws() {
 }
 
 #[test]
-fn passes_of_a_scene_that_moves_are_planned_where_its_draws_stand_in_each_frame() {
-    // The hall's cranes move: with passes planned from draws at rest, these paths have frames with other layers.
+fn passes_of_a_moving_scene_are_planned_from_the_positions_of_its_draws_in_each_frame() {
+    // The hall's cranes move. With passes planned from draws at rest, these paths have frames with other
+    // layers.
     for (camera, path, split) in [
         ("pumps", "walk", "least-work:4px"),
         ("walkway", "walk", "least-work:2px"),
@@ -69,7 +71,7 @@ fn passes_of_a_scene_that_moves_are_planned_where_its_draws_stand_in_each_frame(
 }
 
 #[test]
-fn hidden_area_meshes_and_culling_by_distance_leave_out_what_they_say() {
+fn hidden_area_meshes_and_culling_by_distance_skip_the_given_geometry() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mesh = folder.path().join("mesh.json");
     // The lower left half of the left picture, nothing of the right one.
@@ -98,7 +100,7 @@ fn hidden_area_meshes_and_culling_by_distance_leave_out_what_they_say() {
 }
 
 #[test]
-fn hidden_area_meshes_and_distances_that_cannot_be_are_refused() {
+fn invalid_hidden_area_meshes_and_distances_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = folder.path().join("a.textrace");
     let file = |name: &str, text: &str| {

@@ -1,4 +1,4 @@
-//! `info`, `dump`, `diff` and `convert` serve ray traces, and every command reads pipes.
+//! Tests of `info`, `dump`, `diff` and `convert` with ray traces, and of commands reading from pipes.
 
 use parallax_tests::{program, root, run_ok, traces};
 use serde_json::Value;
@@ -17,7 +17,7 @@ fn text(output: Output) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// Runs replay with a golden trace on its standard input, a pipe.
+/// Runs replay with a golden trace as its standard input, a pipe.
 fn piped(arguments: &[&str], bytes: &[u8]) -> Output {
     let mut child = program("replay")
         .args(arguments)
@@ -38,7 +38,7 @@ fn piped(arguments: &[&str], bytes: &[u8]) -> Output {
 }
 
 #[test]
-fn info_tells_the_hierarchy_and_the_rays_by_kind() {
+fn info_prints_the_hierarchy_and_the_rays_by_kind() {
     let golden = root().join("traces/chess-rays.raytrace");
     let shown = text(run_ok(program("replay").arg("info").arg(&golden)));
     for part in [
@@ -81,7 +81,7 @@ fn the_first_different_sample_of_two_ray_traces_is_shown() {
 }
 
 #[test]
-fn a_ray_trace_encoded_anew_has_the_same_bytes() {
+fn a_ray_trace_encoded_again_has_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let again = folder.path().join("again.raytrace");
     for name in ["chess-rays.raytrace", "teapot-rays.raytrace"] {
@@ -96,7 +96,7 @@ fn a_ray_trace_encoded_anew_has_the_same_bytes() {
 }
 
 #[test]
-fn visits_become_addresses_in_every_text_format() {
+fn visits_are_converted_to_addresses_in_every_text_format() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = made_up(&folder, "a.raytrace", 7);
     let dumped = text(run_ok(program("replay").arg("dump").arg(&path)));
@@ -126,12 +126,12 @@ fn visits_become_addresses_in_every_text_format() {
     });
     assert!(csv.eq(addresses.iter().copied()));
     assert_eq!(convert("jsonl", "texel").lines().count(), addresses.len());
-    // Nodes have 64 bytes and triangles 40, so lines of 16 bytes are several a visit.
+    // Nodes have 64 bytes and triangles 40, so a visit has several lines of 16 bytes.
     assert!(convert("din", "line").lines().count() > 2 * addresses.len());
 }
 
 #[test]
-fn a_ray_trace_without_visits_has_no_addresses_and_says_so() {
+fn a_ray_trace_without_visits_has_no_addresses_and_is_refused() {
     let golden = root().join("traces/teapot-rays.raytrace");
     let output = program("replay")
         .args(["convert", "--to", "din"])
@@ -140,7 +140,7 @@ fn a_ray_trace_without_visits_has_no_addresses_and_says_so() {
     let output = output.expect("replay starts");
     assert_eq!(output.status.code(), Some(2));
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(message.contains("lists no visits"), "{message}");
+    assert!(message.contains("has no visits"), "{message}");
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn figure(report: &Value, name: &str) -> f64 {
 }
 
 #[test]
-fn golden_ray_traces_come_out_of_their_recipes_over_threads() {
+fn golden_ray_traces_are_reproduced_by_their_recipes_for_any_number_of_threads() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for name in ["chess-rays", "teapot-rays"] {
         let golden = root().join("traces").join(name);
@@ -42,7 +42,7 @@ fn golden_ray_traces_come_out_of_their_recipes_over_threads() {
 }
 
 #[test]
-fn a_reprojection_saves_work_and_its_error_stands_beside_it() {
+fn a_reprojection_saves_work_and_reports_its_error() {
     let golden = root().join("traces/chess-rays.raytrace");
     let careful = reproject(&golden, &[]);
     let plain = reproject(&golden, &["--rule", "none"]);
@@ -56,7 +56,7 @@ fn a_reprojection_saves_work_and_its_error_stands_beside_it() {
     }
     assert!(figure(&plain, "reuse_pct") > figure(&careful, "reuse_pct"));
     assert!(figure(&plain, "wrong_object_pct") >= figure(&careful, "wrong_object_pct"));
-    // So small a picture shows every silhouette pixel large: the target of 0.01 is for real sizes.
+    // In such a small picture silhouettes are many of the pixels; the target of 0.01 is for real sizes.
     assert!(figure(&plain, "flip_mean") > 2.0 * figure(&careful, "flip_mean"));
     assert!(figure(&careful, "flip_mean") < 0.02);
 }

@@ -1,4 +1,4 @@
-//! What FORMAT.md forbids is refused behind valid checksums, too, and by every command alike.
+//! Data that FORMAT.md forbids is refused despite valid checksums, by every command in the same way.
 
 use formats::Trace;
 use formats::textrace::Encoding;
@@ -41,7 +41,7 @@ fn refuse_ray(expected: &str, change: impl FnOnce(&mut Parts)) {
 }
 
 #[test]
-fn traces_that_are_put_together_again_unchanged_are_accepted() {
+fn traces_that_are_split_and_reassembled_are_accepted() {
     for (name, _, bytes) in traces::all() {
         let mut parts = Parts::of(&bytes);
         assert!(parts.sealed() == bytes, "{name}");
@@ -54,7 +54,7 @@ fn traces_that_are_put_together_again_unchanged_are_accepted() {
 }
 
 #[test]
-fn reserved_fields_of_the_header_are_zero() {
+fn reserved_fields_of_the_header_must_be_zero() {
     for at in [14, 15, 40, 43] {
         let mut bytes = texture_parts().sealed();
         bytes[at] = 1;
@@ -64,7 +64,7 @@ fn reserved_fields_of_the_header_are_zero() {
 }
 
 #[test]
-fn chunks_of_a_texture_trace_come_in_order_and_those_of_rays_in_any() {
+fn chunks_of_a_texture_trace_must_be_in_order_and_those_of_rays_may_be_in_any() {
     refuse_texture("chunk SMPS behind chunk TEXS", |parts| {
         parts.chunks.swap(1, 2)
     });
@@ -74,7 +74,7 @@ fn chunks_of_a_texture_trace_come_in_order_and_those_of_rays_in_any() {
 }
 
 #[test]
-fn an_unknown_chunk_is_skipped_but_its_damage_is_not() {
+fn an_unknown_chunk_is_skipped_but_its_damage_is_detected() {
     let mut parts = texture_parts();
     parts.chunks.insert(3, (*b"XTRA", vec![7; 99]));
     let mut bytes = parts.sealed();
@@ -88,7 +88,7 @@ fn an_unknown_chunk_is_skipped_but_its_damage_is_not() {
 }
 
 #[test]
-fn an_untouched_tiles_encoding_means_nothing() {
+fn the_encoding_of_an_untouched_tile_has_no_effect() {
     let mut parts = texture_parts();
     let untouched = parts.tiles().iter().position(Vec::is_empty).expect("one");
     for encoding in [0, 1, 3] {
@@ -103,7 +103,7 @@ fn an_untouched_tiles_encoding_means_nothing() {
 }
 
 #[test]
-fn numbers_take_no_more_bytes_than_they_must() {
+fn numbers_must_be_encoded_in_the_fewest_bytes() {
     let mut parts = texture_parts();
     let mut tiles = parts.tiles();
     let tile = tiles.iter_mut().find(|t| !t.is_empty()).expect("one");
@@ -122,10 +122,10 @@ fn numbers_take_no_more_bytes_than_they_must() {
 }
 
 #[test]
-fn numbers_of_rays_take_no_more_bytes_than_they_must() {
+fn numbers_of_rays_must_be_encoded_in_the_fewest_bytes() {
     let mut parts = ray_parts();
     let mut tiles = parts.tiles();
-    // The first tile has 256 samples, so 32 bytes of hit bits before the first number.
+    // The first tile has 256 samples, so 32 bytes of hit bits come before the first number.
     let end = 32
         + tiles[0][32..]
             .iter()
@@ -138,7 +138,7 @@ fn numbers_of_rays_take_no_more_bytes_than_they_must() {
 }
 
 #[test]
-fn bits_after_the_last_record_are_zero() {
+fn bits_after_the_last_record_must_be_zero() {
     let mut parts = texture_parts();
     let tiles = parts.tiles();
     let refused = (0..tiles.len()).filter(|index| {
@@ -154,10 +154,10 @@ fn bits_after_the_last_record_are_zero() {
 }
 
 #[test]
-fn hit_bits_after_the_last_sample_are_zero() {
+fn hit_bits_after_the_last_sample_must_be_zero() {
     refuse_ray("zero bits behind the last sample's", |parts| {
         let mut tiles = parts.tiles();
-        // The last tile has 7 x 5 samples: five bytes, five bits left over.
+        // The last tile has 7 x 5 samples: five bytes with five unused bits.
         let last = tiles.last_mut().expect("tiles");
         last[4] |= 0x80;
         parts.set_tiles(&tiles);
@@ -165,7 +165,7 @@ fn hit_bits_after_the_last_sample_are_zero() {
 }
 
 #[test]
-fn a_description_has_frames() {
+fn a_description_must_have_frames() {
     let expected = "frames: at least one, numbers ascending";
     refuse_texture(expected, |parts| {
         parts.edit(b"META", |meta| meta["frames"] = json!([]));
@@ -182,7 +182,7 @@ fn a_description_has_frames() {
 }
 
 #[test]
-fn eyes_are_not_a_negative_distance_apart_but_may_be_at_one_place() {
+fn the_eye_distance_may_be_zero_but_not_negative() {
     let with = |ipd: serde_json::Value| {
         let mut parts = texture_parts();
         parts.edit(b"META", |meta| meta["hmd"]["ipd_m"] = ipd);
@@ -198,7 +198,7 @@ fn eyes_are_not_a_negative_distance_apart_but_may_be_at_one_place() {
 }
 
 #[test]
-fn tangents_that_span_no_frustum_are_refused_by_every_command() {
+fn tangents_without_a_frustum_are_refused_by_every_command() {
     let bad = [
         ("left", -0.9),
         ("up", -1.0),
@@ -254,7 +254,7 @@ fn tangents_that_span_no_frustum_are_refused_by_every_command() {
 }
 
 #[test]
-fn pictures_have_the_size_of_the_displays_eyes() {
+fn pictures_must_have_the_size_of_the_displays_eyes() {
     refuse_texture("pass 0: the size of an eye's image", |parts| {
         parts.edit(b"META", |meta| meta["hmd"]["eye_size_px"][1] = json!(22));
     });
@@ -267,7 +267,7 @@ fn pictures_have_the_size_of_the_displays_eyes() {
 }
 
 #[test]
-fn layers_are_numbered_and_need_a_version() {
+fn layers_must_be_numbered_and_need_a_version() {
     // Passes: two pictures, a shadow map, a layer of both eyes, two of the left eye.
     let number = |pass: usize| 4 + 24 * pass + 6;
     refuse_texture(
@@ -292,7 +292,7 @@ fn layers_are_numbered_and_need_a_version() {
 }
 
 #[test]
-fn a_key_stands_once_in_its_object() {
+fn a_key_must_be_unique_in_its_object() {
     for twice in [
         "\"seed\":1,\"seed\":",
         "\"unknown\":1,\"unknown\":[],\"seed\":",
@@ -310,7 +310,7 @@ fn a_key_stands_once_in_its_object() {
 }
 
 #[test]
-fn numbers_in_json_are_finite_as_floats() {
+fn numbers_in_json_must_be_finite_as_floats() {
     for number in ["1e39", "-4e38", "1e308"] {
         refuse_texture("a number of at most 3.4e38", |parts| {
             parts.replace(
@@ -323,7 +323,7 @@ fn numbers_in_json_are_finite_as_floats() {
 }
 
 #[test]
-fn vertices_and_eyes_lie_in_the_stated_range() {
+fn vertices_and_eyes_must_be_in_the_specified_range() {
     for coordinate in [1e19f32, -2e18, f32::INFINITY, f32::NAN] {
         refuse_ray("triangle 2: vertices within 1e18 m", |parts| {
             parts.put(b"RTRI", 4 + 2 * 48 + 12 + 8, &coordinate.to_le_bytes());
@@ -340,7 +340,7 @@ fn vertices_and_eyes_lie_in_the_stated_range() {
 }
 
 #[test]
-fn a_hierarchy_has_sizes_that_a_machine_can_have() {
+fn sizes_of_a_hierarchy_must_be_in_the_specified_range() {
     for (key, value) in [
         ("bytes_per_triangle", json!(1u32 << 31)),
         ("bytes_per_triangle", json!(0)),
@@ -359,7 +359,7 @@ fn a_hierarchy_has_sizes_that_a_machine_can_have() {
 }
 
 #[test]
-fn distances_are_finite_and_not_negative() {
+fn distances_must_be_finite_and_not_negative() {
     for distance in [f32::NAN, f32::INFINITY, -1.0] {
         let mut parts = ray_parts();
         let mut tiles = parts.tiles();
@@ -385,7 +385,7 @@ fn distances_are_finite_and_not_negative() {
 }
 
 #[test]
-fn a_tile_has_bytes_and_rays_for_its_samples_before_anything_is_allocated() {
+fn the_size_of_a_tile_is_checked_before_any_allocation() {
     refuse_ray(
         "256 samples: as many rays, in 1824 bytes or more",
         |parts| {
@@ -425,7 +425,7 @@ fn validate_refuses_textures_that_run_cannot_address() {
     let table = trace.chunk(b"TEXS");
     let mut at = 4;
     while at < table.len() {
-        // Array layers, then the length of the name behind the entry.
+        // Array layers, then the length of the name after the entry.
         table[at + 12..at + 16].copy_from_slice(&65_536u32.to_le_bytes());
         let name = u16::from_le_bytes([table[at + 20], table[at + 21]]);
         at += 22 + usize::from(name);
@@ -448,7 +448,7 @@ fn validate_refuses_textures_that_run_cannot_address() {
 
 #[cfg(unix)]
 #[test]
-fn settings_without_an_end_are_refused() {
+fn settings_from_an_endless_device_are_refused() {
     let golden = root().join("traces/teapot-rays.raytrace");
     let endless = "/dev/zero";
     let expected = [endless, "at most 4 MiB of TOML"];

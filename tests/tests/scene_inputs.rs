@@ -1,4 +1,4 @@
-//! No output replaces a file that a scene or a path refers to, whether the command reads it or not.
+//! No output replaces a file that a scene or a path refers to, even if the command does not read it.
 
 use parallax_tests::{program, refuse, run_ok};
 use std::fs;
@@ -47,7 +47,7 @@ fn write_scenes(folder: &Path) {
     }
 }
 
-/// What a folder holds, by name.
+/// The files of a folder, by name.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found: Vec<_> = (fs::read_dir(folder).expect("a folder"))
         .map(|entry| {
@@ -103,7 +103,7 @@ fn no_output_replaces_a_file_that_the_scene_or_the_path_refers_to() {
 }
 
 #[test]
-fn a_study_is_measured_anew_when_a_file_that_the_scene_refers_to_has_changed() {
+fn a_study_is_measured_again_when_a_file_of_the_scene_has_changed() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     write_scenes(folder.path());
     let study = || {
@@ -134,7 +134,7 @@ fn a_study_is_measured_anew_when_a_file_that_the_scene_refers_to_has_changed() {
         "the row of another buffer is kept"
     );
     let mut png = PNG.to_vec();
-    // Bytes after the image's end make another file, though not another picture.
+    // Bytes after the image's end change the file, but not the picture.
     png.push(0);
     fs::write(folder.path().join("colour.png"), png).expect("writable");
     assert!(

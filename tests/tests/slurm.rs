@@ -1,5 +1,5 @@
-//! A sweep on a real Slurm cluster of two nodes, which lives on the loopback interface for the time
-//! of the test. Skipped with a line where Slurm is absent or the user may not run its daemons.
+//! Runs a sweep on a real Slurm cluster of two nodes, which exists on the loopback interface during the
+//! test. Skipped, with a line, if Slurm is absent or the user may not run its daemons.
 
 use parallax_tests::{program, root, run_ok};
 use std::fs::{self, File};
@@ -29,7 +29,7 @@ fn find(program: &str) -> Option<PathBuf> {
     found.find(|path| path.is_file())
 }
 
-/// Why there can be no cluster here.
+/// The reason why no cluster can run here, if any.
 fn hindrance() -> Option<String> {
     if let Some(program) = PROGRAMS.iter().find(|program| find(program).is_none()) {
         return Some(format!("{program} is absent"));
@@ -39,7 +39,7 @@ fn hindrance() -> Option<String> {
     (!is_root).then(|| "slurmd needs root".to_owned())
 }
 
-/// Waits until something holds; false when patience ends.
+/// Waits until a condition holds; returns false after [`PATIENCE`].
 fn wait_for(mut holds: impl FnMut() -> bool) -> bool {
     let deadline = Instant::now() + PATIENCE;
     while !holds() {
@@ -51,7 +51,7 @@ fn wait_for(mut holds: impl FnMut() -> bool) -> bool {
     true
 }
 
-/// Two nodes and their controller; dropped, every daemon has ended.
+/// Two nodes and their controller; dropping it ends all daemons.
 struct Cluster {
     folder: tempfile::TempDir,
     ports: [u16; 3],
@@ -60,7 +60,7 @@ struct Cluster {
 
 impl Cluster {
     fn start() -> Self {
-        // Held all together, so that they differ.
+        // Held at the same time, so that they differ.
         let free = [(); 3].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
         let ports = free
             .each_ref()
@@ -149,7 +149,7 @@ impl Cluster {
             node("n2", second),
         );
         fs::write(self.path("slurm.conf"), text).expect("a configuration");
-        // Of the choices, the one that needs no cgroup to be mounted.
+        // The only choice that does not need a mounted cgroup.
         fs::write(self.path("cgroup.conf"), "CgroupPlugin=cgroup/v1\n").expect("a configuration");
     }
 
@@ -179,7 +179,7 @@ impl Cluster {
             .push(command.spawn().expect("the daemon starts"));
     }
 
-    /// What a command prints; nothing where it fails.
+    /// Output of a command; empty if it fails.
     fn ask(&self, program: &str, arguments: &[&str]) -> String {
         let output = self.command(program).args(arguments).output();
         output.map_or_else(
@@ -192,7 +192,7 @@ impl Cluster {
         self.ask("squeue", &["--noheader", "--array", "--format", "%i %T"])
     }
 
-    /// Submits a script with `sh`; returns what it tells.
+    /// Submits a script with `sh`; returns its output.
     fn submit(&self, script: &Path) -> String {
         let output: Output = run_ok(self.command("sh").arg(script));
         String::from_utf8_lossy(&output.stdout).into_owned()
@@ -221,7 +221,7 @@ impl Cluster {
         text
     }
 
-    /// Local addresses, as the system writes them, that listen on the daemons' ports.
+    /// Local addresses, in the system's notation, that listen on the daemons' ports.
     fn listeners(&self) -> Vec<String> {
         let mut found = Vec::new();
         for table in ["/proc/net/tcp", "/proc/net/tcp6"] {
@@ -245,13 +245,13 @@ impl Cluster {
 
 impl Drop for Cluster {
     fn drop(&mut self) {
-        // Jobs first: their processes are not children of this one.
+        // Jobs first, because their processes are not children of this one.
         if !self.jobs().trim().is_empty() {
             self.ask("scancel", &["--full", "--user", "root"]);
             wait_for(|| self.jobs().trim().is_empty());
         }
         for mut daemon in self.daemons.drain(..).rev() {
-            // SIGTERM ends them in order; SIGKILL those that do not hear.
+            // SIGTERM ends them in order; SIGKILL ends those that do not react.
             let _sent = Command::new("kill").arg(daemon.id().to_string()).status();
             let deadline = Instant::now() + Duration::from_secs(5);
             while matches!(daemon.try_wait(), Ok(None)) && Instant::now() < deadline {
@@ -271,7 +271,7 @@ l2.replacement = [\"lru\", \"fifo\"]
 ";
 
 #[test]
-fn a_job_array_on_two_nodes_gives_one_machines_bytes_also_after_a_task_was_killed() {
+fn a_job_array_on_two_nodes_has_the_bytes_of_one_machine_also_after_a_task_was_killed() {
     if let Some(hindrance) = hindrance() {
         parallax_tests::skipped!("{hindrance}");
         return;
@@ -319,8 +319,9 @@ fn a_job_array_on_two_nodes_gives_one_machines_bytes_also_after_a_task_was_kille
     cluster.wait_for_jobs();
     same("array");
 
-    // A task is killed as the kernel does it when memory ends; the merge after it tells what is missing. A task that had written its
-    // shard when it was killed misses nothing: then another sweep is tried.
+    // A task is killed as the kernel does when memory is exhausted; the merge after it lists what is
+    // missing. A task that had already written its shard causes no missing points, so another sweep is
+    // tried.
     let (out, path, told) = (0..5)
         .find_map(|attempt| {
             let out = format!("killed-{attempt}");
@@ -347,13 +348,13 @@ fn a_job_array_on_two_nodes_gives_one_machines_bytes_also_after_a_task_was_kille
         merge.status.code() == Some(2) && told.contains("of 18 points are missing"),
         "{told}"
     );
-    // The same script again does what is left.
+    // The same script replays the missing points.
     cluster.submit(&path);
     cluster.wait_for_jobs();
     same(&out);
 }
 
-/// Kills the processes of a running task of the array that was submitted as `told` says.
+/// Kills the processes of a running task of the array named in `told`.
 fn kill_a_task(cluster: &Cluster, told: &str) {
     let array: String = told
         .chars()

@@ -1,5 +1,4 @@
-//! `tracegen stress` as a user runs it: the property of mirrored eyes, and triangles that no rasteriser
-//! resolves.
+//! Tests of `tracegen stress`: mirrored eyes, and triangles that no rasteriser resolves.
 
 use parallax_tests::{program, run_ok};
 use serde_json::Value;
@@ -7,7 +6,7 @@ use serde_json::Value;
 #[test]
 fn mirrored_scenes_give_mirrored_eyes_and_slivers_are_warned_of() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // What a user keeps there is not the program's to remove.
+    // The program must not remove a user's file there.
     let kept = folder.path().join("scratch").join("thesis.txt");
     std::fs::create_dir(kept.parent().expect("a folder")).expect("writable");
     std::fs::write(&kept, "years of work").expect("writable");

@@ -1,4 +1,4 @@
-//! Sweeps over many machines: shards, a merge, and what a killed worker leaves behind.
+//! Sweeps over many machines: shards, merges, and the remains of a killed worker.
 
 use parallax_tests::repair::crc32;
 use parallax_tests::{program, refuse, root, run_ok};
@@ -23,12 +23,12 @@ layout.block_order = [\"morton\"]
 seed = [1]
 ";
 
-/// Distinct points of [`EXPERIMENT`]: a seed of 1 is no change.
+/// Number of distinct points of [`EXPERIMENT`]; a seed of 1 is not a change.
 const POINTS: usize = 32;
 
 const RESULTS: [&str; 4] = ["results.json", "results.csv", "report.html", "rows.parquet"];
 
-/// An experiment with its folders.
+/// An experiment and its folders.
 struct Sweep {
     folder: tempfile::TempDir,
 }
@@ -60,7 +60,7 @@ impl Sweep {
         self.command_of("a.toml", out, flags)
     }
 
-    /// Runs to the end; returns what is printed.
+    /// Runs to the end; returns the output.
     fn results(&self, out: &str, flags: &[&str]) -> Vec<u8> {
         let mut command = self.command(out, flags);
         let rows = self.path(out).join("rows.parquet");
@@ -96,7 +96,7 @@ fn assert_same_results(a: &Path, b: &Path) {
 }
 
 #[test]
-fn shards_in_any_order_merge_to_one_machines_bytes() {
+fn shards_in_any_order_merge_to_the_bytes_of_one_machine() {
     let sweep = Sweep::new();
     let printed = sweep.results("whole", &[]);
     for (out, count, order) in [("two", 2, vec![2, 1]), ("five", 5, vec![3, 5, 1, 2, 4])] {
@@ -105,7 +105,7 @@ fn shards_in_any_order_merge_to_one_machines_bytes() {
             let output = run_ok(&mut sweep.command(out, &["--shard", &shard]));
             assert!(output.stdout.is_empty(), "a shard prints no result");
             let entries = fs::read_dir(sweep.path(out)).expect("the folder").count();
-            assert_eq!(entries, 1, "a shard writes points alone");
+            assert_eq!(entries, 1, "a shard writes only points");
         }
         let files = sweep.points(out).len();
         assert!(
@@ -119,7 +119,7 @@ fn shards_in_any_order_merge_to_one_machines_bytes() {
 }
 
 #[test]
-fn a_slurm_task_does_its_shard() {
+fn a_slurm_task_replays_its_shard() {
     let sweep = Sweep::new();
     for task in ["4", "8"] {
         let mut command = sweep.command("out", &["--shard"]);
@@ -145,10 +145,10 @@ fn a_slurm_task_does_its_shard() {
 }
 
 #[test]
-fn after_a_killed_worker_the_results_are_the_same() {
+fn results_are_the_same_after_a_worker_was_killed() {
     let sweep = Sweep::new();
     let printed = sweep.results("whole", &[]);
-    // One thread, so that the first points are kept long before the last.
+    // One thread, so that the first points are stored long before the last.
     let mut worker = sweep.command("out", &["--shard", "1/2", "--threads", "1"]);
     let mut worker = worker.stderr(Stdio::null()).spawn().expect("replay starts");
     let deadline = Instant::now() + Duration::from_secs(60);
@@ -164,7 +164,7 @@ fn after_a_killed_worker_the_results_are_the_same() {
 }
 
 #[test]
-fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
+fn a_merge_lists_missing_damaged_and_outdated_points() {
     let sweep = Sweep::new();
     refuse(
         &mut sweep.command("out", &["--merge-only"]),
@@ -181,7 +181,7 @@ fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
     let rows = sweep.rows("out");
     let name = path.display().to_string();
     let put = |rows: &[String]| fs::write(path, rows.join("\n")).expect("rows");
-    // A changed digit in one row, a row less, the end of the last.
+    // A changed digit in one row, a missing row, and a truncated last row.
     let mut damaged = rows[1..].to_vec();
     let digit = damaged[1]
         .rfind(|c: char| c.is_ascii_digit())
@@ -222,7 +222,7 @@ fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
         ],
     );
     put(&damaged);
-    // The same shards mend it.
+    // The same shards repair it.
     for shard in ["1/3", "2/3", "3/3"] {
         run_ok(&mut sweep.command("out", &["--shard", shard]));
     }
@@ -252,7 +252,7 @@ fn two_experiments_in_one_folder_do_not_mix() {
 }
 
 #[test]
-fn the_plan_tells_keys_costs_and_what_is_done() {
+fn the_plan_lists_keys_costs_and_finished_points() {
     let sweep = Sweep::new();
     run_ok(&mut sweep.command("out", &["--shard", "2/3"]));
     let plan = |flags: &[&str]| -> Vec<serde_json::Value> {
@@ -306,7 +306,7 @@ fn contradicting_flags_and_impossible_shards_are_refused() {
             &["--shard", "1/2", "--json"],
             "--merge-only prints the results",
         ),
-        (&["--shard", "1/2", "--parquet", "a"], "writes points alone"),
+        (&["--shard", "1/2", "--parquet", "a"], "writes only points"),
         (&["--plan"], "--plan --out"),
     ] {
         refuse(&mut sweep.command("out", flags), &[expected]);
@@ -336,7 +336,7 @@ fn bad_plans_and_outputs_are_refused_before_the_work() {
             &["bad.toml", "L1 cache of 6 KiB"],
         );
     }
-    // A folder that cannot be made.
+    // A folder that cannot be created.
     fs::write(sweep.path("file"), "").expect("temporary file");
     for flags in [
         &["--shard", "1/2"][..],
@@ -385,7 +385,7 @@ fn bad_plans_and_outputs_are_refused_before_the_work() {
 }
 
 #[test]
-fn a_slurm_script_does_the_work_whatever_its_paths_hold() {
+fn a_slurm_script_works_with_any_characters_in_its_paths() {
     let sweep = Sweep::new();
     let out = "it's a \"folder\" $(true) `x`\\";
     let rows = sweep.path(out).join("rows.parquet");
@@ -393,7 +393,7 @@ fn a_slurm_script_does_the_work_whatever_its_paths_hold() {
     let script = run_ok(command.arg(&rows)).stdout;
     let path = sweep.path("sweep.sh");
     fs::write(&path, script).expect("temporary file");
-    // Slurm's part, played by hand: the tasks in any order, then task 0.
+    // Simulates Slurm: the tasks in any order, then task 0.
     for task in ["2", "3", "1", "0"] {
         run_ok(
             Command::new("sh")
@@ -409,7 +409,7 @@ fn a_slurm_script_does_the_work_whatever_its_paths_hold() {
 fn rows_of_different_sweeps_can_be_joined() {
     let sweep = Sweep::new();
     let trace = root().join("traces/atrium-shadows.textrace");
-    // The same trace under another name, beside another trace, in another experiment.
+    // The same trace with another name, with another trace, in another experiment.
     let renamed = sweep.path("another name.textrace");
     fs::copy(&trace, &renamed).expect("a copy");
     let experiment = "[base]\nmode = \"functional\"\norder = \"z2-sta\"\nl1.size_bytes = \"4KiB\"\n[one-at-a-time]\nl1.ways = [2, 4]\n";

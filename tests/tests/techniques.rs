@@ -1,5 +1,5 @@
-//! `tracegen techniques`: the folder of a study, going on after an interruption, the search under a
-//! budget, and what is refused.
+//! Tests of `tracegen techniques`: the folder of a study, continuing after an interruption, the search
+//! within a budget, and refusals.
 
 use parallax_tests::{encodings, program, refuse, run_ok};
 use serde_json::Value;
@@ -38,7 +38,7 @@ fn manifest(folder: &Path) -> Value {
     json(&folder.join("manifest.json"))
 }
 
-/// Takes away what differs from run to run: times, and how much memory was held.
+/// Removes values that differ between runs: times and peak memory.
 fn without_measurements(value: &mut Value) {
     match value {
         Value::Object(map) => {
@@ -50,7 +50,7 @@ fn without_measurements(value: &mut Value) {
     }
 }
 
-/// Every file below a folder but for JSON, by its path in the folder.
+/// Every file below a folder except JSON, by its path in the folder.
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
     let mut open = vec![folder.to_owned()];
@@ -72,16 +72,17 @@ fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn a_study_tells_of_every_technique_what_it_draws_shows_and_takes() {
+fn a_study_reports_draws_pictures_and_times_of_every_technique() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let folder = root.path().join("study");
     let output = run_ok(&mut study(&folder, "superfrustum,round-robin,multiview"));
     let manifest = manifest(&folder);
-    // Either the driver's multiview gives the same pictures (see below), or it is said that it is not used.
+    // Either the driver's multiview renders the same pictures (see below), or a message says that it is not
+    // used.
     let said = String::from_utf8_lossy(&output.stderr).contains("multiview cannot be trusted");
     assert_eq!(said, manifest.get("multiview_defect").is_some());
     let replayed = run_ok(program("replay").arg("techniques").arg(&folder)).stdout;
-    let told = String::from_utf8_lossy(&replayed).contains("timed view by view");
+    let told = String::from_utf8_lossy(&replayed).contains("timed as separate views");
     assert_eq!(told, said);
     assert_eq!(manifest["schema"], "tracegen.techniques/1");
     assert_eq!(manifest["frames"], serde_json::json!([0, 1, 4]));
@@ -128,7 +129,7 @@ fn a_study_tells_of_every_technique_what_it_draws_shows_and_takes() {
 }
 
 #[test]
-fn at_half_rate_odd_frames_are_the_last_one_turned_and_cost_its_bytes() {
+fn at_half_rate_odd_frames_are_the_previous_one_rotated_and_count_its_bytes() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let folder = root.path().join("study");
     run_ok(&mut study(
@@ -141,7 +142,7 @@ fn at_half_rate_odd_frames_are_the_last_one_turned_and_cost_its_bytes() {
         let name = rows[row]["frames"][frame]["images"][0].as_str();
         fs::read(folder.join(name.expect("a name"))).expect("a picture")
     };
-    // Frames 0, 1 and 4, both eyes of 64x72 pixels of four bytes, read and written.
+    // Frames 0, 1 and 4, both eyes with 64x72 pixels of four bytes, read and written.
     let bytes = |row: usize, key: &str| -> Vec<u64> {
         let frames = rows[row]["frames"].as_array().expect("frames");
         (frames
@@ -161,7 +162,7 @@ fn at_half_rate_odd_frames_are_the_last_one_turned_and_cost_its_bytes() {
     assert!(image(1, 1) != image(0, 1) && image(1, 1) != image(0, 0));
     let (baseline, matched) = (bytes(0, "fragments"), bytes(2, "fragments"));
     assert!(matched[0] < baseline[0] / 2, "{matched:?} {baseline:?}");
-    // A view's colour twice, its depth once: passes follow each other.
+    // Colour of both views, but depth of one, because passes follow each other.
     assert_eq!(bytes(0, "target_color_bytes")[0], 2 * 64 * 72 * 4);
     assert_eq!(bytes(0, "target_depth_bytes")[0], 64 * 72 * 4);
 
@@ -178,7 +179,7 @@ fn at_half_rate_odd_frames_are_the_last_one_turned_and_cost_its_bytes() {
     assert_eq!(row(0)["flip_mean"], 0.0);
     let error = row(1)["flip_mean"].as_f64().expect("an error");
     assert!(error > 0.0 && error < 0.2, "{error}");
-    // The head walks, so depth makes another picture.
+    // The head walks, so depth makes a difference.
     assert_ne!(row(3)["psnr_db"], row(1)["psnr_db"]);
     let figure = |key: &str| row(1)[key].as_f64().unwrap_or_else(|| panic!("{key}"));
     assert!(figure("steps_72hz") >= 1.0 && figure("steps_144hz") >= figure("steps_72hz"));
@@ -188,7 +189,7 @@ fn at_half_rate_odd_frames_are_the_last_one_turned_and_cost_its_bytes() {
 }
 
 #[test]
-fn a_study_that_was_killed_goes_on_where_it_was_and_ends_with_the_same() {
+fn a_killed_study_continues_and_completes_with_the_same_results() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let [whole, killed] = ["whole", "killed"].map(|name| root.path().join(name));
     let only = "superfrustum,conical,round-robin";
@@ -222,7 +223,7 @@ fn a_study_that_was_killed_goes_on_where_it_was_and_ends_with_the_same() {
 }
 
 #[test]
-fn what_was_cut_or_swapped_in_a_study_is_refused_and_measured_anew() {
+fn truncated_or_swapped_files_of_a_study_are_refused_and_measured_again() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let folder = root.path().join("study");
     let mut measure = study(&folder, "superfrustum,conical");
@@ -239,7 +240,7 @@ fn what_was_cut_or_swapped_in_a_study_is_refused_and_measured_anew() {
         refuse(program("replay").arg("techniques").arg(&folder), expected);
     };
     read(&["superfrustum/0001-right.png", "expected the checksum"]);
-    // `--quiet` keeps the count of kept rows to itself.
+    // `--quiet` hides the count of kept rows.
     let mut again = program("tracegen");
     again.args(measure.get_args().filter(|argument| *argument != "--quiet"));
     let output = run_ok(&mut again);
@@ -247,11 +248,11 @@ fn what_was_cut_or_swapped_in_a_study_is_refused_and_measured_anew() {
     assert!(told.contains("1 of 3 rows were there already"), "{told}");
     assert!(files(&folder) == before);
 
-    // Another scene's trace, whole.
+    // A complete trace of another scene.
     let foreign = parallax_tests::root().join("traces/atrium.textrace");
     fs::copy(foreign, &trace).expect("a file");
     read(&["conical.textrace", "expected the checksum"]);
-    // What would be waited for is refused before anything is measured.
+    // Inputs that would block are refused before any measurement.
     fs::remove_file(&trace).expect("removed");
     run_ok(Command::new("mkfifo").arg(&trace));
     read(&["conical.textrace", "found a pipe"]);
@@ -259,7 +260,7 @@ fn what_was_cut_or_swapped_in_a_study_is_refused_and_measured_anew() {
 }
 
 #[test]
-fn the_traces_of_a_study_are_packed_as_asked_and_a_study_packed_otherwise_is_another() {
+fn the_traces_of_a_study_have_the_requested_encoding_and_another_encoding_is_another_study() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let folder = root.path().join("study");
     let run = |encoding: &str| {
@@ -275,7 +276,7 @@ fn the_traces_of_a_study_are_packed_as_asked_and_a_study_packed_otherwise_is_ano
 }
 
 #[test]
-fn the_search_keeps_its_budget_on_frames_it_did_not_see_and_is_as_cheap_as_any_technique_alone() {
+fn the_search_keeps_its_budget_on_unseen_frames_and_is_as_cheap_as_any_single_technique() {
     let root = tempfile::tempdir().expect("a temporary folder");
     run_ok(study(root.path(), "none").args(["--auto", "flip=0.01", "--objective", "time"]));
     let manifest = manifest(root.path());
@@ -294,7 +295,7 @@ fn the_search_keeps_its_budget_on_frames_it_did_not_see_and_is_as_cheap_as_any_t
             .as_f64()
             .expect("a ratio")
     };
-    // No claim beyond what the quartiles of both allow.
+    // The claim is limited by the quartiles of both.
     let upper = auto["best_single"]["verdict"]["cost"]["spread"]["q3"].as_f64();
     assert!(
         cost("chosen") <= upper.unwrap_or(1.0).max(cost("best_single")),
@@ -316,7 +317,8 @@ fn both_eyes_at_once_upload_two_views_and_one_list_of_draws() {
         value.as_u64().expect("a count")
     };
     for frame in 0..3 {
-        // Each list has a number of four bytes a draw; eye by eye, each has its length before it.
+        // Each list has a number of four bytes per draw; with separate eyes, each is preceded by its
+        // length.
         let views = of(0, frame, "bytes_uploaded") - 4 * of(0, frame, "draws") - 2 * 4;
         assert!(views > 0 && of(1, frame, "draws") < of(0, frame, "draws"));
         assert_eq!(
@@ -328,9 +330,9 @@ fn both_eyes_at_once_upload_two_views_and_one_list_of_draws() {
 }
 
 #[test]
-fn what_counts_choose_is_not_dominated_by_any_row_of_the_table() {
+fn choices_by_counts_are_not_dominated_by_any_row_of_the_table() {
     let root = tempfile::tempdir().expect("a temporary folder");
-    // Both budgets, and every objective; all pairs are in results/auto-choices.csv at full size.
+    // Both budgets and every objective; results/auto-choices.csv has all pairs at full size.
     let searches = [
         ("flip=0.003", ["fragments", "bytes"]),
         ("flip=0.05", ["fragments", "energy"]),
@@ -389,7 +391,7 @@ fn info(trace: &Path) -> Value {
 }
 
 #[test]
-fn a_choice_by_counts_gives_the_same_bytes_twice_and_is_captured_again_by_name() {
+fn a_choice_by_counts_has_the_same_bytes_twice_and_can_be_captured_again_by_name() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let [first, second, named] =
         ["first", "second", "named"].map(|name| root.path().join(name).with_extension("textrace"));
@@ -431,7 +433,7 @@ fn a_choice_by_counts_gives_the_same_bytes_twice_and_is_captured_again_by_name()
 }
 
 #[test]
-fn schedules_that_cannot_be_are_refused() {
+fn invalid_schedules_are_refused() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let trace = root.path().join("a.textrace");
     let refused = |arguments: &[&str], expected: &[&str]| {
@@ -461,7 +463,7 @@ fn schedules_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn a_capture_under_a_budget_is_a_trace_of_the_path_with_what_was_chosen() {
+fn a_capture_with_a_budget_is_a_trace_of_the_path_with_the_chosen_techniques() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let (trace, picture) = (root.path().join("a.textrace"), root.path().join("a.png"));
     let mut command = program("tracegen");
@@ -484,7 +486,7 @@ fn a_capture_under_a_budget_is_a_trace_of_the_path_with_what_was_chosen() {
 }
 
 #[test]
-fn a_budget_that_nothing_meets_is_told() {
+fn a_budget_that_no_technique_meets_is_reported() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let mut command = study(root.path(), "none");
     refuse(
@@ -494,7 +496,7 @@ fn a_budget_that_nothing_meets_is_told() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_with_the_reason() {
+fn invalid_options_are_refused_with_the_reason() {
     let root = tempfile::tempdir().expect("a temporary folder");
     let folder = root.path().join("study");
     let refused = |arguments: &[&str], expected: &[&str]| {
@@ -546,7 +548,7 @@ fn what_cannot_be_is_refused_with_the_reason() {
 }
 
 #[test]
-fn a_budget_that_chooses_the_techniques_excludes_choosing_them() {
+fn a_budget_excludes_naming_techniques() {
     let root = tempfile::tempdir().expect("a temporary folder");
     for technique in [
         "--multiview",

@@ -1,11 +1,11 @@
-//! The cache of prepared textures never shows in a trace or a picture.
+//! The cache of prepared textures has no effect on traces and pictures.
 
 use parallax_tests::{program, run_ok};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A capture of the teapot in a folder of its own.
+/// A capture of the teapot in its own folder.
 struct Capture {
     folder: tempfile::TempDir,
 }
@@ -34,7 +34,7 @@ impl Capture {
         command
     }
 
-    /// Captures and tells the line about textures.
+    /// Captures and returns the summary line about textures.
     fn run(&self, name: &str, cache: &Path, flags: &[&str]) -> String {
         let output = run_ok(&mut self.command(name, cache, flags));
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -79,7 +79,7 @@ fn trace_and_picture_are_the_same_without_with_an_empty_and_with_a_full_cache() 
         "{second}"
     );
 
-    // Damage: one entry with a flipped bit, one cut, one empty.
+    // Damage: one entry with a flipped bit, one truncated, one empty.
     let kept = entries(&cache);
     let whole: Vec<Vec<u8>> = kept
         .iter()
@@ -99,7 +99,7 @@ fn trace_and_picture_are_the_same_without_with_an_empty_and_with_a_full_cache() 
         assert_eq!(&fs::read(entry).expect("an entry"), bytes, "replaced");
     }
 
-    // A cache that cannot be: its folder is a file.
+    // An invalid cache: its folder is a file.
     let file = capture.path("file");
     fs::write(&file, "in the way").expect("writable");
     let unusable = capture.run("unusable", &file, &[]);

@@ -1,4 +1,4 @@
-//! `replay run --timeline`: a file that Perfetto opens, and refusals.
+//! Tests of `replay run --timeline`: a file that Perfetto opens, and refusals.
 
 use parallax_tests::{program, root};
 use serde_json::Value;
@@ -39,13 +39,13 @@ fn the_file_holds_every_item_and_does_not_depend_on_threads() {
     });
     assert!(pairs.count() > 100);
 
-    // Standard output can take it in place of the result.
+    // It can replace the result on standard output.
     let output = run(&[text(&trace), "--order", "z2-sta", "--timeline", "-"]);
     assert_eq!(String::from_utf8_lossy(&output.stdout), one);
 }
 
 #[test]
-fn what_cannot_be_recorded_or_written_is_refused() {
+fn timelines_that_cannot_be_recorded_or_written_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = folder.path().join("a.textrace");
     fs::copy(root().join("traces/atrium.textrace"), &trace).expect("a copy");

@@ -1,4 +1,4 @@
-//! `tracegen verify`: a capture agrees with the reference, a trace that lies does not.
+//! Tests of `tracegen verify`: a capture agrees with the reference, a changed trace does not.
 
 use formats::textrace::{Textrace, TextraceWriter, Tile};
 use parallax_tests::{program, real_scene, refuse, root, run_ok};
@@ -7,7 +7,7 @@ use std::path::Path;
 
 const SMALL: [&str; 2] = ["--size", "96x112"];
 
-/// The report of a capture that is as it should be.
+/// The report of a correct capture.
 fn verify(arguments: &[&str]) -> Value {
     verify_expecting(0, arguments)
 }
@@ -35,7 +35,7 @@ fn path(path: &Path) -> &str {
     path.to_str().expect("UTF-8")
 }
 
-/// Every coordinate and every footprint that differs has a cause.
+/// Checks that every coordinate and every footprint that differs has a cause.
 fn hold_causes(report: &Value) {
     assert_eq!(report["failures"], serde_json::json!([]), "{report:#}");
     for place in ["uv_error_texels", "capture_precision", "specification"] {
@@ -89,7 +89,7 @@ fn a_capture_agrees_with_the_reference_and_so_does_the_reference() {
             number(of_texture, "/within_1_255_share") > 0.995,
             "{of_texture:#}"
         );
-        // What is beyond has its cause, and decoded as the driver does nothing is.
+        // Larger errors have their cause; with the driver's decoding there are none.
         assert_eq!(number(of_texture, "/beyond_unexplained"), 0.0);
         assert!(
             number(of_texture, "/max_as_driver") < 0.5 / 255.0,
@@ -97,7 +97,7 @@ fn a_capture_agrees_with_the_reference_and_so_does_the_reference() {
         );
     }
     hold_causes(&report);
-    // What the reference wrote holds exactly its own fragments, but for the rounding of coordinates.
+    // The reference's own trace has exactly its fragments, except for the rounding of coordinates.
     let own = verify(&["atrium", "--trace", path(&reference)]);
     assert_eq!(number(&own, "/coverage/iou"), 1.0);
     assert_eq!(own["size_px"], report["size_px"]);
@@ -106,7 +106,7 @@ fn a_capture_agrees_with_the_reference_and_so_does_the_reference() {
 }
 
 #[test]
-fn a_sample_of_tiles_is_the_same_whatever_the_threads() {
+fn a_sample_of_tiles_does_not_depend_on_the_threads() {
     let [flag, size] = SMALL;
     let of = |threads| {
         verify(&[
@@ -130,7 +130,7 @@ fn a_sample_of_tiles_is_the_same_whatever_the_threads() {
 }
 
 #[test]
-fn records_that_are_missing_moved_or_invented_are_told() {
+fn missing_moved_and_invented_records_are_reported() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("atrium.textrace");
     let [flag, size] = SMALL;
@@ -142,7 +142,7 @@ fn records_that_are_missing_moved_or_invented_are_told() {
     let honest = verify(&["atrium", "--trace", path(&file)]);
     let changed = folder.path().join("changed.textrace");
     change(&file, &changed, |tile| {
-        // A lane of the first record is left out, the next one's coordinates are moved by a texel.
+        // A lane of the first record is removed, and the next record's coordinates are moved by a texel.
         let [first, second, ..] = tile.records.as_mut_slice() else {
             return;
         };
@@ -166,7 +166,7 @@ fn records_that_are_missing_moved_or_invented_are_told() {
     assert!(differ(&lying) > differ(&honest));
 }
 
-/// Copies a trace, its tiles changed.
+/// Copies a trace with changed tiles.
 fn change(from: &Path, to: &Path, change: impl Fn(&mut Tile)) {
     let trace = Textrace::open(from).expect("a trace");
     let mut writer = TextraceWriter::create(to, trace.tables()).expect("a file");
@@ -182,7 +182,7 @@ fn change(from: &Path, to: &Path, change: impl Fn(&mut Tile)) {
 }
 
 #[test]
-fn what_cannot_be_verified_is_refused() {
+fn traces_that_cannot_be_verified_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let golden = root().join("traces/atrium.textrace");
     let other = folder.path().join("other.textrace");
@@ -230,7 +230,7 @@ fn what_cannot_be_verified_is_refused() {
 
 #[test]
 fn triangles_that_drivers_clip_at_the_border_are_explained() {
-    // A triangle 190 px long is cut into one of 0.02 px in height there.
+    // There, a triangle of 190 px in length is clipped to one of 0.02 px in height.
     let Some(scene) = real_scene("stk-cocoa-temple/stk-cocoa-temple.gltf") else {
         return;
     };

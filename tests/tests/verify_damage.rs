@@ -1,7 +1,8 @@
-//! What `tracegen verify` reports of a capture with one thing wrong: each column of a record and each field of
-//! the tables. `results/verify-damage.csv` holds what the test finds; `UPDATE_GOLDEN=1` writes it anew, and
-//! `make figures` then the table in docs/results/verify.md. Damages of graded size are searched for the smallest one that is
-//! reported; the test then holds that size, and that two steps below it nothing is reported (drivers differ by a step).
+//! The reports of `tracegen verify` on captures with a single error, for each column of a record and each
+//! field of the tables. `results/verify-damage.csv` has the results of this test; `UPDATE_GOLDEN=1`
+//! rewrites it, and `make figures` then updates the table in docs/results/verify.md. For damages of graded
+//! size, the smallest reported one is searched. The test checks that size, and that damages two steps below
+//! are not reported (drivers differ by a step).
 
 use formats::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Tables, Textrace, TextraceWriter, Tile};
 use formats::texture::{ColorSpace, Filter, MipFilter, TexelFormat, Wrap};
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 const SCENE: &str = "atrium-shadows";
 
-/// A trace in parts.
+/// The parts of a trace.
 #[derive(Clone)]
 struct Trace {
     tables: Tables,
@@ -49,7 +50,7 @@ impl Trace {
         writer.finish().expect("a file");
     }
 
-    /// Every record of a material's group.
+    /// Changes every record of a material's group.
     fn each(&mut self, change: impl Fn(&mut QuadRecord)) {
         let groups = |draw: u32, tables: &Tables| tables.draws[draw as usize].groups.len() - 4;
         for tile in self.tiles.iter_mut().flatten() {
@@ -64,7 +65,8 @@ impl Trace {
         }
     }
 
-    /// One record of a material's group, covered whole, in the middle of a picture, alone in its run.
+    /// Changes one fully covered record of a material's group, in the middle of a picture, alone in its
+    /// run.
     fn one(&mut self, change: impl FnOnce(&mut QuadRecord)) {
         let tables = &self.tables;
         for tile in self.tiles[0].iter_mut().skip(30) {
@@ -83,7 +85,7 @@ impl Trace {
         panic!("no whole record");
     }
 
-    /// Moves the last quad of a run, covered whole, on.
+    /// Moves the last quad of a run, if fully covered.
     fn move_quad(&mut self, by: [u8; 2]) {
         for tile in self.tiles.iter_mut().flatten() {
             for run in &tile.runs {
@@ -104,7 +106,7 @@ impl Trace {
         panic!("no quad that may move");
     }
 
-    /// Gives a run with a quad that is covered whole the next primitive's number.
+    /// Gives the next primitive's number to a run with a fully covered quad.
     fn next_primitive(&mut self) {
         let draws = &self.tables.draws;
         for tile in self.tiles.iter_mut().flatten() {
@@ -127,7 +129,7 @@ impl Trace {
 
 type Change = Box<dyn Fn(&mut Trace)>;
 
-/// A field and what is done to it: one change, or the same change in ascending sizes.
+/// A field and its damage: one change, or the same change in ascending sizes.
 struct Damage {
     field: String,
     sizes: Vec<(String, Change)>,
@@ -178,7 +180,7 @@ fn of_tables(field: &str, what: &str, change: impl Fn(&mut Tables) + 'static) ->
     damage(field, what, move |trace| change(&mut trace.tables))
 }
 
-/// A pair of a record by name.
+/// A pair of a record, by name.
 fn pair<'a>(record: &'a mut QuadRecord, name: &str) -> &'a mut [i32; 2] {
     match name {
         "uv" => &mut record.uv,
@@ -385,7 +387,7 @@ fn of_description() -> Vec<Damage> {
     ]
 }
 
-/// Fields that nothing in a scene can contradict.
+/// Fields that nothing in a scene contradicts.
 const FREE: [(&str, &str); 6] = [
     (
         "META: tool, command_line",
@@ -413,7 +415,7 @@ const FREE: [(&str, &str); 6] = [
     ),
 ];
 
-/// Prepared textures of the scene are kept for the runs of this test.
+/// Verifies a trace; the runs of this test share the prepared textures of the scene.
 fn verify(trace: &Path, cache: &Path) -> (Option<i32>, String) {
     let mut command = program("tracegen");
     command.env("PARALLAX_CACHE_SIZE", "1GiB");
@@ -426,12 +428,12 @@ fn verify(trace: &Path, cache: &Path) -> (Option<i32>, String) {
     (output.status.code(), errors)
 }
 
-/// The first error without what differs between machines.
+/// The first error, without parts that differ between machines.
 fn first_error(errors: &str) -> String {
     let line = errors.lines().find(|line| line.contains("error"));
     let line = line.unwrap_or_default();
     let text = line.split_once("error: ").map_or(line, |(_, text)| text);
-    // Measured figures differ between drivers: the kind of report is what counts.
+    // Measured figures differ between drivers, so only the kind of report is compared.
     let mut kind = String::new();
     for part in text.split_inclusive(": ").take(2) {
         kind += part;
@@ -514,7 +516,7 @@ fn each_damage_is_reported() {
     hold(&committed, &csv);
 }
 
-/// A field of a CSV file.
+/// Quotes a field of a CSV file.
 fn quoted(text: &str) -> String {
     if text.contains([',', '"']) {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -523,7 +525,7 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// Holds a file against what it should hold, or writes it.
+/// Compares a file with its expected content, or writes it.
 fn hold(file: &Path, whole: &str) {
     let found = std::fs::read_to_string(file).unwrap_or_default();
     if std::env::var_os("UPDATE_GOLDEN").is_some() {

@@ -1,4 +1,4 @@
-//! Geometry in a captured trace, and the traffic of a whole frame from it.
+//! Tests of geometry in a captured trace, and of the traffic of a whole frame.
 
 use formats::container::ChunkTag;
 use formats::textrace::geometry::{GEOMETRY, LIST_INDEX, PRIMITIVE_LISTS, ViewTarget};
@@ -40,8 +40,9 @@ fn client<'a>(found: &'a Value, name: &str) -> &'a Value {
     of.unwrap_or_else(|| panic!("{name} in {clients:?}"))
 }
 
-/// Masked and blended draws, shadow maps, moving things, layers, a mirrored scene and one seen from far: every primitive
-/// with records in a tile is in the tile's list, and most lists are hardly longer than what was drawn.
+/// Masked and blended draws, shadow maps, moving objects, layers, a mirrored and a distant scene: every
+/// primitive with records in a tile is in the tile's list, and most lists are hardly longer than the drawn
+/// primitives.
 #[test]
 fn every_primitive_that_was_drawn_in_a_tile_is_in_its_list() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -95,7 +96,7 @@ fn every_primitive_that_was_drawn_in_a_tile_is_in_its_list() {
         assert_eq!(geometry.views.len() > passes.len(), is_shadowed, "{name}");
         assert!(drawn > 1000, "{name}: {drawn}");
         if name == "teapot" {
-            // Without the depth test, they differ by the primitives that lie between the centres of pixels.
+            // Without the depth test, they differ by the primitives between the centres of pixels.
             assert!(entries < 3 * drawn, "{entries} {drawn}");
         }
     }
@@ -121,7 +122,7 @@ fn both_drivers_write_the_same_geometry() {
 }
 
 #[test]
-fn clients_add_up_and_an_order_changes_only_what_tiles_read() {
+fn clients_add_up_and_an_order_changes_only_the_reads_of_tiles() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = capture(
         folder.path(),
@@ -148,7 +149,7 @@ fn clients_add_up_and_an_order_changes_only_what_tiles_read() {
     }
     assert_eq!(client(&sta, "colour")["write_bytes"], 2 * 160 * 144 * 4);
     assert_eq!(client(&sta, "depth")["write_bytes"], 4 * 2048 * 2048 * 4);
-    // LPDDR4 reads 32 bytes with 1.3 nJ and opens a row with 1.5 nJ; GDDR6 is another device.
+    // LPDDR4 reads 32 bytes with 1.3 nJ and opens a row with 1.5 nJ; GDDR6 has other figures.
     let colour = f64::from(2 * 160 * 144 * 4);
     let energy_mj = |found: &Value| {
         client(found, "colour")["energy_mj"]
@@ -176,7 +177,7 @@ fn clients_add_up_and_an_order_changes_only_what_tiles_read() {
     };
     assert!(bytes(&both) < bytes(&sta));
 
-    // The same in a sweep's columns.
+    // The same figures in a sweep's columns.
     let rows = folder.path().join("rows.csv");
     let mut paper = program("replay");
     paper
@@ -203,7 +204,7 @@ fn clients_add_up_and_an_order_changes_only_what_tiles_read() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn invalid_frames_are_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let plain = folder.path().join("plain.textrace");
     let capture = ["raster", "teapot", "--size", "32x32", "--no-plain", "-o"];
@@ -253,9 +254,10 @@ fn what_cannot_be_is_refused() {
     }
 }
 
-/// All clients go through the levels that are for all, and to DRAM: each byte once, whatever the mode and the levels.
+/// All clients use the levels for all clients, and DRAM: each byte is counted once, in any mode and with
+/// any levels.
 #[test]
-fn what_clients_read_and_write_is_what_dram_reads_and_writes() {
+fn dram_reads_and_writes_equal_those_of_the_clients() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = capture(
         folder.path(),
@@ -295,7 +297,8 @@ fn what_clients_read_and_write_is_what_dram_reads_and_writes() {
                 Some(sum("read_bytes") + textures),
                 "{place}"
             );
-            // An L3 for all: fewer reads, the same writes, and each byte of reads leaves it once.
+            // With an L3 for all clients: fewer reads, the same writes, and each byte of reads leaves it
+            // once.
             let options = [&options[..], &["--config", &shared_l3]].concat();
             let with_l3 = replayed_in(mode, &trace, &options);
             let of_dram = |key: &str| with_l3["result"]["dram"][key].as_u64().expect("bytes");
@@ -315,7 +318,7 @@ fn what_clients_read_and_write_is_what_dram_reads_and_writes() {
     }
 }
 
-/// Larger tiles have fewer list entries; the pictures that are written stay what they are.
+/// Larger tiles have fewer list entries; written pictures do not change.
 #[test]
 fn larger_tiles_have_shorter_lists_and_the_same_pictures() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -335,7 +338,7 @@ fn larger_tiles_have_shorter_lists_and_the_same_pictures() {
 }
 
 #[test]
-fn a_picture_says_how_far_colour_is_compressed() {
+fn a_picture_determines_the_compression_of_colour() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let picture = folder.path().join("picture.png");
     let picture = picture.to_str().expect("UTF-8");
@@ -353,7 +356,7 @@ fn a_picture_says_how_far_colour_is_compressed() {
             .expect("bytes")
     };
     let ratio = 1000.0 * written(&packed) as f64 / written(&plain) as f64;
-    // Each tile takes whole lines.
+    // Each tile uses whole lines.
     assert!((ratio - permille as f64).abs() < 63.0, "{ratio} {permille}");
     refuse(
         program("replay").args(["run", trace.to_str().expect("UTF-8"), "--picture", picture]),

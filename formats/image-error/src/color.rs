@@ -3,7 +3,7 @@
 /// Reciprocal of the D65 reference white in XYZ (FLIP's, from the sRGB primaries).
 const INVERSE_WHITE: [f32; 3] = [1.052_156_9, 1.0, 0.918_357_7];
 
-/// Linear value of an sRGB-encoded one, both 0 to 1.
+/// Linear value of an sRGB-encoded value, both 0 to 1.
 #[must_use]
 pub fn linear_from_srgb(value: f32) -> f32 {
     if value > 0.04045 {
@@ -13,7 +13,7 @@ pub fn linear_from_srgb(value: f32) -> f32 {
     }
 }
 
-/// sRGB encoding of a linear value, clamped to 0..1; not a number counts as 0.
+/// sRGB encoding of a linear value, clamped to 0..1; NaN becomes 0.
 #[must_use]
 pub fn srgb_from_linear(value: f32) -> f32 {
     let value = if value.is_nan() {
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_8_bit_code_survives_decoding_and_encoding() {
+    fn every_8_bit_code_is_unchanged_by_decoding_and_encoding() {
         for code in 0..=255u8 {
             let linear = linear_from_srgb(f32::from(code) / 255.0);
             assert_eq!(srgb8_from_linear(linear), code);

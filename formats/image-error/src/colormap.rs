@@ -1,6 +1,7 @@
 //! Colours of error maps.
 
-/// Matplotlib's magma at 17 even steps; linear between them is within 2/255 of the whole table.
+/// Matplotlib's magma at 17 equidistant points; interpolation deviates by at most 2/255 from the full
+/// table.
 const MAGMA: [[u8; 3]; 17] = [
     [0, 0, 4],
     [10, 8, 34],
@@ -21,7 +22,7 @@ const MAGMA: [[u8; 3]; 17] = [
     [252, 253, 191],
 ];
 
-/// Magma colour of a value, clamped to 0..1: black for no error, pale yellow for the largest.
+/// Magma colour of a value, clamped to 0..1: black for no error, pale yellow for 1.
 #[must_use]
 pub fn magma(value: f32) -> [u8; 3] {
     let last = MAGMA.len() - 1;

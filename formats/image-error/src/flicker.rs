@@ -1,21 +1,21 @@
-//! Flicker: change from one frame to the next beyond what the scene itself shows.
+//! Flicker: change between consecutive frames beyond the change in the reference.
 
 use crate::motion::Motion;
 use crate::{Mask, Picture};
 
-/// Edge of the tiles in which changes are held against the reference's. Where an edge falls between pixels
-/// makes single pixels change by chance, in the reference and the test alike; over a tile that is even.
+/// Edge of the tiles in which changes are compared with the reference's. The sampling of edges between
+/// pixels changes single pixels at random in both pictures; averaged over a tile, this effect cancels.
 pub const TILE_PX: usize = 32;
 
-/// Mean over the pixels of how much more a technique's picture changes than the reference's, 0 (none) to 1, on
-/// sRGB codes. A pixel's change is the mean over the channels of `|p_1(x) - p_0(x + v)| / 255`, where `v` leads to
-/// where the reference showed the same before. Of each tile the technique's changes less the reference's count
-/// where that is more than 0. So an error that sticks to what moves does not flicker, although it
-/// changes at every pixel that it moves across, nor does what is only blurred. Pixels count that the mask holds
-/// now and held where their content was.
+/// Mean over the pixels of the change that a technique adds to the reference's, 0 (none) to 1, on sRGB
+/// codes. A pixel's change is the mean over the channels of `|p_1(x) - p_0(x + v)| / 255`, where `v` leads
+/// to the position of the same content in the previous reference. In each tile, the technique's changes
+/// minus the reference's count if the difference is positive. An error that moves with an object therefore
+/// does not flicker, although it changes every pixel it moves across; neither does blur. Only pixels inside
+/// the mask in both frames count.
 ///
-/// `frames` are two frames in a row, each the reference and the test, all of the mask's size; `motion` is that
-/// of the references.
+/// `frames` are two consecutive frames, each with the reference and the test, all of the mask's size.
+/// `motion` is that of the references.
 #[must_use]
 pub fn flicker(frames: [[&Picture; 2]; 2], motion: &Motion, mask: &Mask) -> f64 {
     let [[before_reference, before], [after_reference, after]] = frames;
@@ -49,13 +49,13 @@ pub fn flicker(frames: [[&Picture; 2]; 2], motion: &Motion, mask: &Mask) -> f64 
     sum / (255.0 * 3.0 * pixels.max(1) as f64)
 }
 
-/// Where a pixel's content was before: the four nearest pixels and their weights.
+/// Position of a pixel's content in the previous frame: the four nearest pixels and their weights.
 struct Source {
     taps: [(usize, f32); 4],
 }
 
 impl Source {
-    /// None where it was outside of the picture.
+    /// `None` if the position is outside the picture.
     fn new([dx, dy]: [f32; 2], [x, y]: [usize; 2], [width, height]: [usize; 2]) -> Option<Self> {
         let (was_x, was_y) = (x as f32 + dx, y as f32 + dy);
         let inside = (0.0..=(width - 1) as f32).contains(&was_x)
@@ -76,7 +76,7 @@ impl Source {
         })
     }
 
-    /// How far a pixel is from what it was, all channels together, in codes.
+    /// Difference of a pixel from its content in the previous frame, summed over channels, in codes.
     fn change(&self, before: &Picture, after: &Picture, at: usize) -> f32 {
         let code =
             |picture: &Picture, at: usize, channel: usize| f32::from(picture.pixels[at][channel]);
@@ -101,7 +101,7 @@ mod tests {
         flicker(frames, &motion, &Mask::everything(frames[0][0].size_px))
     }
 
-    /// The change of the error at each pixel, as if nothing moved.
+    /// The change of the error at each pixel, without motion compensation.
     fn change_of_error([[r0, t0], [r1, t1]]: [[&Picture; 2]; 2]) -> f64 {
         let error = |r: &Picture, t: &Picture, i: usize, c: usize| {
             f64::from(t.pixels[i][c]) - f64::from(r.pixels[i][c])
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_vanishes_for_a_frame_flickers_by_its_share_of_the_picture() {
+    fn an_error_that_vanishes_for_a_frame_flickers_by_its_share_of_the_picture() {
         let still = Picture::filled([10, 10], [20; 3]);
         let mut gone = still.clone();
         gone.pixels[..10].fill([122; 3]);
@@ -129,14 +129,15 @@ mod tests {
     }
 
     #[test]
-    fn a_moving_scene_that_is_shown_as_it_is_does_not_flicker() {
+    fn a_correctly_shown_moving_scene_does_not_flicker() {
         let a = scene_like([40, 30]);
         let b = shifted(&a, 3);
         assert_eq!(of([[&a, &a], [&b, &b]]), 0.0);
         assert!(of([[&a, &a], [&b, &noise([40, 30], 1)]]) > 0.1);
     }
 
-    /// A technique that shows everything 0.7 pixels aside, and one that does so in every other frame alone.
+    /// Compares a technique that shifts everything by 0.7 pixels with one that does so only in every other
+    /// frame.
     #[test]
     fn with_a_moving_head_a_steady_error_ranks_below_one_that_comes_and_goes() {
         let size_px = [160, 120];
@@ -149,7 +150,7 @@ mod tests {
             let comes = [[&before, &before], [&after, &after_aside]];
             let (low, high) = (of(steady), of(comes));
             assert!(low < 0.2 * high, "{pan:?}: {low} {high}");
-            // Pixel by pixel the steady one would flicker more as soon as the head moves.
+            // Without motion compensation, the constant error would flicker more as soon as the head moves.
             if pan[0] >= 4.0 {
                 assert!(change_of_error(steady) > change_of_error(comes), "{pan:?}");
             }
@@ -157,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_lens_hides_does_not_flicker() {
+    fn pixels_outside_the_mask_do_not_flicker() {
         let still = Picture::filled([10, 10], [20; 3]);
         let mut gone = still.clone();
         gone.pixels[..10].fill([122; 3]);

@@ -1,8 +1,8 @@
-//! FLIP, a difference evaluator for alternating images (Andersson et al., HPG 2020), its variant
-//! for low dynamic range: how different two pictures look when flipped between in place.
+//! FLIP, a difference evaluator for alternating images (Andersson et al., HPG 2020), in its variant for low
+//! dynamic range. It predicts the visible difference of two pictures flipped between in place.
 //!
-//! The kernels are sampled per degree of visual angle, so every value belongs to a number of
-//! pixels per degree; [`crate::pixels_per_degree`] gives an eye's.
+//! The kernels are sampled per degree of visual angle, so every value depends on the pixels per degree;
+//! [`crate::pixels_per_degree`] computes them for an eye.
 
 use crate::Picture;
 use crate::color;
@@ -31,7 +31,7 @@ pub struct FlipMap {
     pub errors: Vec<f32>,
     /// Width and height in pixels.
     pub size_px: [u32; 2],
-    /// Pixels per degree that the kernels were made for.
+    /// Pixels per degree used for the kernels.
     pub pixels_per_degree: f32,
 }
 
@@ -62,7 +62,7 @@ impl FlipMap {
     }
 }
 
-/// One picture after filtering: a reference is prepared once for many comparisons.
+/// A filtered picture. A reference is filtered once for many comparisons.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     size_px: [u32; 2],
@@ -96,13 +96,13 @@ impl Prepared {
         }
     }
 
-    /// Pixels per degree that the filters were made for.
+    /// Pixels per degree used for the filters.
     #[must_use]
     pub fn pixels_per_degree(&self) -> f32 {
         self.pixels_per_degree
     }
 
-    /// Error map of a test picture against this reference. Pixels outside either are left out.
+    /// Error map of a test picture against this reference, for pixels inside both pictures.
     #[must_use]
     pub fn compare(&self, test: &Self) -> FlipMap {
         let largest = largest_color_distance();
@@ -134,12 +134,12 @@ pub fn flip(reference: &Picture, test: &Picture, pixels_per_degree: f32) -> Flip
     Prepared::new(reference, pixels_per_degree).compare(&Prepared::new(test, pixels_per_degree))
 }
 
-/// Applies the contrast sensitivity functions and moves to Hunt-adjusted CIELAB.
+/// Applies the contrast sensitivity functions and converts to Hunt-adjusted CIELAB.
 fn filtered_lab(opponent: &[[f32; 3]], size: [usize; 2], ppd: f32) -> Vec<[f32; 3]> {
     let radius = (3.0 * (BLUE_YELLOW[0].1 / (2.0 * PI * PI)).sqrt() * ppd).ceil() as usize;
     let a = gaussian(ACHROMATIC, radius, ppd);
     let rg = gaussian(RED_GREEN, radius, ppd);
-    // A sum of two Gaussians is not separable, but each of them is.
+    // A sum of two Gaussians is not separable, but each Gaussian is.
     let by = BLUE_YELLOW.map(|lobe| gaussian(lobe, radius, ppd));
     let sum = |k: &[f32]| k.iter().sum::<f32>();
     let norm_a = 1.0 / (sum(&a) * sum(&a));
@@ -177,7 +177,7 @@ fn gaussian((a, b): Lobe, radius: usize, ppd: f32) -> Vec<f32> {
         .map(|i| {
             let x_deg = (i as f32 - radius as f32) / ppd;
             let weight = (-PI * PI * x_deg * x_deg / b).exp();
-            // Denormal weights change nothing and make every product slow.
+            // Denormal weights have no effect on the result and slow down every product.
             amplitude * if weight < 1e-30 { 0.0 } else { weight }
         })
         .collect()
@@ -283,7 +283,7 @@ struct Window<'a, const N: usize> {
     /// Number of the line's last pixel.
     last: usize,
     radius: usize,
-    /// Pixels left, counted from `radius` before the line.
+    /// Remaining pixels, starting `radius` before the line.
     steps: std::ops::Range<usize>,
 }
 
@@ -298,7 +298,7 @@ impl<const N: usize> Iterator for Window<'_, N> {
     }
 }
 
-/// Hunt effect: chroma counts for more in the light.
+/// Hunt effect: chroma has more weight at higher luminance.
 fn hunt([l, a, b]: [f32; 3]) -> [f32; 3] {
     [l, 0.01 * l * a, 0.01 * l * b]
 }

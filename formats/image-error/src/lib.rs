@@ -1,7 +1,7 @@
-//! Image error as a viewer of the head-mounted display would see it: FLIP, PSNR and SSIM of a
-//! picture inside the part that the lens shows, and flicker from frame to frame.
+//! Image error as visible in a head-mounted display: FLIP, PSNR and SSIM of a picture inside the visible
+//! area of the lens, and flicker between frames.
 //!
-//! Metrics compare what the display shows, so all of them work on 8-bit sRGB pictures.
+//! Metrics compare displayed pictures, so all of them use 8-bit sRGB.
 
 pub mod color;
 pub mod colormap;
@@ -38,8 +38,8 @@ impl Picture {
         }
     }
 
-    /// Encodes linear radiance: clamped to 0..1, sRGB transfer curve, rounded to 8 bits. Missing
-    /// pixels are black.
+    /// Encodes linear radiance: clamped to 0..1, sRGB transfer curve, rounded to 8 bits. Missing pixels are
+    /// black.
     #[must_use]
     pub fn from_linear(size_px: [u32; 2], linear: &[[f32; 3]]) -> Self {
         let mut picture = Self::filled(size_px, [0; 3]);
@@ -63,7 +63,7 @@ impl Picture {
         self.size_px[1] as usize
     }
 
-    /// Pictures side by side with a gap of `gap_px` black pixels; all as tall as the tallest.
+    /// Pictures side by side with gaps of `gap_px` black pixels; shorter ones are padded to the tallest.
     #[must_use]
     pub fn side_by_side(pictures: &[&Self], gap_px: u32) -> Self {
         let height = pictures.iter().map(|p| p.size_px[1]).max().unwrap_or(0);
@@ -82,8 +82,8 @@ impl Picture {
         out
     }
 
-    /// The picture shrunk by a whole factor, each pixel the mean of those it covers, until neither
-    /// edge is longer than `longest_px`.
+    /// The picture reduced by an integer factor until neither edge is longer than `longest_px`. Each pixel
+    /// is the mean of the pixels it covers.
     #[must_use]
     pub fn shrunk_to(&self, longest_px: u32) -> Self {
         let longest = self.size_px[0].max(self.size_px[1]);
@@ -111,11 +111,11 @@ impl Picture {
     }
 }
 
-/// Pixels per degree that FLIP's filters are made for here: below, a degree is less than a pixel's tenth.
+/// Range of pixels per degree for FLIP's filters; at the lower end, a degree is a tenth of a pixel.
 pub const PIXELS_PER_DEGREE: std::ops::RangeInclusive<f32> = 0.1..=1000.0;
 
-/// Pixels per degree at the centre of an eye's image: `(W/2) / tan(h/2) * pi/180`, with the mean
-/// of the horizontal half-angle tangents where the frustum is off-axis.
+/// Pixels per degree at the centre of an eye's image: `(W/2) / tan(h/2) * pi/180`, with the mean of the
+/// horizontal half-angle tangents for off-axis frusta.
 #[must_use]
 pub fn pixels_per_degree(width_px: u32, fov: &FovTangents) -> f32 {
     width_px as f32 / (fov.left + fov.right) * std::f32::consts::PI / 180.0
@@ -132,7 +132,7 @@ pub fn quantile(values: &[f32], q: f64) -> f32 {
     *sorted.select_nth_unstable_by(rank, f32::total_cmp).1
 }
 
-/// Mean of the values, summed in order in double precision so that it never depends on threads.
+/// Mean of the values, summed in order in double precision, so that it does not depend on threads.
 #[must_use]
 pub fn mean(values: &[f32]) -> f64 {
     if values.is_empty() {

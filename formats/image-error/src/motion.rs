@@ -1,24 +1,25 @@
-//! Where each part of a picture was in the picture before: block matching from coarse to fine.
+//! Motion between two pictures: block matching from coarse to fine.
 //!
-//! Errors are held against each other along these vectors, so that an error that moves with what it sticks to
-//! is not taken for one that comes and goes.
+//! Errors of consecutive frames are compared along these vectors. An error that moves with an object then
+//! counts as constant.
 
 use crate::Picture;
 use rayon::prelude::*;
 
-/// Edge of a block that has a vector of its own.
+/// Edge of a block with its own vector.
 pub const BLOCK_PX: usize = 8;
 
-/// Pixels beyond a block that are compared with it: a block alone often looks like its neighbours.
+/// Margin around a block that is also compared, because a block alone is often ambiguous.
 const MARGIN_PX: isize = 4;
 
-/// Steps to each side that are tried at every level.
+/// Search distance in each direction at every level.
 const REACH: isize = 2;
 
-/// Pictures are halved until the shorter edge has fewer pixels: a level less doubles the fastest motion that is found.
+/// Pictures are halved until the shorter edge has fewer pixels. Each additional level doubles the fastest
+/// motion that is found.
 const COARSEST_PX: usize = 16;
 
-/// Luma of a picture, and half of it, and so on.
+/// A level of the luma pyramid.
 struct Level {
     width: usize,
     height: usize,
@@ -67,7 +68,7 @@ impl Level {
     }
 }
 
-/// A vector a block: from a pixel to where its content was before.
+/// One vector per block, from a pixel to the previous position of its content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
     columns: usize,
@@ -75,7 +76,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Between two pictures of one size.
+    /// Finds the motion between two pictures of the same size.
     #[must_use]
     pub fn between(before: &Picture, now: &Picture) -> Self {
         let mut levels = vec![[Level::of(before), Level::of(now)]];
@@ -107,7 +108,7 @@ impl Motion {
         }
     }
 
-    /// From a pixel to where its content was before.
+    /// Vector from a pixel to the previous position of its content.
     #[must_use]
     pub fn vector(&self, [x, y]: [usize; 2]) -> [f32; 2] {
         let block = y / BLOCK_PX * self.columns + x / BLOCK_PX;
@@ -115,7 +116,8 @@ impl Motion {
     }
 }
 
-/// Where a search begins: at rest, as most of the coarser level moved, and as its block and the neighbours did.
+/// Start vectors of a search: zero, the coarser level's median, and the vectors of its block and
+/// neighbours.
 fn candidates(coarser: Option<&(Vec<[isize; 2]>, [usize; 2])>, at: [usize; 2]) -> Vec<[isize; 2]> {
     let mut all = vec![[0, 0]];
     if let Some((vectors, [columns, rows])) = coarser {
@@ -133,7 +135,7 @@ fn candidates(coarser: Option<&(Vec<[isize; 2]>, [usize; 2])>, at: [usize; 2]) -
     all
 }
 
-/// The median of each coordinate: what a turning head does to nearly all blocks.
+/// The median of each coordinate; a turning head moves nearly all blocks by it.
 fn median(vectors: &[[isize; 2]]) -> [isize; 2] {
     [0, 1].map(|axis| {
         let mut along: Vec<isize> = vectors.iter().map(|vector| vector[axis]).collect();
@@ -145,7 +147,7 @@ fn median(vectors: &[[isize; 2]]) -> [isize; 2] {
     })
 }
 
-/// Sum of the absolute differences of a block and its margin along a vector.
+/// Sum of absolute differences of a block and its margin along a vector.
 fn difference(before: &Level, now: &Level, block: [usize; 2], [dx, dy]: [isize; 2]) -> f32 {
     let [left, top] = block.map(|place| (place * BLOCK_PX) as isize - MARGIN_PX);
     let size = BLOCK_PX as isize + 2 * MARGIN_PX;
@@ -158,8 +160,8 @@ fn difference(before: &Level, now: &Level, block: [usize; 2], [dx, dy]: [isize; 
     sum
 }
 
-/// The vector near one of the candidates along which a block differs least; the first of equals, so that what
-/// has no texture stays at rest.
+/// The vector near one of the candidates with the smallest difference. Of equal ones, the first is taken,
+/// so that areas without texture do not move.
 fn best(before: &Level, now: &Level, block: [usize; 2], from: &[[isize; 2]]) -> [isize; 2] {
     let score = |vector: [isize; 2]| difference(before, now, block, vector);
     let (mut vector, mut least) = ([0, 0], f32::INFINITY);
@@ -182,8 +184,9 @@ fn best(before: &Level, now: &Level, block: [usize; 2], from: &[[isize; 2]]) -> 
     vector
 }
 
-/// The vector to parts of a pixel: where the two lines of equal and opposite slope through three neighbouring
-/// sums meet, which is how sums of absolute differences run.
+/// Refines the vector to fractions of a pixel: the intersection of the two lines of equal and opposite
+/// slope through three neighbouring sums, because sums of absolute differences are linear near their
+/// minimum.
 fn between_pixels(before: &Level, now: &Level, block: [usize; 2], vector: [isize; 2]) -> [f32; 2] {
     let score =
         |dx: isize, dy: isize| difference(before, now, block, [vector[0] + dx, vector[1] + dy]);
@@ -214,7 +217,7 @@ mod tests {
             let before = panned(size_px, [0.0, 0.0]);
             let motion = Motion::between(&before, &panned(size_px, pan));
             let mut off = Vec::new();
-            // What came in at an edge was nowhere before.
+            // Content that enters at an edge has no previous position.
             for y in (24..136).step_by(BLOCK_PX) {
                 for x in (32..168).step_by(BLOCK_PX) {
                     let [vx, vy] = motion.vector([x, y]);
@@ -228,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_texture_stays_at_rest() {
+    fn areas_without_texture_do_not_move() {
         let grey = Picture::filled([50, 40], [90; 3]);
         let motion = Motion::between(&grey, &grey);
         assert_eq!(motion.vector([49, 39]), [0.0, 0.0]);

@@ -1,10 +1,10 @@
-//! Pictures as PNG files.
+//! Encodes pictures as PNG.
 
 use crate::Picture;
 use image::ImageEncoder;
 use image::codecs::png::PngEncoder;
 
-/// A picture that the encoder refused.
+/// Error for a picture that the encoder refused.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot encode a {width}x{height} picture as PNG: {source}")]
 pub struct PngError {
@@ -12,14 +12,14 @@ pub struct PngError {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Why.
+    /// The encoder's reason.
     pub source: image::ImageError,
 }
 
 /// The picture's PNG file as bytes.
 ///
 /// # Errors
-/// [`PngError`] where the pixels do not fill the size.
+/// [`PngError`] if the number of pixels does not match the size.
 pub fn encode(picture: &Picture) -> Result<Vec<u8>, PngError> {
     let [width, height] = picture.size_px;
     let bytes: Vec<u8> = picture.pixels.iter().flatten().copied().collect();

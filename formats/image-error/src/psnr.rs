@@ -2,7 +2,7 @@
 
 use crate::Picture;
 
-/// Decibels for identical pictures, where the ratio is infinite (JSON has no infinity).
+/// Value for identical pictures, whose ratio is infinite (JSON has no infinity).
 pub const IDENTICAL_DB: f64 = 100.0;
 
 /// `10 log10(255^2 / MSE)` over all pixels and channels, at most [`IDENTICAL_DB`].
@@ -20,7 +20,7 @@ pub fn psnr_db(reference: &Picture, test: &Picture) -> f64 {
     psnr_of_squares(squares, count)
 }
 
-/// The ratio of several pictures of one size together, from theirs: the mean of their squared errors in decibels.
+/// Ratio over several pictures of the same size, from their ratios: the decibels of the mean squared error.
 /// A mean of decibels would hide a bad picture among identical ones.
 #[must_use]
 pub fn pooled_db(of_pictures: impl IntoIterator<Item = f64>) -> f64 {
@@ -59,14 +59,14 @@ mod tests {
     }
 
     #[test]
-    fn the_ratio_of_several_pictures_is_that_of_one_that_holds_them_all() {
+    fn the_ratio_over_several_pictures_is_that_of_one_picture_with_all_their_pixels() {
         let [a, b] = [noise([8, 8], 1), noise([8, 8], 2)];
         let join = |x: &Picture, y: &Picture| Picture {
             size_px: [8, 16],
             pixels: [x.pixels.clone(), y.pixels.clone()].concat(),
         };
         for (first, second) in [(&a, &b), (&a, &a), (&b, &a)] {
-            // Of two pictures the second may be perfect.
+            // The second of two pictures may be identical.
             let whole = psnr_db(&join(&a, &a), &join(first, second));
             let pooled = pooled_db([psnr_db(&a, first), psnr_db(&a, second)]);
             assert!((whole - pooled).abs() < 1e-9, "{whole} {pooled}");

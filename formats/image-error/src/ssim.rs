@@ -8,8 +8,8 @@ const WINDOW_DEVIATION: f64 = 1.5;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
-/// Mean SSIM over all pixels of the Rec. 709 luma (on sRGB codes), with the original's 11x11
-/// Gaussian window of deviation 1.5; windows are cut and renormalised at the edges.
+/// Mean SSIM over all pixels of the Rec. 709 luma (on sRGB codes), with the original's 11x11 Gaussian
+/// window of deviation 1.5. Windows are cut and renormalised at the edges.
 #[must_use]
 pub fn ssim(reference: &Picture, test: &Picture) -> f64 {
     if reference.pixels.is_empty() || reference.size_px != test.size_px {
@@ -19,7 +19,7 @@ pub fn ssim(reference: &Picture, test: &Picture) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// SSIM of each pixel's window, of two pictures of one size.
+/// SSIM of each pixel's window, for two pictures of the same size.
 pub(crate) fn ssim_map(reference: &Picture, test: &Picture) -> Vec<f64> {
     let size = [reference.width(), reference.height()];
     // Moments: a, b, a^2, b^2, ab; one separable pass each way.
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
     use crate::test_pictures::{noise, scene_like, shifted};
 
-    /// Straight from the definition: every window summed in two dimensions.
+    /// The definition, with every window summed in two dimensions.
     fn brute_force(a: &Picture, b: &Picture) -> f64 {
         let (w, h) = (a.width() as i64, a.height() as i64);
         let mut total = 0.0;

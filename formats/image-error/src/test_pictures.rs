@@ -30,7 +30,7 @@ pub fn scene_like(size_px: [u32; 2]) -> Picture {
     picture
 }
 
-/// The picture moved right by some pixels, its left edge repeated.
+/// The picture moved to the right by some pixels, with its left edge repeated.
 pub fn shifted(picture: &Picture, by_px: usize) -> Picture {
     let width = picture.width();
     let mut out = picture.clone();
@@ -41,13 +41,14 @@ pub fn shifted(picture: &Picture, by_px: usize) -> Picture {
     out
 }
 
-/// A window of a texture without end whose left upper corner lies at `pan`.
+/// A window of an unbounded texture with its upper left corner at `pan`.
 pub fn panned(size_px: [u32; 2], pan: [f32; 2]) -> Picture {
     let mut picture = Picture::filled(size_px, [0; 3]);
     for (i, pixel) in picture.pixels.iter_mut().enumerate() {
         let x = (i as u32 % size_px[0]) as f32 + pan[0];
         let y = (i as u32 / size_px[0]) as f32 + pan[1];
-        // Long waves are high and short ones low, as in photographs; no two repeat together within a picture.
+        // Long waves have larger amplitudes than short ones, as in photographs. Their common period exceeds
+        // the picture.
         let wave = |a: f32, b: f32| 0.15 / a.hypot(b) * (a * x + b * y).sin();
         let sum = wave(0.31, 0.17)
             + wave(-0.23, 0.41)

@@ -1,4 +1,4 @@
-//! Errors where the user can see: inside the circle of each eye's image that the lens shows.
+//! Errors inside the visible area: the circle of each eye's image that the lens shows.
 
 use crate::flip::{FlipMap, Prepared};
 use crate::psnr::psnr_of_squares;
@@ -6,23 +6,23 @@ use crate::{Picture, mean, quantile, ssim};
 use formats::view::{FovTangents, Lens};
 use serde::Serialize;
 
-/// Which pixels of a picture count.
+/// The pixels of a picture that count.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     /// Width and height in pixels.
     pub size_px: [u32; 2],
-    /// Row by row from the top left: the pixel counts.
+    /// Whether each pixel counts, row by row from the top left.
     pub inside: Vec<bool>,
 }
 
 impl Mask {
-    /// All pixels count.
+    /// A mask in which all pixels count.
     #[must_use]
     pub fn everything(size_px: [u32; 2]) -> Self {
         Self::of(size_px, |_| true)
     }
 
-    /// The pixels that a lens shows of an eye's picture: those whose centres it shows.
+    /// The pixels of an eye's picture whose centres the lens shows.
     #[must_use]
     pub fn of_lens(size_px: [u32; 2], fov: &FovTangents, lens: &Lens) -> Self {
         Self::of(size_px, |pixel| lens.pixel_visible(fov, size_px, pixel))
@@ -44,7 +44,7 @@ impl Mask {
     }
 }
 
-/// How far a picture is from its reference where the user can see.
+/// Difference of a picture from its reference inside the visible area.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PictureError {
     /// Mean FLIP, 0 (same) to 1.
@@ -53,7 +53,7 @@ pub struct PictureError {
     pub flip_p99: f64,
     /// Peak signal-to-noise ratio, at most [`crate::psnr::IDENTICAL_DB`].
     pub psnr_db: f64,
-    /// Mean structural similarity, 1 where the same.
+    /// Mean structural similarity, 1 for identical pictures.
     pub ssim: f64,
 }
 
@@ -67,7 +67,7 @@ impl PictureError {
     };
 }
 
-/// A picture that others are held against, filtered once for all of them.
+/// A reference picture, filtered once for all comparisons.
 #[derive(Clone, Debug)]
 pub struct Reference {
     picture: Picture,
@@ -75,21 +75,21 @@ pub struct Reference {
     flip: Prepared,
 }
 
-/// A picture that cannot be held against its reference.
+/// Error for a picture whose size differs from its reference's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a picture of {}x{} pixels: expected {}x{} as its reference has", found[0], found[1], expected[0], expected[1])]
+#[error("a picture of {}x{} pixels: expected {}x{}, the size of its reference", found[0], found[1], expected[0], expected[1])]
 pub struct SizeError {
-    /// The reference's width and height.
+    /// Width and height of the reference.
     pub expected: [u32; 2],
-    /// The picture's.
+    /// Width and height of the picture.
     pub found: [u32; 2],
 }
 
 impl Reference {
-    /// Prepares a reference that is seen at a number of pixels per degree through a mask.
+    /// Prepares a reference for viewing at a number of pixels per degree through a mask.
     ///
     /// # Errors
-    /// A mask of another size than the picture.
+    /// A mask whose size differs from the picture's.
     pub fn new(picture: Picture, mask: Mask, pixels_per_degree: f32) -> Result<Self, SizeError> {
         same_size(picture.size_px, mask.size_px)?;
         Ok(Self {
@@ -105,14 +105,14 @@ impl Reference {
         &self.picture
     }
 
-    /// Which pixels count.
+    /// The pixels that count.
     #[must_use]
     pub fn mask(&self) -> &Mask {
         &self.mask
     }
 
-    /// The error of `test`. What lies outside the mask cannot be seen, so it counts as the
-    /// reference's there, also for the filters that look at a pixel's neighbours.
+    /// The error of `test`. Pixels outside the mask are replaced by the reference's, so they do not affect
+    /// the filters' neighbourhoods.
     ///
     /// # Errors
     /// A picture of another size.
@@ -130,7 +130,7 @@ impl Reference {
                 .map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2))
                 .sum()
         };
-        // Outside the mask there is no difference to sum.
+        // Outside the mask, the difference is zero.
         let pairs = self.picture.pixels.iter().zip(&seen.pixels);
         let similarity = ssim::ssim_map(&self.picture, &seen);
         let similarity: Vec<f64> = self.mask.select(&similarity).collect();
@@ -157,7 +157,7 @@ impl Reference {
         Ok(map)
     }
 
-    /// The picture with the reference's pixels outside the mask; none where nothing differs inside.
+    /// The picture with the reference's pixels outside the mask; `None` if it has no difference inside.
     fn seen(&self, test: &Picture) -> Result<Option<Picture>, SizeError> {
         same_size(self.picture.size_px, test.size_px)?;
         let mut seen = self.picture.clone();
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_lens_hides_counts_nowhere() {
+    fn pixels_outside_the_lens_do_not_count() {
         let a = scene_like([64, 64]);
         let mask = circle([64, 64], [0.0, 0.0], 0.8);
         let mut b = a.clone();
@@ -232,7 +232,7 @@ mod tests {
         let mask = circle([64, 64], [0.0, 0.0], 0.5);
         let all = mask.inside.iter().filter(|i| **i).count();
         let mut test = grey.clone();
-        // Both halves of the picture are off by one code and by two.
+        // The halves of the picture differ by one code and by two.
         for (i, pixel) in test.pixels.iter_mut().enumerate() {
             *pixel = if i % 64 < 32 { [101; 3] } else { [102; 3] };
         }
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_has_the_area_of_its_radius_and_lies_where_it_should() {
+    fn a_circle_has_the_area_and_the_centre_of_the_lens() {
         let mask = circle([400, 200], [0.25, 0.5], 0.4);
         let inside: Vec<usize> = (0..mask.inside.len()).filter(|i| mask.inside[*i]).collect();
         // Pixels of 2/400 by 2/200 tangents.
@@ -266,7 +266,7 @@ mod tests {
         let reference = Reference::new(noise([8, 8], 1), Mask::everything([8, 8]), 7.0).unwrap();
         assert_eq!(
             reference.error(&noise([8, 9], 1)).unwrap_err().to_string(),
-            "a picture of 8x9 pixels: expected 8x8 as its reference has"
+            "a picture of 8x9 pixels: expected 8x8, the size of its reference"
         );
     }
 }

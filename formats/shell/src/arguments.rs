@@ -1,4 +1,4 @@
-//! Arguments that both programs have, and those that a trace records.
+//! Arguments that both programs share, and the arguments that a trace records.
 
 use anyhow::Context;
 use std::error::Error;
@@ -7,14 +7,14 @@ use std::ffi::OsString;
 /// `--threads`.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub struct Threads {
-    /// Worker threads; results do not depend on it [default: all cores]
+    /// Worker threads; results do not depend on their number [default: all cores]
     #[arg(long = "threads", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub count: Option<u16>,
 }
 
 impl Threads {
-    /// Starts rayon's threads, that many or one a core; called once, before anything runs in parallel. Rayon
-    /// itself would start them at first use and panic where the system refuses.
+    /// Starts rayon's threads: this number, or one per core. Called once, before any parallel work, because
+    /// rayon would otherwise start them at first use and panic on failure.
     ///
     /// # Errors
     /// The threads cannot be started.
@@ -24,7 +24,7 @@ impl Threads {
             .num_threads(count)
             .build_global();
         match started {
-            // They run already, and any number will do.
+            // The pool is already running, and any number of threads is fine.
             Err(error) if count == 0 && error.source().is_none() => Ok(()),
             started => started.with_context(|| match self.count {
                 Some(count) => format!("--threads {count}: cannot start the threads"),
@@ -34,7 +34,7 @@ impl Threads {
     }
 }
 
-/// Options with a value that say where and how, not what.
+/// Options with a value that do not affect the content of a trace.
 const PASSING_OPTIONS: [&str; 5] = [
     "--no-skip",
     "--output",
@@ -42,11 +42,11 @@ const PASSING_OPTIONS: [&str; 5] = [
     "--threads",
     "--record-budget",
 ];
-/// Switches that do.
+/// Switches that do not affect it either.
 const PASSING_SWITCHES: [&str; 3] = ["--no-plain", "--no-cache", "--quiet"];
 
-/// The arguments that decide what a trace holds: output paths and how it was made are left out, so
-/// that the same capture gives the same bytes.
+/// The arguments that affect the content of a trace. Output paths and options without effect on it are
+/// removed, so that equal captures have equal bytes.
 pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<String> {
     let mut kept = Vec::new();
     let mut arguments = arguments
@@ -57,7 +57,7 @@ pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<S
             Some((name, value)) => (name, Some(value)),
             None => (argument.as_str(), None),
         };
-        // `-o`, its value attached or not, perhaps behind a `-q`.
+        // `-o`, with its value attached or not, possibly after a `-q`.
         let output = argument
             .strip_prefix('-')
             .map(|letters| letters.trim_start_matches('q'))
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn output_paths_and_how_a_trace_was_made_are_not_recorded() {
+    fn output_paths_and_options_without_effect_on_the_trace_are_not_recorded() {
         for line in [
             "raster s.gltf -o a --shadows --image=b.png --camera -x",
             "raster s.gltf --output=a --shadows --threads 2 --no-skip all --no-plain --camera -x --record-budget 4MiB -ob",

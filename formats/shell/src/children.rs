@@ -1,4 +1,4 @@
-//! Programs that this one runs: a signal that ends it ends them first.
+//! Runs other programs. A signal that ends this program ends them first.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -6,12 +6,12 @@ use std::process::{Command, ExitStatus};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A child that has not ended so long after a signal is left alone.
+/// Time after a signal until a child that has not ended is left running.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 struct Children {
     running: BTreeSet<u32>,
-    /// The program is ending: nothing more is started.
+    /// The program is ending, so no child may start.
     ending: bool,
 }
 
@@ -25,11 +25,11 @@ fn children() -> MutexGuard<'static, Children> {
     CHILDREN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs a program to its end. Does not return when a signal ends this program: what became of the child then
-/// is nobody's error.
+/// Runs a program to its end. Does not return if a signal ends this program, because the child's failure is
+/// then not an error.
 ///
 /// # Errors
-/// It cannot be started or waited for.
+/// The program cannot be started or waited for.
 pub fn run_child(command: &mut Command) -> io::Result<ExitStatus> {
     let mut now = children();
     if now.ending {
@@ -50,14 +50,14 @@ pub fn run_child(command: &mut Command) -> io::Result<ExitStatus> {
     status
 }
 
-/// The thread that received the signal ends the program.
+/// Blocks until the thread that received the signal ends the program.
 fn wait_for_the_end() -> ! {
     loop {
         std::thread::park();
     }
 }
 
-/// Sends a signal to all children and waits until they have ended. Nothing is started after it.
+/// Sends a signal to all children, waits for their end, and prevents the start of others.
 pub(crate) fn end_with(signal: i32) {
     let mut now = children();
     now.ending = true;
@@ -72,7 +72,7 @@ fn send(child: u32, signal: i32) {
     use rustix::process::{Pid, Signal, kill_process};
     let pid = i32::try_from(child).ok().and_then(Pid::from_raw);
     if let (Some(pid), Some(signal)) = (pid, Signal::from_named_raw(signal)) {
-        // One that has ended by itself needs no signal.
+        // A child that has already ended needs no signal.
         let _gone = kill_process(pid, signal);
     }
 }

@@ -1,4 +1,4 @@
-//! Shell completions and manual pages, made from the command line's own definition.
+//! Generates shell completions and manual pages from the definition of the command line.
 
 use super::program;
 use anyhow::Context;
@@ -17,11 +17,11 @@ pub enum Documents {
         /// The shell
         shell: clap_complete::Shell,
     },
-    /// Write the manual pages, one a subcommand, into a folder.
+    /// Write the manual pages, one per subcommand, into a folder.
     ///
     /// For `man`: a folder such as ~/.local/share/man/man1.
     Man {
-        /// Folder, made where it does not exist
+        /// Folder; created if missing
         folder: PathBuf,
     },
 }

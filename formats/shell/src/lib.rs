@@ -1,5 +1,5 @@
-//! What the programs do alike at the command line: exit codes, messages, progress, checks of
-//! outputs, signals, threads, completions and manual pages, and work split over many machines.
+//! Command-line behaviour that the programs share: exit codes, messages, progress, checks of outputs,
+//! signals, threads, completions and manual pages, and distribution over many machines.
 
 mod arguments;
 mod children;

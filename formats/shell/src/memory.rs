@@ -1,16 +1,17 @@
-//! An allocation that fails ends the program with a message and exit code 2.
+//! Ends the program with a message and exit code 2 if an allocation fails.
 //!
-//! Rust's collections abort where memory ends, and some libraries panic. The allocator notes that an allocation failed, so that
-//! the handler of SIGABRT and the panic hook can tell this end from that of a broken assumption.
+//! Rust's collections abort if memory is exhausted, and some libraries panic. The allocator records a
+//! failed allocation, so that the handler of SIGABRT and the panic hook can distinguish it from a failed
+//! assertion.
 
 use anyhow::Context;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Bytes of the allocation that failed last, 0 where none has.
+/// Size of the last failed allocation in bytes; 0 if none has failed.
 static FAILED_BYTES: AtomicUsize = AtomicUsize::new(0);
 
-/// The system's allocator, which the programs use: it notes what it cannot give.
+/// The system's allocator, with failures recorded.
 #[derive(Clone, Copy, Debug)]
 pub struct Allocator;
 
@@ -21,7 +22,7 @@ fn noted(pointer: *mut u8, bytes: usize) -> *mut u8 {
     pointer
 }
 
-// SAFETY: every call goes to the system's allocator as it is.
+// SAFETY: every call is forwarded to the system's allocator.
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller keeps the contract of `alloc`.
@@ -44,14 +45,15 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
-/// Turns an abort or a panic caused by a lack of memory into a message and exit code 2; any other one is passed on.
+/// Turns an abort or a panic caused by exhausted memory into a message and exit code 2. Others are
+/// unchanged.
 ///
 /// # Errors
-/// The system refuses the handler.
+/// The handler cannot be installed.
 #[cfg(unix)]
 pub(crate) fn explain_aborts() -> anyhow::Result<()> {
-    // SAFETY: the handler allocates nothing and takes no lock: it formats a number into its own stack,
-    // writes it to a descriptor and leaves.
+    // SAFETY: the handler does not allocate and takes no lock. It formats a number on its own stack, writes
+    // it to a descriptor and exits.
     let registered = unsafe {
         signal_hook::low_level::register(signal_hook::consts::SIGABRT, || {
             let bytes = FAILED_BYTES.load(Ordering::Relaxed);
@@ -64,7 +66,7 @@ pub(crate) fn explain_aborts() -> anyhow::Result<()> {
     let default_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         let bytes = FAILED_BYTES.load(Ordering::Relaxed);
-        // A refusal that was handled may lie long back: what counts is that the memory is missing now.
+        // An earlier failure may have been handled, so check whether memory is exhausted now.
         if bytes > 0 && Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
             tell_and_leave(bytes);
         }
@@ -73,7 +75,7 @@ pub(crate) fn explain_aborts() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Ends the program, without an allocation.
+/// Prints the message and ends the program without an allocation.
 #[cfg(unix)]
 fn tell_and_leave(bytes: usize) {
     let mut text = [0; 160];
@@ -83,20 +85,20 @@ fn tell_and_leave(bytes: usize) {
     signal_hook::low_level::exit(super::program::USAGE.into());
 }
 
-/// Nothing to do where there are no signals.
+/// Does nothing on systems without signals.
 #[cfg(not(unix))]
 pub(crate) fn explain_aborts() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the message; returns how many bytes of the text are left.
+/// Writes the message into `text` and returns the number of unused bytes.
 #[cfg(unix)]
 fn write_message(text: &mut [u8], bytes: usize) -> usize {
     use std::io::Write;
     let mut rest = text;
     let _fits = writeln!(
         rest,
-        "error: not enough memory: {bytes} bytes more were refused (the machine's memory, or ulimit -v)"
+        "error: not enough memory: an allocation of {bytes} bytes failed (the machine's memory, or ulimit -v)"
     );
     rest.len()
 }

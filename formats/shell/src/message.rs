@@ -1,4 +1,4 @@
-//! What goes to a terminal: results on stdout, everything else on stderr, no name printed raw.
+//! Terminal output: results on stdout, everything else on stderr, with control characters replaced.
 
 use formats::text::printable_lines;
 use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
@@ -18,7 +18,7 @@ pub(crate) fn is_quiet() -> bool {
 /// Writes a result to stdout, with a line feed at its end.
 ///
 /// # Errors
-/// Those of writing.
+/// Errors of writing.
 pub fn print(text: &str) -> anyhow::Result<()> {
     let mut out = stdout();
     let text = text.trim_end_matches('\n');
@@ -30,12 +30,12 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     Ok(out.flush()?)
 }
 
-/// Standard output, buffered, with errors that name it. Who writes to it flushes it in the end.
+/// Buffered standard output with errors that name it. The caller flushes it.
 pub fn stdout() -> impl Write {
     BufWriter::new(Named(io::stdout().lock()))
 }
 
-/// Standard output with errors that name it.
+/// Standard output that adds its name to errors.
 struct Named(StdoutLock<'static>);
 
 impl Write for Named {
@@ -55,31 +55,31 @@ fn named(error: io::Error) -> io::Error {
     )
 }
 
-/// Tells a figure about the run on stderr, which varies from run to run and is no result.
+/// Prints a figure about the run on stderr. Such figures vary between runs and are not results.
 pub fn note(message: &str) {
     if !is_quiet() {
         tell("", message);
     }
 }
 
-/// Tells on stderr what the user should know though the work goes on.
+/// Prints a warning on stderr; the command continues.
 pub fn warn(message: &str) {
     tell("\u{1b}[1;33mwarning\u{1b}[0m: ", message);
 }
 
-/// Tells on stderr why a check failed or the work ended.
+/// Prints on stderr why a check failed or the command ended.
 pub fn error(message: &str) {
     tell("\u{1b}[1;31merror\u{1b}[0m: ", message);
 }
 
 fn tell(label: &str, message: &str) {
-    // A message over a progress bar starts on a line of its own.
+    // A message starts on a new line instead of inside a progress bar.
     let clear = if io::stderr().is_terminal() {
         "\r\u{1b}[K"
     } else {
         ""
     };
-    // A log that cannot be written (a full disk, a closed handle) is no reason to stop the work.
+    // An unwritable log (a full disk, a closed handle) is no reason to stop the command.
     let mut out = anstream::stderr().lock();
     let _untold = writeln!(out, "{clear}{label}{}", printable_lines(message));
 }

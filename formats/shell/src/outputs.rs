@@ -1,4 +1,4 @@
-//! Checks of a command's outputs before its work, which may take minutes.
+//! Checks a command's outputs before its work, which may take minutes.
 
 use anyhow::{Context, bail, ensure};
 use formats::container::{check_target, is_stdout, kind_of};
@@ -23,19 +23,19 @@ enum Kind {
 }
 
 impl Output {
-    /// Text that the flag asks for.
+    /// Text output, named by a flag.
     #[must_use]
     pub fn text(flag: &'static str, path: &Path) -> Self {
         Self::new(flag, path, Kind::Text)
     }
 
-    /// A trace or a picture that the flag asks for.
+    /// A trace or picture, named by a flag.
     #[must_use]
     pub fn binary(flag: &'static str, path: &Path) -> Self {
         Self::new(flag, path, Kind::Binary)
     }
 
-    /// The form of the command's result that the flag asks for, such as `--json`.
+    /// The command's result in another form, selected by a flag such as `--json`.
     #[must_use]
     pub fn result(flag: &'static str) -> Self {
         Self::new(flag, Path::new("-"), Kind::Result)
@@ -46,7 +46,7 @@ impl Output {
         Self { flag, path, kind }
     }
 
-    /// Where it goes.
+    /// Path of the output.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -60,11 +60,11 @@ impl Output {
     }
 }
 
-/// Checks that every output can be written and that none would replace an input or another output.
-/// Returns whether stdout is left for the command's own result.
+/// Checks that every output can be written and that none replaces an input or another output. Returns
+/// whether stdout is free for the command's own result.
 ///
 /// # Errors
-/// The first output for which that does not hold.
+/// The first output that fails a check.
 pub fn check_outputs<'a>(
     outputs: &[Output],
     inputs: impl IntoIterator<Item = &'a Path>,
@@ -75,7 +75,7 @@ pub fn check_outputs<'a>(
             let on_terminal = output.kind == Kind::Binary && io::stdout().is_terminal();
             ensure!(
                 !on_terminal,
-                "{}: binary: name a file, or redirect standard output",
+                "{}: binary output: name a file, or redirect standard output",
                 output.named()
             );
         } else {
@@ -90,7 +90,7 @@ pub fn check_outputs<'a>(
                 output.named()
             );
         }
-        // What is no file, such as the name of a built-in scene, cannot be overwritten.
+        // Inputs that are not files, such as names of built-in scenes, cannot be overwritten.
         let mut files = inputs.iter().filter(|input| input.exists());
         if let Some(input) = files.find(|input| is_same(input, &output.path)) {
             bail!(
@@ -104,10 +104,10 @@ pub fn check_outputs<'a>(
     Ok(!outputs.iter().any(taken))
 }
 
-/// Checks that a folder for outputs is one, or may become one.
+/// Checks that a folder for outputs exists or can be created.
 ///
 /// # Errors
-/// The name of standard output, or of something else than a folder.
+/// The name of standard output, or a path to something other than a folder.
 pub fn check_folder(flag: &str, path: &Path) -> anyhow::Result<()> {
     ensure!(
         !is_stdout(path),
@@ -124,8 +124,8 @@ pub fn check_folder(flag: &str, path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// True if two paths are one file: by spelling, through links of either kind, or as names that do
-/// not exist yet.
+/// Whether two paths name the same file: by spelling, through links of either kind, or as names that do not
+/// exist yet.
 fn is_same(a: &Path, b: &Path) -> bool {
     match (is_stdout(a), is_stdout(b)) {
         (true, true) => true,
@@ -186,12 +186,12 @@ mod tests {
         }
         let new = folder.path().join("new");
         check_outputs(&[Output::text("--csv", &new)], [input.as_path()]).unwrap();
-        // The same word as a built-in scene's name is no input.
+        // A file name equal to a built-in scene's name is not an input.
         check_outputs(&[Output::text("--csv", &new)], [new.as_path()]).unwrap();
     }
 
     #[test]
-    fn two_outputs_of_one_name_are_refused_before_either_exists() {
+    fn two_outputs_with_the_same_name_are_refused_before_either_exists() {
         let folder = tempfile::tempdir().unwrap();
         let plain = folder.path().join("x.png");
         let dotted = folder.path().join("./x.png");
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn an_output_on_stdout_takes_the_results_place() {
+    fn an_output_on_stdout_replaces_the_result() {
         let is_left = |output| check_outputs(&[output], []).unwrap();
         assert!(is_left(Output::result("--json")));
         assert!(!is_left(Output::text("--csv", Path::new("-"))));

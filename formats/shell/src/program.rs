@@ -1,4 +1,4 @@
-//! From arguments to exit code.
+//! Runs a program from its arguments to its exit code.
 
 use super::{memory, message, signals};
 use clap::{CommandFactory, Parser};
@@ -8,10 +8,10 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
-/// Exit code of wrong use or unreadable input; clap's own, too.
+/// Exit code of wrong use or unreadable input, also used by clap.
 pub(crate) const USAGE: u8 = 2;
 
-/// Version of the programs with that of the traces that they read and write.
+/// Version of the programs, with the version of the trace formats.
 pub static VERSION: LazyLock<String> = LazyLock::new(|| {
     format!(
         "{} (.textrace and .raytrace format {VERSION_MAJOR}.{VERSION_MINOR})",
@@ -19,24 +19,24 @@ pub static VERSION: LazyLock<String> = LazyLock::new(|| {
     )
 });
 
-/// What every page of help ends with.
+/// Footer of every help page.
 const FOOTER: &str = "\
-An output named - is standard output, in place of the result that is printed there otherwise; \
-binary ones are not written to a terminal. Outputs replace regular files only, and appear whole or \
-not at all.
+The output name - means standard output, instead of the command's own result; \
+binary output is not written to a terminal. Outputs replace regular files only, and appear complete \
+or not at all.
 Exit codes: 0 done, 1 a check failed, 2 wrong use, unreadable input or an output that cannot be \
 written.";
 
 /// Flags of every command.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Common {
-    /// Print results, warnings and errors only: no progress, no figures about the run
+    /// Print only results, warnings and errors: no progress and no figures about the run
     #[arg(short, long, global = true, display_order = 1000)]
     quiet: bool,
 }
 
-/// Parses the command line, runs it, and turns its outcome into an exit code. Errors go to stderr;
-/// a reader of our output who has gone (`... | head`) is no error.
+/// Parses the command line, runs the command and returns its exit code. Errors go to stderr. A closed
+/// output pipe (`... | head`) is not an error.
 pub fn run<C: Parser>(
     common: impl FnOnce(&C) -> Common,
     command: impl FnOnce(C) -> anyhow::Result<ExitCode>,
@@ -56,14 +56,41 @@ pub fn run<C: Parser>(
     }
 }
 
-/// The command line of a program with the footer of its help, here and in its manual.
+/// The command line of a program, for its help and its manual: with the footer, and with short help that fits on a screen.
 pub(crate) fn command<C: CommandFactory>() -> clap::Command {
-    let command = C::command();
+    let mut command = C::command();
+    let names: Vec<String> = (command.get_subcommands())
+        .map(|subcommand| subcommand.get_name().to_owned())
+        .collect();
+    for name in names {
+        command = command.mut_subcommand(name, |subcommand| {
+            let text = subcommand.get_after_help().map(ToString::to_string);
+            match text {
+                Some(text) => subcommand
+                    .after_help(shortened(&text))
+                    .after_long_help(text),
+                None => subcommand,
+            }
+        });
+    }
     let examples = command.get_after_help().map(ToString::to_string);
     command.after_help(examples.map_or_else(
         || FOOTER.to_owned(),
         |examples| format!("{examples}\n\n{FOOTER}"),
     ))
+}
+
+/// The text after a subcommand's options as `-h` shows it: with at most two examples.
+fn shortened(text: &str) -> String {
+    let mut lines: Vec<&str> = text.lines().collect();
+    if let Some(heading) = lines.iter().position(|line| *line == "Examples:") {
+        lines.truncate(heading + 3);
+    }
+    // An example of several lines is left out if it would be cut.
+    while lines.last().is_some_and(|line| line.ends_with('\\')) {
+        lines.pop();
+    }
+    lines.join("\n")
 }
 
 fn parse<C: Parser>() -> C {
@@ -74,7 +101,7 @@ fn parse<C: Parser>() -> C {
         let arguments: Vec<String> = (std::env::args_os())
             .map(|a| a.to_string_lossy().into_owned())
             .collect();
-        // Clap quotes arguments as they are: a file name from `*` must not steer the terminal.
+        // Clap prints arguments unchanged, so control characters in file names must be replaced.
         if arguments.iter().all(|a| printable_lines(a) == a.as_str()) {
             error.exit();
         }
@@ -83,7 +110,7 @@ fn parse<C: Parser>() -> C {
     })
 }
 
-/// An error and its causes in one line, without those that it repeats itself.
+/// An error and its causes in one line. Causes that the error's own text repeats are skipped.
 fn described(error: &anyhow::Error) -> String {
     error.chain().fold(String::new(), |text, cause| {
         let cause = cause.to_string();
@@ -114,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cause_that_its_error_repeats_is_told_once() {
+    fn a_cause_repeated_by_its_error_is_printed_once() {
         let cause = || anyhow::anyhow!("expected 3, found 4");
         let text =
             |context: &str| described(&cause().context(context.to_owned()).context("a.toml"));
@@ -123,5 +150,14 @@ mod tests {
             text("key ways: expected 3, found 4"),
             "a.toml: key ways: expected 3, found 4"
         );
+    }
+
+    #[test]
+    fn short_help_has_two_whole_examples() {
+        assert_eq!(shortened("Exit code: 0."), "Exit code: 0.");
+        let text = "Note.\n\nExamples:\n  a\n  b\n  c";
+        assert_eq!(shortened(text), "Note.\n\nExamples:\n  a\n  b");
+        let text = "Examples:\n  a\n  b \\\n    --flag\n  c";
+        assert_eq!(shortened(text), "Examples:\n  a");
     }
 }

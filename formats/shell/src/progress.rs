@@ -7,19 +7,19 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Between two drawings of a bar.
+/// Interval between two drawings of a bar.
 const BAR_INTERVAL: Duration = Duration::from_millis(200);
-/// Before the first line where stderr is no terminal; each pause is twice the one before.
+/// Time before the first line if stderr is not a terminal; each further interval is twice as long.
 const LINE_INTERVAL: Duration = Duration::from_secs(3);
-/// Longest pause between two lines.
+/// Longest interval between two lines.
 const LONGEST_LINE_INTERVAL: Duration = Duration::from_secs(600);
 const BAR_CHARACTERS: u64 = 24;
 
-/// Shows how far a command is until it is dropped; `--quiet` shows nothing.
+/// Shows the progress of a command until it is dropped; hidden by `--quiet`.
 #[derive(Debug)]
 pub struct Progress {
     stage: Arc<Mutex<Stage>>,
-    // Hanging up ends the thread.
+    // Dropping the sender ends the thread.
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -28,14 +28,14 @@ pub struct Progress {
 struct Stage {
     name: String,
     unit: &'static str,
-    /// 0 where it is unknown.
+    /// 0 if unknown.
     total: u64,
     done: u64,
     start: Instant,
 }
 
 impl Progress {
-    /// Starts a stage of `total` units; 0 where their number is unknown.
+    /// Starts a stage of `total` units; 0 if their number is unknown.
     #[must_use]
     pub fn new(name: &str, total: u64, unit: &'static str) -> Self {
         let is_terminal = io::stderr().is_terminal();
@@ -62,7 +62,7 @@ impl Progress {
             let show = move || {
                 drop(start);
                 let mut pauses = Pauses::new(interval, as_bar);
-                // What cannot be shown is no reason to stop the work.
+                // A failure to show progress is no reason to stop the command.
                 while stopped.recv_timeout(pauses.next()) == Err(RecvTimeoutError::Timeout) {
                     let stage = lock(&shown).clone();
                     let _ = if as_bar {
@@ -77,7 +77,8 @@ impl Progress {
             };
             let thread = std::thread::Builder::new().name("progress".to_owned());
             let thread = thread.spawn(show).ok();
-            // The work goes on only once the thread has its memory: a thread that finds none panics before its first line.
+            // Wait until the thread has its memory, because a thread without memory panics before its first
+            // line.
             let _hung_up = thread.as_ref().map(|_| started.recv());
             thread
         });
@@ -88,24 +89,25 @@ impl Progress {
         }
     }
 
-    /// Goes on to another stage.
+    /// Starts another stage.
     pub fn stage(&self, name: &str, total: u64, unit: &'static str) {
         *lock(&self.stage) = Stage::new(name, total, unit);
     }
 
-    /// Counts finished units.
+    /// Adds finished units.
     pub fn advance(&self, units: u64) {
         lock(&self.stage).done += units;
     }
 }
 
-/// Whether a thread's stack and signal stack can be had: without progress, a command needs less memory.
+/// Whether memory for a thread's stack and signal stack is available. Without progress, a command needs
+/// less memory.
 fn memory_for_a_thread() -> bool {
     const NEEDED_BYTES: usize = 4 << 20;
     Vec::<u8>::new().try_reserve_exact(NEEDED_BYTES).is_ok()
 }
 
-/// How long to wait before what is shown next: a log of a long run stays short.
+/// Growing intervals, so that the log of a long run stays short.
 struct Pauses {
     next: Duration,
     as_bar: bool,
@@ -181,7 +183,7 @@ impl Stage {
 mod tests {
     use super::*;
 
-    /// Collects what is shown.
+    /// Collects the printed text.
     #[derive(Clone, Default)]
     struct Shown(Arc<Mutex<Vec<u8>>>);
 
@@ -196,7 +198,7 @@ mod tests {
         }
     }
 
-    /// What is shown until it holds `expected`.
+    /// The printed text, once it contains `expected`.
     fn shown(as_bar: bool, expected: &str) -> String {
         let shown = Shown::default();
         let stage = Stage::new("loading", 0, "");
@@ -228,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn four_hours_take_a_page_of_lines() {
+    fn four_hours_of_lines_fit_on_a_page() {
         let mut pauses = Pauses::new(LINE_INTERVAL, false);
         let mut seconds = 0;
         let mut lines = 0;
@@ -240,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bar_is_drawn_in_place_and_taken_away_at_the_end() {
+    fn a_bar_is_drawn_in_place_and_removed_at_the_end() {
         let text = shown(true, "4 of 8 tiles");
         assert!(
             text.contains("\r[============            ] tracing: 4 of 8 tiles"),

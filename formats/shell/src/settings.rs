@@ -1,17 +1,17 @@
-//! Files of settings: configurations, experiments, manifests.
+//! Reads settings files: configurations, experiments, manifests.
 
 use anyhow::{Context, Result, anyhow, ensure};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// More than this is no file of settings.
+/// Size limit of settings files.
 const LONGEST_MIB: u64 = 4;
 
-/// Reads a file of settings, of at most 4 MiB whatever its name stands for: a device may have no end.
+/// Reads a settings file of at most 4 MiB. The limit also holds for devices, which may have no end.
 ///
 /// # Errors
-/// The file cannot be read, is too long or is no text; the message names it.
+/// The file cannot be read, is too long or is not text; the message names it.
 pub fn read_settings(path: &Path) -> Result<String> {
     let name = || path.display().to_string();
     let longest = LONGEST_MIB << 20;

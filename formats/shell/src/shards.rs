@@ -1,20 +1,20 @@
-//! Work split over many machines: which part this process does, and who gets what.
+//! Distributes work over many machines.
 
 use std::ops::Range;
 use std::str::FromStr;
 
-/// More shards than this are taken for a mistake.
+/// Limit on the number of shards.
 pub const MOST_SHARDS: u32 = 10_000;
 
-/// What `--shard` stands for without a value.
+/// Value of `--shard` without an argument.
 const FROM_SLURM: &str = "slurm";
 
-/// One of several parts of the work.
+/// One of several parts of a command's work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 1 to `count`.
     pub number: u32,
-    /// Parts in all.
+    /// Number of parts.
     pub count: u32,
 }
 
@@ -22,8 +22,8 @@ pub struct Shard {
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Many machines")]
 pub struct ShardArgs {
-    /// Do part K of N alone, balanced by estimated cost [without K/N: what the task of a Slurm job
-    /// array says]
+    /// Do only part K of N, balanced by estimated cost [without K/N: from the task number of the Slurm job
+    /// array]
     #[arg(long, value_name = "K/N", num_args = 0..=1, default_missing_value = FROM_SLURM,
           value_parser = parse_shard)]
     pub shard: Option<Shard>,
@@ -62,11 +62,11 @@ impl FromStr for Shard {
 }
 
 impl Shard {
-    /// The shard of a task of a Slurm job array, whose numbers may begin anywhere and have a step.
+    /// The shard of a task in a Slurm job array, whose numbers may start anywhere and have a step.
     ///
     /// # Errors
-    /// A variable that is missing or no number, and an array whose numbers have gaps: which shard
-    /// a task of such a one is cannot be told from its environment.
+    /// A variable that is missing or not a number, or an array whose numbers have gaps, because the
+    /// environment does not tell which shard such a task has.
     pub fn from_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
         let number = |name: &str| -> Result<Option<u32>, String> {
             let Some(text) = variable(name) else {
@@ -104,24 +104,25 @@ impl Shard {
     }
 }
 
-/// Work that one machine does at one time.
+/// A unit of work that one machine does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// What it costs, in any unit.
+    /// Cost in any unit.
     pub cost: u64,
-    /// Pieces of one set, which stand side by side, share a preparation.
+    /// Index of its set. Pieces of the same set are adjacent and share a preparation.
     pub set: usize,
 }
 
-/// Deals pieces out to shards, in their order, so that the costliest shard costs as little as it
-/// can; a shard pays a set's preparation once. Returns each shard's pieces.
+/// Distributes pieces over shards, in order, to minimise the cost of the most expensive shard. A shard pays
+/// a set's preparation once. Returns the pieces of each shard.
 ///
-/// `preparation[set]` is what a set costs each shard that has pieces of it.
+/// `preparation[set]` is the cost of a set for each shard with pieces of it.
 #[must_use]
 pub fn balanced(pieces: &[Piece], preparation: &[u64], count: u32) -> Vec<Range<usize>> {
     let line = Line::new(pieces, preparation);
     let end = pieces.len();
-    // The smallest bound that `count` shards keep; shards that are filled up to it need the fewest.
+    // Find the smallest bound that `count` shards can keep. Filling each shard up to the bound needs the
+    // fewest shards.
     let (mut below, mut bound) = (0, line.cost(0, end));
     while bound - below > 1 {
         let middle = below + (bound - below) / 2;
@@ -134,7 +135,7 @@ pub fn balanced(pieces: &[Piece], preparation: &[u64], count: u32) -> Vec<Range<
     let needed = line.shards_needed(bound);
     let mut first = 0;
     let shards = (0..count).rev().map(|others| {
-        // No shard is left without work that another one could give.
+        // Give work to empty shards if another one has several pieces.
         let fair = line.cost(first, end) / u64::from(others + 1);
         let most = line.filled(first, bound);
         let enough = |&last: &usize| needed[last] <= others && line.cost(first, last) >= fair;
@@ -146,11 +147,11 @@ pub fn balanced(pieces: &[Piece], preparation: &[u64], count: u32) -> Vec<Range<
     shards.collect()
 }
 
-/// Pieces in a row, to be cut.
+/// Consecutive pieces to be divided.
 struct Line<'a> {
     pieces: &'a [Piece],
     preparation: &'a [u64],
-    /// Cost of all before each piece, each set's preparation paid once.
+    /// Cumulative cost before each piece, with each set's preparation paid once.
     before: Vec<u64>,
 }
 
@@ -185,7 +186,7 @@ impl<'a> Line<'a> {
             .unwrap_or(0)
     }
 
-    /// Of a shard with these pieces.
+    /// Cost of a shard with these pieces.
     fn cost(&self, first: usize, last: usize) -> u64 {
         if first >= last {
             return 0;
@@ -198,7 +199,7 @@ impl<'a> Line<'a> {
         (self.before[last] - self.before[first]).saturating_add(again)
     }
 
-    /// Where a shard that begins at `first` ends within the bound; one piece at least.
+    /// End of a shard that starts at `first` and keeps the bound; it has at least one piece.
     fn filled(&self, first: usize, bound: u64) -> usize {
         let fits = |last: &usize| self.cost(first, *last) <= bound;
         let ends: usize = {
@@ -216,7 +217,7 @@ impl<'a> Line<'a> {
         ends.max(first + 1).min(self.pieces.len())
     }
 
-    /// Shards that the pieces from each on need within the bound; more than there are where a
+    /// Shards that the pieces from each index on need within the bound; more than there are pieces if a
     /// single piece exceeds it.
     fn shards_needed(&self, bound: u64) -> Vec<u32> {
         let end = self.pieces.len();
@@ -259,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slurm_task_knows_its_shard_wherever_its_array_begins() {
+    fn a_slurm_task_finds_its_shard_wherever_its_array_starts() {
         assert_eq!(of_slurm(&[("ID", "2"), ("COUNT", "4")]), Ok((2, 4)));
         let array = |id, count, min, max, step| {
             of_slurm(&[
@@ -273,7 +274,7 @@ mod tests {
         assert_eq!(array("0", "4", "0", "3", "1"), Ok((1, 4)));
         assert_eq!(array("13", "4", "10", "13", "1"), Ok((4, 4)));
         assert_eq!(array("6", "4", "0", "6", "2"), Ok((4, 4)));
-        // --array=1,5,9 and a variable that lies.
+        // --array=1,5,9, and a variable with a wrong value.
         for id in ["1", "5", "9"] {
             assert!(array(id, "3", "1", "9", "1").unwrap_err().contains("K/N"));
         }
@@ -284,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn slurm_variables_that_are_missing_or_no_numbers_are_named() {
+    fn slurm_variables_that_are_missing_or_not_numbers_are_named() {
         for (variables, expected) in [
             (&[][..], "SLURM_ARRAY_TASK_ID is not set"),
             (&[("ID", "1")], "SLURM_ARRAY_TASK_COUNT is not set"),
@@ -310,7 +311,7 @@ mod tests {
         sets.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The least cost of the costliest shard, by trying every way to cut.
+    /// The smallest cost of the most expensive shard, by trying every division.
     fn least(line: &Line, first: usize, shards: u32) -> u64 {
         let end = line.pieces.len();
         if shards == 1 {
@@ -321,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn no_way_to_cut_is_better() {
+    fn no_division_is_better() {
         let mut seed = 1u64;
         let mut random = |below: u64| {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -355,13 +356,13 @@ mod tests {
     }
 
     #[test]
-    fn a_set_is_cut_no_oftener_than_the_balance_asks() {
+    fn a_set_is_not_divided_more_often_than_the_balance_needs() {
         let shards = balanced(&pieces(&[&[1; 8], &[1; 8]]), &[100, 100], 4);
         assert_eq!(shards, [0..4, 4..8, 8..12, 12..16]);
     }
 
     #[test]
-    fn work_is_spread_over_all_shards_that_can_have_some() {
+    fn work_is_spread_over_all_shards_if_there_are_enough_pieces() {
         let sizes = |pieces: &[Piece], count| -> Vec<usize> {
             balanced(pieces, &[0], count)
                 .iter()
@@ -380,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hundred_thousand_pieces_are_dealt_at_once() {
+    fn a_hundred_thousand_pieces_are_distributed_fast() {
         let many = vec![
             Piece {
                 cost: u64::MAX / 1000,

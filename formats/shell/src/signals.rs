@@ -1,4 +1,4 @@
-//! Signals that end the program leave no unfinished file and no child behind.
+//! Removes unfinished files and ends children when a signal ends the program.
 
 use anyhow::Context;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ};
@@ -7,16 +7,16 @@ use signal_hook::low_level::emulate_default_handler;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Starts a thread that removes unfinished outputs when a signal asks the process to end, and then ends
-/// it as the signal would have: shells report 130 (SIGINT), 131 (SIGQUIT), 143 (SIGTERM) or 129 (SIGHUP).
-/// A write beyond the limit of file sizes (`ulimit -f`) becomes an error of that write.
+/// Starts a thread that removes unfinished outputs when a signal asks the process to end. It then ends the
+/// process as the signal would have: shells report 130 (SIGINT), 131 (SIGQUIT), 143 (SIGTERM) or 129
+/// (SIGHUP). A write beyond the limit of file sizes (`ulimit -f`) becomes an error of that write.
 ///
 /// # Errors
-/// The system refuses the handler or the thread.
+/// The handler or the thread cannot be started.
 pub(crate) fn discard_unfinished_on_exit() -> anyhow::Result<()> {
-    // `nohup` and background jobs ignore some signals, and so must we.
+    // Signals ignored by `nohup` and background jobs stay ignored.
     let ignored = ignored_signals();
-    // With a handler, whatever it does, the write that is too large fails with EFBIG.
+    // With any handler installed, a write that is too large fails with EFBIG.
     signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))
         .context("cannot handle signals")?;
     let wanted = [SIGINT, SIGQUIT, SIGTERM, SIGHUP];
@@ -30,7 +30,7 @@ pub(crate) fn discard_unfinished_on_exit() -> anyhow::Result<()> {
             for signal in signals.forever() {
                 super::children::end_with(signal);
                 formats::container::discard_unfinished();
-                // Does not return for these four.
+                // Does not return for these four signals.
                 let _impossible = emulate_default_handler(signal);
             }
         })
@@ -38,8 +38,8 @@ pub(crate) fn discard_unfinished_on_exit() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Mask of the signals that the parent process had ignored, signal 1 in bit 0, where the system
-/// tells (Linux).
+/// Mask of the signals that the parent process ignores, signal 1 in bit 0, where the system reports it
+/// (Linux).
 fn ignored_signals() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -1,4 +1,4 @@
-//! Slurm scripts: a job array of shards, and what follows when all of them are done.
+//! Writes Slurm scripts: a job array of shards, and a job that runs after all of them.
 
 use anyhow::Context;
 use std::borrow::Cow;
@@ -8,21 +8,21 @@ use std::path::Path;
 /// Work for a Slurm job array.
 #[derive(Clone, Debug)]
 pub struct SlurmArray<'a> {
-    /// Names the job; what Slurm might stumble over is replaced.
+    /// Name of the job; characters that Slurm may reject are replaced.
     pub name: &'a str,
-    /// Parts.
+    /// Number of parts.
     pub shards: u32,
-    /// Processors of each part; what the cluster gives by itself if none.
+    /// Processors per part; the cluster's default if `None`.
     pub cpus: Option<u16>,
-    /// Memory and time of the costliest part, estimated; what the cluster gives by itself if none.
+    /// Estimated memory and time of the most expensive part; the cluster's default if `None`.
     pub needs: Option<Needs>,
-    /// Program and arguments, with paths that mean the same on every node.
+    /// Program and arguments, with paths that are valid on every node.
     pub command: Vec<String>,
-    /// Arguments of the job that follows when every part has ended; none where no job does.
+    /// Arguments of the job that runs after all parts; empty if there is none.
     pub then: Vec<String>,
 }
 
-/// What a part needs of its node, with a margin.
+/// Resources that a part needs, with a margin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Needs {
     /// Memory in MiB.
@@ -31,9 +31,10 @@ pub struct Needs {
     pub minutes: u64,
 }
 
-/// Submits as many arrays as the cluster's MaxArraySize asks for: the numbers of tasks stay below it, and each
-/// array gets the number of shards before its first as its argument. A cluster that does not say has Slurm's
-/// own 1001. The job that follows waits until all have ended, however they ended: it lists what is missing.
+/// Submits as many arrays as the cluster's MaxArraySize requires. Task numbers stay below it, and each
+/// array gets the number of shards before its first one as its argument. The default of MaxArraySize is
+/// Slurm's 1001. The job that follows starts when all arrays have ended, even if they failed, and lists
+/// missing results.
 const SUBMIT: &str = r#"    [ -f "$0" ] || { echo "save the script, then run: sh FILE" >&2; exit 2; }
     most=$(scontrol show config 2>/dev/null | sed -n 's/^MaxArraySize *= *\([0-9][0-9]*\).*/\1/p')
     most=$((${most:-1001} - 1))
@@ -55,7 +56,7 @@ const SUBMIT_AFTER: &str = r#"    after=$(sbatch --parsable "$@" --array=0 --dep
 "#;
 
 impl SlurmArray<'_> {
-    /// The script. `sh FILE` submits it: as arrays, and as the job after them, task 0.
+    /// The script. `sh FILE` submits it, as arrays and as a last job, which is task 0.
     #[must_use]
     pub fn script(&self) -> String {
         let name: String = self
@@ -115,10 +116,10 @@ impl SlurmArray<'_> {
     }
 }
 
-/// A path that means the same wherever a script is run.
+/// A path that is valid wherever a script runs.
 ///
 /// # Errors
-/// It is empty, or no UTF-8.
+/// The path is empty or not UTF-8.
 pub fn absolute(path: &Path) -> anyhow::Result<String> {
     let place = || path.display().to_string();
     let whole = std::path::absolute(path).with_context(place)?;
@@ -128,7 +129,7 @@ pub fn absolute(path: &Path) -> anyhow::Result<String> {
         .to_owned())
 }
 
-/// A word as a shell reads it.
+/// Quotes a word for a shell.
 #[must_use]
 pub fn quoted(word: &str) -> Cow<'_, str> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@".contains(c);
@@ -146,7 +147,7 @@ mod tests {
 
     const ODD: &str = "a b'c\"$(id)`id`\\\n*%;&|<é";
 
-    /// What `sh` makes of the script as a task, with `printf` as the program.
+    /// Output of the script run by `sh` as a task, with `printf` as the program.
     fn told(script: &str, task: &str) -> String {
         let mut shell = Command::new("sh");
         shell.args(["-c", script]).env("SLURM_CPUS_ON_NODE", "3");
@@ -156,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn words_reach_the_program_as_they_were() {
+    fn words_reach_the_program_unchanged() {
         let command = ["printf", "[%s]", ODD, ""].map(str::to_owned).to_vec();
         let array = SlurmArray {
             name: "-a b\n#SBATCH --x",
@@ -189,7 +190,8 @@ mod tests {
     }
 
     #[cfg(unix)]
-    /// Submits a script where `sbatch` prints numbers and notes its arguments; returns what it tells and those.
+    /// Submits a script with an `sbatch` that prints numbers and records its arguments. Returns the output
+    /// and those arguments.
     fn submitted(array: &SlurmArray, most: &str) -> (String, Vec<String>) {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
@@ -221,7 +223,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn more_shards_than_the_cluster_takes_in_an_array_are_several_arrays() {
+    fn more_shards_than_an_array_may_have_become_several_arrays() {
         let array = |shards| SlurmArray {
             name: "a",
             shards,
@@ -266,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_script_that_is_no_file_cannot_submit_itself() {
+    fn a_script_that_is_not_a_file_cannot_submit_itself() {
         let array = SlurmArray {
             name: "a",
             shards: 1,

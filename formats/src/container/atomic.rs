@@ -1,4 +1,4 @@
-//! Output files that appear under their name whole or not at all.
+//! Output files that appear under their name completely or not at all.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata};
@@ -8,39 +8,39 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tempfile::{NamedTempFile, TempPath};
 
-/// Temporary files and folders that a signal handler has to remove. They are made, renamed and removed with
-/// the lock held, so that none is missed.
+/// Temporary files and folders that a signal handler must remove. They are created, renamed and removed
+/// while the lock is held, so the list is always complete.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 pub(super) fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every unfinished file and folder of this process, which has to end after it: no output can be
-/// started or finished any more, and threads that try to wait forever.
+/// Removes every unfinished file and folder of this process, which must end afterwards: no output can be
+/// started or finished any more, and threads that try block forever.
 pub fn discard_unfinished() {
     let files = unfinished();
     for file in &*files {
-        // Whatever cannot be removed now cannot be helped.
+        // Errors are ignored because the process is ending.
         let _gone = fs::remove_file(file).or_else(|_| fs::remove_dir_all(file));
     }
     std::mem::forget(files);
 }
 
-/// True if an output is standard output, which `-` names; a file of that name is `./-`.
+/// Whether an output is standard output, which `-` names; a file with that name is `./-`.
 #[must_use]
 pub fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// A file that appears under its name only once it is complete; dropped before, it leaves
-/// nothing behind. It replaces regular files only, and keeps their permissions.
+/// A file that appears under its name once it is complete. If dropped earlier, it leaves nothing behind. It
+/// replaces regular files only, and keeps their permissions.
 ///
-/// The target `-` is standard output: what was written is copied there when it is complete.
+/// The target `-` is standard output; the content is copied there when it is complete.
 #[derive(Debug)]
 pub struct AtomicFile {
     writer: BufWriter<File>,
-    // Removed before it is taken off the list.
+    // The file is removed before its entry in the list.
     path: TempPath,
     _listed: Listed,
     target: PathBuf,
@@ -57,10 +57,10 @@ impl Drop for Listed {
 }
 
 impl AtomicFile {
-    /// Opens a temporary file beside `target`.
+    /// Opens a temporary file in the folder of `target`.
     ///
     /// # Errors
-    /// Those of [`check_target`].
+    /// See [`check_target`].
     pub fn create(target: &Path) -> io::Result<Self> {
         if !is_stdout(target) {
             check_name(target)?;
@@ -80,7 +80,7 @@ impl AtomicFile {
     /// Writes a whole file.
     ///
     /// # Errors
-    /// When it cannot be written; the target is then untouched.
+    /// The file cannot be written; the target is then unchanged.
     pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = Self::create(target)?;
         file.write_all(bytes)?;
@@ -90,7 +90,7 @@ impl AtomicFile {
     /// Flushes and renames the file over its target.
     ///
     /// # Errors
-    /// When either fails; the target is then untouched.
+    /// Flushing or renaming failed; the target is then unchanged.
     pub fn persist(self) -> io::Result<()> {
         let mut file = self.writer.into_inner().map_err(io::Error::from)?;
         if is_stdout(&self.target) {
@@ -124,11 +124,11 @@ impl Seek for AtomicFile {
     }
 }
 
-/// Tells whether an [`AtomicFile`] could be written to `target`, without leaving anything there.
+/// Checks whether an [`AtomicFile`] could be written to `target`, without leaving anything there.
 ///
 /// # Errors
-/// What stands there is no regular file (a folder, a device, a pipe, a symbolic link, ...) or may
-/// not be written, or its folder does not exist or may not be written.
+/// `target` is not a regular file (a folder, a device, a pipe, a symbolic link, ...), is not writable, or
+/// is in a folder that does not exist or is not writable.
 pub fn check_target(target: &Path) -> io::Result<()> {
     if !is_stdout(target) {
         check_name(target)?;
@@ -168,12 +168,12 @@ fn check_name(target: &Path) -> io::Result<Option<Metadata>> {
     if found.permissions().readonly() {
         return refuse("a file that may be written", "a read-only one".to_owned());
     }
-    // Replacing a file takes rights on its folder alone, but whoever may not write it should not.
+    // Replacing a file needs write access only to its folder, but a read-only file should stay.
     fs::OpenOptions::new().write(true).open(target)?;
     Ok(Some(found))
 }
 
-/// What something on a disk is, in words.
+/// The kind of a file system entry, as text.
 #[must_use]
 pub fn kind_of(found: &Metadata) -> &'static str {
     if found.is_file() {
@@ -207,16 +207,16 @@ fn folder_of(target: &Path) -> &Path {
     }
 }
 
-/// Begin and end of the name of an unfinished file.
+/// Prefix and suffix of an unfinished file's name.
 const UNFINISHED_NAME: (&str, &str) = (".", ".part");
 
-/// Removes the unfinished files of a folder that processes which were killed have left there: those
-/// that nobody has written to for `age`. Returns how many there were.
+/// Removes unfinished files that killed processes left in a folder: those that were not modified for `age`.
+/// Returns their number.
 ///
 /// # Errors
 /// The folder cannot be read or written.
 pub fn remove_abandoned(folder: &Path, age: Duration) -> io::Result<usize> {
-    // The folder may be another machine's, with a clock of its own: a new file tells its time.
+    // The folder may be on another machine with another clock, so the time is taken from a new file.
     let now = {
         let _held = unfinished();
         let clock = temporary(&folder.join("clock"))?;
@@ -232,7 +232,7 @@ pub fn remove_abandoned(folder: &Path, age: Duration) -> io::Result<usize> {
         if !is_unfinished {
             continue;
         }
-        // It may be gone by now: finished, or removed by another process.
+        // Another process may have finished or removed the file.
         let Ok(found) = entry.metadata() else {
             continue;
         };
@@ -245,13 +245,13 @@ pub fn remove_abandoned(folder: &Path, age: Duration) -> io::Result<usize> {
     Ok(removed)
 }
 
-/// A temporary file on the file system of `target`, with the permissions of any new file.
+/// A temporary file on the file system of `target`, with the permissions of a normal new file.
 fn temporary(target: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(UNFINISHED_NAME.0).suffix(UNFINISHED_NAME.1);
     #[cfg(unix)]
     {
-        // Temporary files are private otherwise; the umask still applies.
+        // By default, temporary files are private. The umask still applies.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_regular_file_is_refused_by_its_kind() {
+    fn entries_that_are_not_regular_files_are_refused_with_their_kind() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("file"), "").unwrap();

@@ -13,10 +13,10 @@ use nom::number::complete::{le_u16, le_u32, le_u64};
 pub const HEADER_BYTES: usize = 48;
 /// Size of one directory entry.
 pub const DIRECTORY_ENTRY_BYTES: usize = 24;
-/// Bytes of the header that its own CRC covers: all before it.
+/// Number of header bytes that its CRC covers: all bytes before it.
 const HEADER_CRC_OFFSET: usize = HEADER_BYTES - 4;
 
-/// Fields of the header that vary.
+/// Variable fields of the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub version_minor: u16,
@@ -56,7 +56,7 @@ impl Header {
         bytes
     }
 
-    /// Parses the whole file's first bytes; what follows the header stays unread.
+    /// Parses the header at the start of a file.
     pub(super) fn parse(file: &[u8]) -> Parsed<'_, Self> {
         let (rest, magic) = context("the magic PLXTRACE", take(MAGIC.len())).parse(file)?;
         ensure(
@@ -73,7 +73,8 @@ impl Header {
             || format!("major version {VERSION_MAJOR}"),
             major,
         )?;
-        // The checksum comes before every other field: a damaged header should be called that.
+        // The checksum is checked before all other fields, so that the error says that the header is
+        // damaged.
         let (_, body) = context("a header of 48 bytes", take(HEADER_CRC_OFFSET)).parse(file)?;
         let (after_body, _) = take(HEADER_CRC_OFFSET).parse(file)?;
         let (_, stored_crc32) = context("the header's CRC-32", le_u32).parse(after_body)?;

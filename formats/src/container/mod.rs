@@ -1,8 +1,8 @@
-//! The container that every trace file is: a header, chunks, and a directory of the chunks.
+//! The container format of all trace files: a header, chunks, and a directory of the chunks.
 //!
-//! The directory stands at the end, so that chunks can be streamed; the header, written last,
-//! points at it. Header, directory and every chunk have a CRC-32, and the bytes between chunks
-//! must be zero, so that no flipped bit goes unseen. FORMAT.md has the byte layout.
+//! The directory is at the end, so that chunks can be streamed; the header is written last and points at
+//! it. Header, directory and every chunk have a CRC-32, and the bytes between chunks must be zero, so every
+//! flipped bit is detected. FORMAT.md has the byte layout.
 
 mod atomic;
 mod header;
@@ -24,15 +24,15 @@ use std::fmt;
 
 /// First eight bytes of every trace file.
 pub const MAGIC: [u8; 8] = *b"PLXTRACE";
-/// Readers refuse another major version.
+/// Major version. Readers refuse any other.
 pub const VERSION_MAJOR: u16 = 1;
-/// The latest minor version. A file says the earliest that has all that is in it: 1 where a trace has
-/// layers, else 0. Readers accept a later one, which may only add.
+/// The latest minor version. A file has the earliest one that defines all of its content: 1 if the trace
+/// has layers, else 0. Readers accept later ones, which may only add content.
 pub const VERSION_MINOR: u16 = 1;
 /// Chunks start at multiples of this many bytes.
 pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;
 
-/// What a file holds.
+/// Kinds of trace files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Kind {

@@ -1,4 +1,4 @@
-//! Reading a container through a memory map.
+//! Reads a container through a memory map.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES, Header};
@@ -27,10 +27,10 @@ impl Bytes {
     }
 }
 
-/// Largest trace that is read from a pipe, which cannot be mapped.
+/// Largest trace that can be read from a pipe, which cannot be mapped.
 const MAX_STREAM_BYTES: u64 = 1 << 30;
 
-/// Reads a trace from a pipe: first the header, which says how much follows.
+/// Reads a trace from a pipe: first the header, which has the file size, then the rest.
 fn read_stream(name: &str, mut stream: impl Read) -> Result<Vec<u8>> {
     let io = |source| FormatError::io(name, "read", source);
     let mut bytes = Vec::new();
@@ -46,22 +46,22 @@ fn read_stream(name: &str, mut stream: impl Read) -> Result<Vec<u8>> {
             found: header.file_bytes.to_string(),
         });
     }
-    // One byte more than there should be, so that a longer stream is noticed.
+    // Read one extra byte to detect a longer stream.
     let rest = header.file_bytes.saturating_sub(HEADER_BYTES as u64) + 1;
     stream.take(rest).read_to_end(&mut bytes).map_err(io)?;
     Ok(bytes)
 }
 
-/// An opened trace file whose header, directory and padding have been checked.
+/// An open trace file with checked header, directory and padding.
 ///
-/// A chunk's checksum is computed at once and compared when the chunk is asked for.
+/// A chunk's checksum is computed when the file is opened and compared when the chunk is requested.
 #[derive(Debug)]
 pub struct Container {
     file: String,
     bytes: Bytes,
     header: Header,
     directory: Vec<ChunkEntry>,
-    /// CRC-32 of each chunk's bytes, which the directory's should equal.
+    /// Computed CRC-32 of each chunk, to be compared with the directory's.
     crc32s: Vec<u32>,
 }
 
@@ -69,7 +69,7 @@ impl Container {
     /// Maps a file, or reads a pipe into memory, and checks header, directory and padding.
     ///
     /// # Errors
-    /// When the file cannot be read or is not a well-formed container.
+    /// The file cannot be read or is not a valid container.
     pub fn open(path: &Path) -> Result<Self> {
         let name = path.display().to_string();
         let io = |action| {
@@ -86,11 +86,11 @@ impl Container {
             return Self::from_named_bytes(name, Bytes::Owned(bytes));
         }
         if metadata.len() == 0 {
-            // An empty file cannot be mapped; let the header parser name what is missing.
+            // An empty file cannot be mapped; the header parser then reports the missing header.
             return Self::from_named_bytes(name, Bytes::Owned(Vec::new()));
         }
-        // SAFETY: the map is read only; a trace is written under another name and renamed, so
-        // a well-behaved writer never changes a file that is open here.
+        // SAFETY: the map is read-only. Traces are written under a temporary name and renamed, so the
+        // writer never changes an open file.
         let map = unsafe { Mmap::map(&file) }.map_err(io("map"))?;
         Self::from_named_bytes(name, Bytes::Mapped(map))
     }
@@ -98,7 +98,7 @@ impl Container {
     /// Reads a container from memory.
     ///
     /// # Errors
-    /// When the bytes are not a well-formed container.
+    /// The bytes are not a valid container.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
         Self::from_named_bytes("memory".to_owned(), Bytes::Owned(bytes))
     }
@@ -175,7 +175,7 @@ impl Container {
         &self.file
     }
 
-    /// What the file holds.
+    /// The kind of trace.
     #[must_use]
     pub fn kind(&self) -> Kind {
         self.header.kind
@@ -199,10 +199,10 @@ impl Container {
         &self.directory
     }
 
-    /// Fails unless the file is of `kind`.
+    /// Checks that the file is of `kind`.
     ///
     /// # Errors
-    /// When it is of another kind.
+    /// The file is of another kind.
     pub fn expect_kind(&self, kind: Kind) -> Result<()> {
         if self.kind() == kind {
             return Ok(());
@@ -216,10 +216,10 @@ impl Container {
         })
     }
 
-    /// The directory entry of a chunk that must be there.
+    /// The directory entry of a required chunk.
     ///
     /// # Errors
-    /// When there is none.
+    /// The chunk is missing.
     pub fn entry(&self, tag: ChunkTag) -> Result<&ChunkEntry> {
         self.directory
             .iter()
@@ -236,7 +236,7 @@ impl Container {
     /// Bytes of a chunk, with its CRC checked.
     ///
     /// # Errors
-    /// When there is no such chunk or it is damaged.
+    /// The chunk is missing or damaged.
     pub fn chunk(&self, tag: ChunkTag) -> Result<&[u8]> {
         let mut of_tag = self.directory.iter().zip(&self.crc32s);
         if let Some((entry, crc32)) = of_tag.find(|(entry, _)| entry.tag == tag)
@@ -248,19 +248,19 @@ impl Container {
         self.chunk_unchecked(tag)
     }
 
-    /// Fails at the first chunk whose CRC is wrong, known or not.
+    /// Checks the CRC of every chunk, including unknown chunks.
     ///
     /// # Errors
-    /// When a chunk is damaged.
+    /// The first damaged chunk.
     pub fn check_chunks(&self) -> Result<()> {
         let mut tags = self.directory.iter().map(|entry| entry.tag);
         tags.try_for_each(|tag| self.chunk(tag).map(|_| ()))
     }
 
-    /// Fails unless the chunks of `tags` are there in this order; others may lie between them.
+    /// Checks that the chunks of `tags` are present in this order; other chunks may be between them.
     ///
     /// # Errors
-    /// When one is missing or out of order.
+    /// A chunk is missing or out of order.
     pub fn expect_order(&self, tags: &[ChunkTag]) -> Result<()> {
         let mut previous = None;
         for tag in tags {
@@ -276,17 +276,17 @@ impl Container {
         Ok(())
     }
 
-    /// Bytes of a chunk whose parts have checksums of their own; its CRC is not checked.
+    /// Bytes of a chunk whose parts have their own checksums; its CRC is not checked.
     ///
     /// # Errors
-    /// When there is no such chunk.
+    /// The chunk is missing.
     pub fn chunk_unchecked(&self, tag: ChunkTag) -> Result<&[u8]> {
         let entry = self.entry(tag)?;
         // Placement was checked when the file was opened.
         Ok(slice(self.bytes.as_slice(), entry).unwrap_or_default())
     }
 
-    /// A located error at byte `offset_in_chunk` of a chunk.
+    /// An error located at byte `offset_in_chunk` of a chunk.
     #[must_use]
     pub fn malformed(
         &self,
@@ -305,10 +305,10 @@ impl Container {
         }
     }
 
-    /// Runs a nom parser over a whole checked chunk.
+    /// Runs a nom parser over a complete checked chunk.
     ///
     /// # Errors
-    /// When the chunk is missing, damaged, or not what the parser expects.
+    /// The chunk is missing, damaged, or rejected by the parser.
     pub fn parse_chunk<'a, T>(
         &'a self,
         tag: ChunkTag,
@@ -319,10 +319,11 @@ impl Container {
         parse_all(&self.file, Place::Chunk(tag), offset, bytes, parser)
     }
 
-    /// CRC-32 of what a trace holds, which names it in results: every chunk but the description, and the
-    /// description without what says how and by what it was captured (FORMAT.md, Content checksum).
+    /// CRC-32 of the content of a trace, which identifies it in results: every chunk except the
+    /// description, and the description without the keys about the capture itself (FORMAT.md, Content
+    /// checksum).
     pub(crate) fn content_checksum(&self, description: ChunkTag) -> u32 {
-        /// Keys of the description, or of its `trace`, that say nothing of what was captured.
+        /// Keys of the description, or of its `trace`, that are not part of the content.
         const ANNOTATIONS: [&str; 6] = [
             "tool",
             "command_line",
@@ -342,7 +343,7 @@ impl Container {
             crc32.update(&entry.crc32.to_le_bytes());
         }
         let bytes = self.chunk_unchecked(description).unwrap_or_default();
-        // A trace is only opened with a description that is JSON.
+        // A trace can only be opened if its description is JSON.
         let mut value: Value = serde_json::from_slice(bytes).unwrap_or_default();
         if let Some(trace) = value.get_mut("trace") {
             without(trace, &ANNOTATIONS);
@@ -355,7 +356,7 @@ impl Container {
 
     /// CRC-32 of the whole file.
     ///
-    /// The chunks' own are combined with those of the bytes around them, which are few.
+    /// Combines the chunks' checksums with those of the few bytes around them.
     #[must_use]
     pub fn file_checksum(&self) -> u32 {
         let all = self.bytes.as_slice();
@@ -386,8 +387,8 @@ fn slice<'a>(all: &'a [u8], entry: &ChunkEntry) -> Option<&'a [u8]> {
     all.get(start..start.checked_add(length)?)
 }
 
-/// Checks that the chunks lie one after the other, each aligned, with nothing but zero padding
-/// between them: no overlap, no hidden bytes, no chunk past the end, no tag twice.
+/// Checks that the chunks are consecutive and aligned, with only zero padding between them: no overlap, no
+/// hidden bytes, no chunk past the end, no duplicate tag.
 fn check_placement(
     all: &[u8],
     directory_offset: u64,

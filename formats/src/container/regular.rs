@@ -1,15 +1,15 @@
-//! Opening files that programs find by themselves, in a folder or by a reference in another file. Only
-//! regular files are opened: a pipe would wait for a writer, and a device may have no end.
+//! Opens files that a program finds by itself, in a folder or by a reference in another file. Only regular
+//! files are opened, because a pipe would block until it has a writer, and a device may have no end.
 
 use super::kind_of;
 use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// The metadata of a regular file, links followed; nothing is opened.
+/// The metadata of a regular file, following links; the file is not opened.
 ///
 /// # Errors
-/// There is none, or something else than a regular file.
+/// The file is missing or not a regular file.
 pub fn check_regular(path: &Path) -> io::Result<Metadata> {
     let found = std::fs::metadata(path)?;
     if found.is_file() {
@@ -24,7 +24,7 @@ pub fn check_regular(path: &Path) -> io::Result<Metadata> {
 /// Opens a regular file.
 ///
 /// # Errors
-/// As [`check_regular`]; it cannot be opened.
+/// See [`check_regular`]; or the file cannot be opened.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     check_regular(path)?;
     File::open(path)
@@ -33,14 +33,14 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
 /// The bytes of a regular file.
 ///
 /// # Errors
-/// As [`open_regular`]; it cannot be read.
+/// See [`open_regular`]; or the file cannot be read.
 pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_regular(path)?.read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// CRC-32 of a file's bytes in 8 hexadecimal digits, as manifests keep it.
+/// CRC-32 of a file's bytes as 8 hexadecimal digits, the form used in manifests.
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> String {
     format!("{:08x}", crc32fast::hash(bytes))

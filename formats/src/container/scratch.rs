@@ -1,24 +1,24 @@
-//! A folder for files that nobody needs once the work is done.
+//! A folder for temporary files.
 
 use super::atomic::{Listed, unfinished};
 use std::io;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// A folder of a name of its own, removed with all that it holds when it is dropped, and when a signal ends
-/// the program.
+/// A uniquely named folder. It is removed with its content when it is dropped, and when a signal ends the
+/// program.
 #[derive(Debug)]
 pub struct ScratchFolder {
-    // Removed before it is taken off the list.
+    // The folder is removed before its entry in the list.
     folder: TempDir,
     _listed: Listed,
 }
 
 impl ScratchFolder {
-    /// Makes one inside `parent`.
+    /// Creates a folder inside `parent`.
     ///
     /// # Errors
-    /// `parent` does not exist or may not be written.
+    /// `parent` does not exist or is not writable.
     pub fn create_in(parent: &Path) -> io::Result<Self> {
         let mut listed = unfinished();
         let folder = tempfile::Builder::new()
@@ -31,7 +31,7 @@ impl ScratchFolder {
         })
     }
 
-    /// Where it is.
+    /// Path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.folder.path()

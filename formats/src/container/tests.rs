@@ -21,14 +21,14 @@ fn read_all(bytes: Vec<u8>) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Rewrites the header's CRC, as a hostile writer would.
+/// Recomputes the header's CRC, as a malicious writer could.
 fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let crc32 = crc32fast::hash(&bytes[..44]);
     bytes[44..48].copy_from_slice(&crc32.to_le_bytes());
     bytes
 }
 
-/// Changes the directory and rewrites both CRCs.
+/// Changes the directory and recomputes both CRCs.
 fn with_directory(mut bytes: Vec<u8>, change: impl FnOnce(&mut [u8])) -> Vec<u8> {
     let start = bytes.len() - 2 * DIRECTORY_ENTRY_BYTES;
     change(&mut bytes[start..]);
@@ -38,7 +38,7 @@ fn with_directory(mut bytes: Vec<u8>, change: impl FnOnce(&mut [u8])) -> Vec<u8>
 }
 
 #[test]
-fn chunks_come_back_as_written() {
+fn chunks_are_read_as_written() {
     let container = Container::from_bytes(sample()).unwrap();
     assert_eq!(container.kind(), Kind::Textrace);
     assert_eq!(container.chunk(META).unwrap(), b"hello");
@@ -61,7 +61,7 @@ fn every_truncation_is_refused() {
 }
 
 #[test]
-fn every_flipped_bit_is_noticed() {
+fn every_flipped_bit_is_detected() {
     let whole = sample();
     for bit in 0..whole.len() * 8 {
         let mut bytes = whole.clone();
@@ -117,7 +117,7 @@ fn a_chunk_past_the_end_is_refused() {
 }
 
 #[test]
-fn a_tag_may_stand_only_once() {
+fn a_duplicate_tag_is_refused() {
     let bytes = with_directory(sample(), |directory| {
         directory[24..28].copy_from_slice(b"META");
     });
@@ -150,7 +150,7 @@ fn a_later_minor_version_is_accepted() {
 }
 
 #[test]
-fn another_file_is_called_by_its_first_bytes() {
+fn the_error_for_another_file_type_shows_its_first_bytes() {
     let text = Container::from_bytes(b"\x89PNG\r\n\x1a\n0000".to_vec())
         .unwrap_err()
         .to_string();

@@ -1,4 +1,4 @@
-//! Writing a container: chunks streamed to a temporary file, renamed when complete.
+//! Writes a container: streams chunks to a temporary file and renames it when complete.
 
 use super::atomic::AtomicFile;
 use super::header::{HEADER_BYTES, Header};
@@ -19,10 +19,10 @@ pub struct ContainerWriter<W = AtomicFile> {
 }
 
 impl ContainerWriter<AtomicFile> {
-    /// Starts a file of `kind` that will be renamed to `path` by [`Self::finish`].
+    /// Starts a file of `kind`; [`Self::finish`] renames it to `path`.
     ///
     /// # Errors
-    /// Those of [`AtomicFile::create`].
+    /// See [`AtomicFile::create`].
     pub fn create(path: &Path, kind: Kind) -> Result<Self> {
         let name = path.display().to_string();
         let sink =
@@ -30,10 +30,10 @@ impl ContainerWriter<AtomicFile> {
         Self::start(name, sink, kind)
     }
 
-    /// Writes directory and header, and renames the file to its name. Returns its size in bytes.
+    /// Writes directory and header, and renames the file. Returns its size in bytes.
     ///
     /// # Errors
-    /// When writing or renaming fails; no file is left then.
+    /// Writing or renaming failed; no file is left.
     pub fn finish(mut self) -> Result<u64> {
         self.seal()?;
         self.sink
@@ -47,15 +47,15 @@ impl ContainerWriter<Cursor<Vec<u8>>> {
     /// Starts a container in memory.
     ///
     /// # Errors
-    /// None in practice; the signature is that of the file's.
+    /// None in practice; the signature matches that for files.
     pub fn in_memory(kind: Kind) -> Result<Self> {
         Self::start("memory".to_owned(), Cursor::new(Vec::new()), kind)
     }
 
-    /// Writes directory and header, and yields the bytes.
+    /// Writes directory and header, and returns the bytes.
     ///
     /// # Errors
-    /// As [`Self::in_memory`].
+    /// See [`Self::in_memory`].
     pub fn into_bytes(mut self) -> Result<Vec<u8>> {
         self.seal()?;
         Ok(self.sink.into_inner())
@@ -72,30 +72,30 @@ impl<W: Write + Seek> ContainerWriter<W> {
             directory: Vec::new(),
             open: None,
         };
-        // A placeholder that no reader takes for a header, should the writer die here.
+        // This placeholder is not a valid header, so an incomplete file is never accepted.
         writer.raw(&[0; HEADER_BYTES])?;
         Ok(writer)
     }
 
-    /// Says in the header that readers need a minor version.
+    /// Sets the minor version in the header to at least `minor`.
     pub(crate) fn require_minor(&mut self, minor: u16) {
         self.header.version_minor = self.header.version_minor.max(minor);
     }
 
-    /// Writes a whole chunk.
+    /// Writes a complete chunk.
     ///
     /// # Errors
-    /// When writing fails.
+    /// Writing failed.
     pub fn chunk(&mut self, tag: ChunkTag, bytes: &[u8]) -> Result<()> {
         self.begin_chunk(tag)?;
         self.append(bytes)?;
         self.end_chunk()
     }
 
-    /// Starts a chunk that [`Self::append`] fills.
+    /// Starts a chunk for [`Self::append`].
     ///
     /// # Errors
-    /// When writing fails or the tag has been used.
+    /// Writing failed, or the tag was used before.
     pub fn begin_chunk(&mut self, tag: ChunkTag) -> Result<()> {
         self.end_chunk()?;
         if self.directory.iter().any(|entry| entry.tag == tag) {
@@ -110,10 +110,10 @@ impl<W: Write + Seek> ContainerWriter<W> {
         Ok(())
     }
 
-    /// Adds bytes to the chunk that is open.
+    /// Adds bytes to the open chunk.
     ///
     /// # Errors
-    /// When writing fails or no chunk is open.
+    /// Writing failed, or no chunk is open.
     pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
         let Some((_, _, crc32)) = &mut self.open else {
             return Err(FormatError::Unwritable {
@@ -126,7 +126,7 @@ impl<W: Write + Seek> ContainerWriter<W> {
         self.raw(bytes)
     }
 
-    /// Ends the chunk that is open, if any.
+    /// Ends the open chunk, if any.
     ///
     /// # Errors
     /// None in practice.
@@ -142,7 +142,7 @@ impl<W: Write + Seek> ContainerWriter<W> {
         Ok(())
     }
 
-    /// Bytes written so far, the header's included.
+    /// Number of bytes written so far, including the header.
     #[must_use]
     pub fn position_bytes(&self) -> u64 {
         self.position

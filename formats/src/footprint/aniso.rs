@@ -1,18 +1,18 @@
-//! Anisotropic filtering: what a quad reads where its pixels are long and narrow in the texture.
+//! Anisotropic filtering: the texels of quads whose pixels are long and narrow in the texture.
 //!
-//! Three models. *Probes* (Vulkan 1.3, section "Texel Anisotropic Filtering"): the filter is applied N times along the
-//! longer axis of the pixel. With the axes' lengths a and b, a >= b, and the ratio r = min(a / b, maximum), N is r
-//! rounded up and the level of detail is log2(a / r). *Rounded probes* (the example in
-//! `EXT_texture_filter_anisotropic`): the same N, and log2(a / N). It drops a level as soon as a exceeds b.
-//! *Ellipse* (softpipe's, after Greene and Heckbert, 1986): all texels of one level inside the pixel's ellipse, which a
-//! texture unit fetches as 2x2 blocks.
+//! Three models. *Probes* (Vulkan 1.3, section "Texel Anisotropic Filtering"): the filter is applied N
+//! times along the longer axis of the pixel. With the axes' lengths a and b, a >= b, and the ratio r =
+//! min(a / b, maximum), N is r rounded up and the level of detail is log2(a / r). *Rounded probes* (the
+//! example in `EXT_texture_filter_anisotropic`): the same N, and log2(a / N), which drops a level as soon
+//! as a exceeds b. *Ellipse* (softpipe's, after Greene and Heckbert, 1986): all texels of one level inside
+//! the pixel's ellipse, which a texture unit fetches as 2x2 blocks.
 
 use super::{LodFormula, SamplingOptions, fast_log2};
 use crate::textrace::{QuadRecord, SUBTEXELS};
 use crate::texture::{Filter, MipFilter, Sampler};
 use serde::{Deserialize, Serialize};
 
-/// Largest maximum of anisotropy that can be asked for, as in every API.
+/// Largest anisotropy, as in every API.
 pub const MOST_ANISOTROPY: u32 = 16;
 
 /// How long and narrow pixels are filtered.
@@ -28,22 +28,22 @@ pub enum AnisotropyModel {
     Ellipse,
 }
 
-/// What a quad's footprints are made of.
+/// The kind of a quad's footprints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reach {
-    /// A footprint a lane and level.
+    /// One footprint per lane and level.
     Isotropic,
-    /// Several along a line.
+    /// Several footprints along a line.
     Probes(Probes),
-    /// All of an ellipse.
+    /// All texels of an ellipse.
     Ellipse(Ellipse),
 }
 
 impl Reach {
-    /// What a record reads of a texture whose level 0 has `size` texels and that has `levels`.
+    /// The footprints of a record in a texture with `levels` levels, whose level 0 has `size` texels.
     ///
-    /// Isotropic where anisotropy is off, where the sampler does not blend texels or has no levels, and where the
-    /// pixel is no longer than a texel: nothing is minified.
+    /// Isotropic if anisotropy is off, if the sampler does not blend texels or has no levels, and if the
+    /// pixel is not longer than a texel (nothing is minified).
     #[must_use]
     pub fn of(
         record: &QuadRecord,
@@ -67,14 +67,14 @@ impl Reach {
         let squared = |d: [f32; 2]| d[0] * d[0] + d[1] * d[1];
         let (along_x, along_y) = (squared(dx), squared(dy));
         let (longer, shorter) = (along_x.max(along_y), along_x.min(along_y));
-        // Also where a derivative is not finite.
+        // Also isotropic if a derivative is not finite.
         if !(longer > 1.0 && longer < f32::INFINITY) {
             return Self::Isotropic;
         }
         let most = options.max_anisotropy.min(MOST_ANISOTROPY);
         match options.anisotropy {
             model @ (AnisotropyModel::Probes | AnisotropyModel::RoundedProbes) => {
-                // The least N of which N times the shorter axis is no less than the longer one.
+                // The smallest N for which N times the shorter axis is not less than the longer axis.
                 let square = |n: u32| (n * n) as f32;
                 let count = (1..most).find(|&n| square(n) * shorter >= longer);
                 let count = count.unwrap_or(most);
@@ -86,7 +86,7 @@ impl Reach {
                 } else {
                     (record.dy, dy)
                 };
-                // The square of what the level is the logarithm of: a / N, or a / min(a / b, most).
+                // The square of the level's argument: a / N, or a / min(a / b, most).
                 let narrowed = match model {
                     AnisotropyModel::RoundedProbes => longer / square(count),
                     _ => shorter.max(longer / square(most)),
@@ -108,7 +108,7 @@ impl Reach {
             AnisotropyModel::Ellipse => {
                 let narrowest = shorter.max(longer / (most * most) as f32);
                 let lod = 0.5 * fast_log2(narrowest) + options.lod_bias;
-                // A bias makes no ellipse longer than the maximum allows.
+                // The maximum also limits ellipses that a bias enlarges.
                 let longest = (2 * most) as f32;
                 let shortest_level = (0.5 * (longer / (longest * longest)).log2()).ceil();
                 let level = (lod.max(0.0) as u32).max(shortest_level.max(0.0) as u32);
@@ -125,22 +125,22 @@ impl Reach {
 /// Footprints along the longer axis of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probes {
-    /// How many, 2 to 16.
+    /// Number of probes, 2 to 16.
     pub count: u32,
-    /// Level of detail of each, bias included.
+    /// Level of detail of each probe, including the bias.
     pub lod: f32,
     /// The longer axis, fixed point.
     axis: [i32; 2],
 }
 
 impl Probes {
-    /// Where a probe lies from the lane's coordinates, fixed point rounded to nearest: `i / (N + 1) - 1/2` of the
-    /// axis, i from 1 to N.
+    /// Offset of a probe from the lane's coordinates, in fixed point rounded to nearest:
+    /// `i / (N + 1) - 1/2` of the axis, with i from 1 to N.
     #[must_use]
     pub fn offset(&self, probe: u32) -> [i32; 2] {
         let parts = i64::from(self.count) + 1;
         let from_middle = 2 * (i64::from(probe) + 1) - parts;
-        // No more than half of the axis.
+        // At most half of the axis.
         self.axis
             .map(|d| ((i64::from(d) * from_middle + parts).div_euclid(2 * parts)) as i32)
     }
@@ -158,11 +158,11 @@ pub struct Ellipse {
 }
 
 impl Ellipse {
-    /// The ellipse on `level` of a pixel with the derivatives along x and y, in texels of level 0.
+    /// The ellipse on `level` of a pixel with these derivatives along x and y, in texels of level 0.
     fn new(level: u32, derivatives: [[f32; 2]; 2]) -> Self {
         let scale = 1.0 / f64::from(1_u32 << level);
         let [[ux, vx], [uy, vy]] = derivatives.map(|d| d.map(|t| f64::from(t) * scale));
-        // The ones keep it at least a texel wide.
+        // Adding one keeps it at least a texel wide.
         let a = vx * vx + vy * vy + 1.0;
         let b = -2.0 * (ux * vx + uy * vy);
         let c = ux * ux + uy * uy + 1.0;
@@ -170,14 +170,14 @@ impl Ellipse {
         Self { level, a, b, c, f }
     }
 
-    /// True for a texel that is so far from the centre.
+    /// Whether a texel at this distance from the centre is inside.
     #[must_use]
     fn contains(&self, u: f64, v: f64) -> bool {
         self.a * u * u + self.b * u * v + self.c * v * v < self.f
     }
 
-    /// The 2x2 blocks at even columns and rows that hold a texel of the ellipse around fixed-point coordinates, as
-    /// their upper left texel before wrapping, row by row. `size` is the level's.
+    /// The 2x2 blocks at even columns and rows that hold a texel of the ellipse around fixed-point
+    /// coordinates, as their upper left texel before wrapping, row by row. `size` is the size of the level.
     pub fn blocks(
         &self,
         uv: [i32; 2],

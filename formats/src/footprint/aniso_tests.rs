@@ -22,7 +22,7 @@ fn fixed(texels: f64) -> i32 {
     (texels * f64::from(SUBTEXELS)).round() as i32
 }
 
-/// A quad of one lane with derivatives in texels.
+/// A quad with one covered lane and derivatives in texels.
 fn record(at: [f64; 2], dx: [f64; 2], dy: [f64; 2]) -> QuadRecord {
     QuadRecord {
         mask: 1,
@@ -65,7 +65,7 @@ fn all(record: &QuadRecord, options: &SamplingOptions) -> Vec<Footprint> {
 
 #[test]
 fn four_to_one_is_four_probes_on_the_level_of_the_shorter_axis() {
-    // 16 texels along x, 4 along y: N = 4, level log2(16 / 4) = 2, and level 3 with nothing of it.
+    // 16 texels along x, 4 along y: N = 4, level log2(16 / 4) = 2, without level 3.
     let quad = record([512.0, 512.0], [16.0, 0.0], [0.0, 4.0]);
     let found = all(&quad, &options(16, AnisotropyModel::Probes));
     let level = |level: u8| found.iter().filter(move |f| f.level == level);
@@ -86,7 +86,7 @@ fn the_maximum_bounds_the_probes_and_coarsens_the_level() {
 }
 
 #[test]
-fn pixels_as_wide_as_long_or_no_longer_than_a_texel_are_filtered_as_ever() {
+fn pixels_that_are_square_or_no_longer_than_a_texel_are_filtered_isotropically() {
     for (dx, dy) in [
         ([8.0, 0.0], [0.0, 8.0]),
         ([0.9, 0.0], [0.0, 0.01]),
@@ -94,7 +94,7 @@ fn pixels_as_wide_as_long_or_no_longer_than_a_texel_are_filtered_as_ever() {
     ] {
         let quad = record([300.25, 17.5], dx, dy);
         for model in [AnisotropyModel::Probes, AnisotropyModel::Ellipse] {
-            // A circle's ellipse is more than a bilinear footprint.
+            // A circular ellipse covers more texels than a bilinear footprint.
             if model == AnisotropyModel::Ellipse && dx[0] > 1.0 {
                 continue;
             }
@@ -107,7 +107,7 @@ fn pixels_as_wide_as_long_or_no_longer_than_a_texel_are_filtered_as_ever() {
 }
 
 #[test]
-fn a_pixel_a_hundredth_longer_than_wide_drops_a_level_by_the_rounded_ratio_alone() {
+fn only_the_rounded_ratio_drops_a_level_for_a_pixel_that_is_slightly_longer_than_wide() {
     let quad = record([512.0, 512.0], [8.08, 0.0], [0.0, 8.0]);
     for (model, lod) in [
         (AnisotropyModel::Probes, 3.0),
@@ -132,8 +132,8 @@ fn a_pixel_a_hundredth_longer_than_wide_drops_a_level_by_the_rounded_ratio_alone
 }
 
 #[test]
-fn levels_that_a_ratio_changes_by_little_change_by_little() {
-    // Widths of 4 texels, lengths from 4.01 on; the rounded ratio jumps at each whole number.
+fn small_changes_of_the_ratio_change_the_level_little() {
+    // Widths of 4 texels, lengths from 4.01 on; the rounded ratio jumps at each integer.
     let lod = |model, length: f64| {
         let quad = record([512.0, 512.0], [0.0, length], [4.0, 0.0]);
         let sampler = Sampler::TRILINEAR_REPEAT;
@@ -161,7 +161,7 @@ fn levels_that_a_ratio_changes_by_little_change_by_little() {
 }
 
 #[test]
-fn with_a_level_a_lane_each_lane_reads_what_it_would_read_alone() {
+fn with_a_level_per_lane_each_lane_reads_the_same_as_alone() {
     // From 2:1 in the first lane to 10:1 in the last one.
     let quad = QuadRecord {
         mask: 15,
@@ -206,8 +206,8 @@ fn with_a_level_a_lane_each_lane_reads_what_it_would_read_alone() {
     }
 }
 
-/// The count of probes, their level and their places in floating point, as Vulkan's text has them; with `rounded`, the
-/// level as in the example of `EXT_texture_filter_anisotropic`.
+/// Number of probes, their level and their positions in floating point, from the text of the Vulkan
+/// specification; with `rounded`, the level from the example of `EXT_texture_filter_anisotropic`.
 fn by_the_text(dx: [f64; 2], dy: [f64; 2], most: u32, rounded: bool) -> (u32, f64, Vec<[f64; 2]>) {
     let (px, py) = (dx[0].hypot(dx[1]), dy[0].hypot(dy[1]));
     let (p_max, p_min) = (px.max(py), px.min(py));
@@ -221,7 +221,7 @@ fn by_the_text(dx: [f64; 2], dy: [f64; 2], most: u32, rounded: bool) -> (u32, f6
 
 proptest! {
     #[test]
-    fn probes_lie_where_the_text_says(
+    fn probes_are_where_the_text_says(
         d in prop::array::uniform4(-300.0_f64..300.0),
         most in 2_u32..=16,
         rounded in any::<bool>(),
@@ -230,7 +230,7 @@ proptest! {
         let (count, lod, places) = by_the_text(dx, dy, most, rounded);
         let (px, py) = (dx[0].hypot(dx[1]), dy[0].hypot(dy[1]));
         let ratio = px.max(py) / px.min(py);
-        // Next to a whole number rounding decides.
+        // Near an integer, the result depends on rounding.
         prop_assume!(px.max(py) > 1.1 && (ratio - ratio.round()).abs() > 1e-2);
         let quad = record([100.0, 900.0], dx, dy);
         let sampler = Sampler::TRILINEAR_REPEAT;
@@ -256,7 +256,7 @@ proptest! {
     }
 
     #[test]
-    fn blocks_hold_every_texel_of_the_ellipse_and_none_is_without_one(
+    fn blocks_hold_every_texel_of_the_ellipse_and_each_holds_at_least_one(
         d in prop::array::uniform4(-40.0_f64..40.0),
         at in prop::array::uniform2(300.0_f64..700.0),
     ) {
@@ -269,7 +269,7 @@ proptest! {
         };
         let size = SIZE >> ellipse.level;
         let blocks: Vec<[i64; 2]> = ellipse.blocks(quad.uv, [size; 2], [SIZE; 2]).collect();
-        // The distance of a texel's centre by the inverse of the pixel's own matrix, a texel wider.
+        // Distance of a texel's centre from the inverse of the pixel's matrix, one texel wider.
         let scale = f64::from(SUBTEXELS) * f64::from(1_u32 << ellipse.level);
         let [[ux, vx], [uy, vy]] = [quad.dx, quad.dy].map(|d| d.map(|d| f64::from(d) / scale));
         let (m, n, o) = (ux * ux + uy * uy + 1.0, ux * vx + uy * vy, vx * vx + vy * vy + 1.0);
@@ -280,7 +280,7 @@ proptest! {
                 let [u, v] = [(x, quad.uv[0]), (y, quad.uv[1])]
                     .map(|(texel, c)| texel as f64 + 0.5 - f64::from(c) / scale);
                 let distance = (o * u * u - 2.0 * n * u * v + m * v * v) / det;
-                // On the rim rounding decides.
+                // On the boundary, the result depends on rounding.
                 prop_assume!((distance - 1.0).abs() > 1e-9);
                 if distance < 1.0 {
                     expected.insert([y & !1, x & !1]);
@@ -293,7 +293,7 @@ proptest! {
 }
 
 #[test]
-fn no_bias_makes_an_ellipse_without_end() {
+fn a_bias_cannot_make_an_ellipse_unbounded() {
     let quad = record([512.0; 2], [900.0, 0.0], [0.0, 900.0]);
     let mut sharp = options(16, AnisotropyModel::Ellipse);
     sharp.lod_bias = -16.0;

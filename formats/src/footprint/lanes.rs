@@ -1,4 +1,5 @@
-//! What each lane reads where every lane has levels of its own ([`LodFormula::PerLane`](super::LodFormula)).
+//! Footprints by lane if every lane has its own level of detail
+//! ([`LodFormula::PerLane`](super::LodFormula)).
 
 use super::{
     Ellipse, LevelSelection, Probes, Reach, SamplingOptions, lane_lod, lane_record, select_levels,
@@ -6,17 +7,17 @@ use super::{
 use crate::textrace::QuadRecord;
 use crate::texture::{Filter, Sampler};
 
-/// What one lane reads.
+/// The texels that one lane reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LaneReach {
-    /// The filter on one level or two, at its own place or at several probes.
+    /// The filter on one or two levels, at the lane's own position or at several probes.
     Levels(LevelSelection, Option<Probes>),
-    /// All of an ellipse.
+    /// All texels of an ellipse.
     Ellipse(Ellipse),
 }
 
 impl LaneReach {
-    /// What a lane reads of a texture whose level 0 has `size` texels and that has `levels`.
+    /// The texels of a lane in a texture with `levels` levels, whose level 0 has `size` texels.
     #[must_use]
     pub fn of(
         record: &QuadRecord,
@@ -39,7 +40,7 @@ impl LaneReach {
         }
     }
 
-    /// How many times the filter is applied to each level.
+    /// Number of filter applications per level.
     #[must_use]
     pub fn probe_count(&self) -> u32 {
         match self {
@@ -48,8 +49,8 @@ impl LaneReach {
         }
     }
 
-    /// How far from the lane's coordinates a probe lies on a level, and its filter; none where the lane has no such
-    /// probe.
+    /// Offset of a probe from the lane's coordinates on a level, and its filter; `None` if the lane has no
+    /// such probe.
     #[must_use]
     pub fn probe(&self, level: u32, probe: u32) -> Option<([i32; 2], Filter)> {
         let Self::Levels(levels, probes) = self else {
@@ -60,7 +61,7 @@ impl LaneReach {
         (reads && probe < self.probe_count()).then_some((from_lane, levels.filter))
     }
 
-    /// The ellipse that the lane reads on a level.
+    /// The ellipse of the lane on a level.
     #[must_use]
     pub fn ellipse(&self, level: u32) -> Option<&Ellipse> {
         match self {

@@ -3,8 +3,8 @@
 use super::LodFormula;
 use crate::textrace::{QuadRecord, SUBTEXELS};
 
-/// llvmpipe's base-2 logarithm: the exponent plus the mantissa minus one. It is exact at powers
-/// of two and at most 0.086 too low between them.
+/// llvmpipe's base-2 logarithm: the exponent plus the mantissa minus one. It is exact at powers of two and
+/// at most 0.086 too low in between.
 #[must_use]
 #[inline]
 pub fn fast_log2(x: f32) -> f32 {
@@ -14,8 +14,8 @@ pub fn fast_log2(x: f32) -> f32 {
     exponent + (mantissa - 1.0)
 }
 
-/// Level of detail of a quad in a texture whose level 0 has `size` texels, without bias: from
-/// the derivatives of the top-left lane, in f32, one rounding an operation.
+/// Level of detail of a quad in a texture whose level 0 has `size` texels, without bias. Computed from the
+/// derivatives of the top-left lane, in f32 with one rounding per operation.
 #[must_use]
 pub fn quad_lod(record: &QuadRecord, extent: [u32; 2], size: [u32; 2], formula: LodFormula) -> f32 {
     let texels = |derivative: [i32; 2]| {
@@ -37,8 +37,8 @@ pub fn quad_lod(record: &QuadRecord, extent: [u32; 2], size: [u32; 2], formula: 
     }
 }
 
-/// The record with one lane's own derivatives, for [`LodFormula::PerLane`]: the differences along its own row and its
-/// own column of the quad. Coordinates still have to be taken from the record itself.
+/// The record with one lane's own derivatives, for [`LodFormula::PerLane`]: the differences along its row
+/// and column of the quad. Coordinates must still be taken from the original record.
 #[must_use]
 pub fn lane_record(record: &QuadRecord, lane: u32) -> QuadRecord {
     let own = |derivative: [i32; 2], other: bool| {
@@ -51,7 +51,7 @@ pub fn lane_record(record: &QuadRecord, lane: u32) -> QuadRecord {
     }
 }
 
-/// Level of detail of one lane by [`LodFormula::PerLane`], without bias.
+/// Level of detail of one lane with [`LodFormula::PerLane`], without bias.
 #[must_use]
 pub fn lane_lod(record: &QuadRecord, lane: u32, extent: [u32; 2], size: [u32; 2]) -> f32 {
     quad_lod(

@@ -1,11 +1,10 @@
-//! From a quad record to the texels that it reads: the reference that faster engines are tested
-//! against, so it is written to be read.
+//! Computes the texels that a quad record reads. This is the reference for tests of faster engines, so it
+//! is written for readability.
 //!
-//! Footprints come in a fixed order: record by record, sample by sample in shader order, the
-//! finer mip level before the coarser one, probe by probe where there are several, then lane by lane;
-//! those of an ellipse lane by lane, then row by row. Where each lane has levels of its own, a level's footprints
-//! are those of the lanes that read it. Everything that counts or writes
-//! accesses follows it.
+//! Footprints have a fixed order: by record, by sample in shader order, the finer mip level before the
+//! coarser one, by probe if there are several, then by lane. Those of an ellipse come by lane, then by row.
+//! If each lane has its own levels, a level's footprints are those of the lanes that read it. All code that
+//! counts or writes accesses follows this order.
 
 mod aniso;
 mod lanes;
@@ -20,7 +19,7 @@ pub use options::{FilterOverride, LodFormula, SamplingOptions};
 use crate::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Sample, Tables, UvGroup};
 use crate::texture::{Filter, MipFilter, Sampler, Texture, Wrap};
 
-/// Texels that one lane reads at one level of one sample.
+/// Texels of one lane at one level of one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Footprint {
     /// Lane of the quad, 0 to 3.
@@ -29,7 +28,8 @@ pub struct Footprint {
     pub level: u8,
     /// Array layer.
     pub layer: u16,
-    /// Left and right texel column, equal for a nearest fetch or where the wrap mode joins them.
+    /// Left and right texel column; equal for nearest fetches and where the wrap mode maps both to the same
+    /// column.
     pub i: [u32; 2],
     /// Upper and lower texel row.
     pub j: [u32; 2],
@@ -47,7 +47,7 @@ impl Footprint {
     }
 }
 
-/// Mip levels that a sample reads and the filter within them.
+/// Mip levels of a sample and the filter within them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LevelSelection {
     /// The finer level.
@@ -58,17 +58,17 @@ pub struct LevelSelection {
     pub filter: Filter,
 }
 
-/// Chooses the levels for a level of detail, as Vulkan and llvmpipe do.
+/// Selects the levels for a level of detail, as Vulkan and llvmpipe do.
 ///
-/// `lod <= 0` magnifies: level 0 with the `mag` filter. Linear mip filtering reads `floor(lod)`
-/// and the next one, and the last level alone from there on.
+/// `lod <= 0` magnifies: level 0 with the `mag` filter. Linear mip filtering reads `floor(lod)` and the
+/// next level; from the last level on, only the last.
 #[must_use]
 #[inline]
 pub fn select_levels(lod: f32, sampler: &Sampler, levels: u32) -> LevelSelection {
     let last = levels.saturating_sub(1);
     let magnified = lod <= 0.0;
     let filter = if magnified { sampler.mag } else { sampler.min };
-    // Above zero a float cast rounds down, and it saturates.
+    // A cast of a positive float rounds down and saturates.
     let (first, count) = match sampler.mip {
         MipFilter::None => (0, 1),
         _ if magnified => (0, 1),
@@ -86,8 +86,8 @@ pub fn select_levels(lod: f32, sampler: &Sampler, levels: u32) -> LevelSelection
 }
 
 /// Left (or upper) texel of a fetch along one axis, before wrapping:
-/// `floor(coordinate * size / (SUBTEXELS * extent) - 0.5)` for a linear filter, without the half
-/// texel for a nearest one. Exact.
+/// `floor(coordinate * size / (SUBTEXELS * extent) - 0.5)` for a linear filter, without the half texel for
+/// a nearest one. The result is exact.
 #[must_use]
 pub fn texel_before_wrap(coordinate: i32, size: u32, extent: u32, filter: Filter) -> i64 {
     let unit = i64::from(SUBTEXELS) * i64::from(extent);
@@ -107,7 +107,7 @@ fn fetch(coordinate: i32, size: u32, extent: u32, filter: Filter) -> [i64; 2] {
     }
 }
 
-/// Brings a texel coordinate into `0..size`.
+/// Wraps a texel coordinate into `0..size`.
 #[must_use]
 pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> u32 {
     let size = i64::from(size);
@@ -122,7 +122,8 @@ pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> u32 {
     wrapped as u32
 }
 
-/// Yields the footprints of one sample of a quad record, in the order of the module's description.
+/// Calls the closure with the footprints of one sample of a quad record, in the order of the module's
+/// description.
 pub fn footprints(
     record: &QuadRecord,
     extent: [u32; 2],
@@ -227,9 +228,9 @@ pub fn footprints(
     }
 }
 
-/// Yields every footprint of a record of `draw`, sample by sample, with the sample it belongs to.
+/// Calls the closure with every footprint of a record of `draw` and its sample, sample by sample.
 ///
-/// Nothing is read by a record without a group, nor by one whose indices the tables do not have.
+/// A record without a group, or with indices that the tables do not have, reads nothing.
 pub fn record_footprints(
     tables: &Tables,
     draw: u32,

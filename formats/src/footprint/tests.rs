@@ -13,7 +13,7 @@ fn texture(size: [u32; 2], levels: u32) -> Texture {
     }
 }
 
-/// A quad whose lanes are `step` texels of a 256x256 texture apart, the first at `at`.
+/// A quad whose lanes are `step` texels of a 256x256 texture apart, with the first at `at`.
 fn record(at: [f64; 2], step: f64) -> QuadRecord {
     let fixed = |texels: f64| (texels * f64::from(SUBTEXELS)).round() as i32;
     QuadRecord {
@@ -64,7 +64,7 @@ fn level_of_detail_counts_octaves_of_minification() {
         let quad = record([10.0; 2], f64::from(1 << octave));
         let lod = quad_lod(&quad, [256; 2], [256; 2], LodFormula::Llvmpipe);
         assert_eq!(lod, octave as f32);
-        // A texture of the same group that is half as large sees half the derivatives.
+        // A texture of the same group with half the size has half the derivatives.
         let lod = quad_lod(&quad, [256; 2], [128; 2], LodFormula::Llvmpipe);
         assert_eq!(lod, octave as f32 - 1.0);
     }
@@ -117,7 +117,7 @@ fn a_texel_centre_reads_the_texel_and_its_right_and_lower_neighbours() {
 }
 
 #[test]
-fn lanes_with_levels_of_their_own_read_these_level_by_level() {
+fn lanes_with_their_own_levels_read_level_by_level() {
     let per_lane = SamplingOptions {
         lod: LodFormula::PerLane,
         ..SamplingOptions::default()
@@ -218,7 +218,7 @@ fn mirrored_coordinates_fold_at_every_edge() {
 }
 
 proptest! {
-    /// The integer formula against the definition in floating point, away from texel edges.
+    /// The integer formula against the floating-point definition, away from texel edges.
     #[test]
     fn texel_position_is_the_rounded_down_coordinate(
         coordinate in -40_000_000..40_000_000i32,
@@ -237,7 +237,7 @@ proptest! {
     }
 
     #[test]
-    fn repeating_a_whole_texture_later_reads_the_same_texels(
+    fn coordinates_repeat_after_a_whole_texture(
         u in -1000.0..1000.0f64, v in -1000.0..1000.0f64, step in 0.01..100.0f64,
     ) {
         let quad = record([u, v], step);

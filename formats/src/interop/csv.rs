@@ -1,4 +1,4 @@
-//! Comma-separated accesses with a header line.
+//! Accesses as CSV with a header line.
 
 use super::{Access, AccessSink};
 use std::io::{self, Write};
@@ -14,7 +14,7 @@ impl<W: Write> CsvWriter<W> {
     /// Writes the header line.
     ///
     /// # Errors
-    /// Those of the writer below.
+    /// Errors of the underlying writer.
     pub fn new(mut out: W) -> io::Result<Self> {
         writeln!(out, "{HEADER}")?;
         Ok(Self(out))

@@ -1,4 +1,4 @@
-//! JSON Lines: one object an access, or one a record.
+//! JSON Lines: one object per access or per record.
 
 use super::{Access, AccessSink, Origin};
 use crate::textrace::{NO_GROUP, QuadRecord};
@@ -16,7 +16,7 @@ impl<W: Write> AccessSink for JsonlWriter<W> {
     }
 }
 
-/// A quad record as `replay dump` prints it; the numbers are the stored fixed-point ones.
+/// A quad record as `replay dump` prints it, with the stored fixed-point numbers.
 #[must_use]
 pub fn record_to_json(origin: Origin, record: &QuadRecord) -> Value {
     let group = Some(record.group).filter(|group| *group != NO_GROUP);

@@ -1,8 +1,8 @@
-//! Accesses for other simulators, texels' and rays': addresses alone ([`plain`], which is read,
-//! too), CSV, JSON Lines.
+//! Accesses of textures and rays for other simulators: addresses only ([`plain`], which can also be read),
+//! CSV, JSON Lines.
 //!
-//! What comes out for a record is what replay counts for it, in the order of
-//! [`crate::footprint`]. The order of tiles and primitives is the caller's.
+//! The accesses of a record are the ones that replay counts, in the order of [`crate::footprint`]. The
+//! caller determines the order of tiles and primitives.
 
 mod csv;
 mod jsonl;
@@ -19,18 +19,18 @@ use crate::textrace::{QuadRecord, Tables};
 use serde::{Deserialize, Serialize};
 use std::io;
 
-/// What counts as one access.
+/// Unit of an access.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Granularity {
     /// Every distinct texel of a footprint, at the address of its block.
     Texel,
-    /// Every distinct cache line of a footprint, at its first byte: what an L1 looks up.
+    /// Every distinct cache line of a footprint, at its first byte. An L1 looks up the same lines.
     #[default]
     Line,
 }
 
-/// Where a record comes from.
+/// Origin of a record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     /// Index of the pass.
@@ -48,7 +48,7 @@ pub struct Origin {
 pub struct Access {
     /// Byte address.
     pub address: u64,
-    /// Bytes from there on: a line's, or a block's.
+    /// Number of bytes: those of a line or a block.
     #[serde(skip)]
     pub bytes: u32,
     /// Index of the pass.
@@ -69,18 +69,18 @@ pub struct Access {
     pub layer: u16,
     /// Mip level.
     pub level: u8,
-    /// Texel column; with line granularity that of the first texel of the line.
+    /// Texel column; with line granularity, of the first texel of the line.
     pub x: u32,
     /// Texel row.
     pub y: u32,
 }
 
-/// Turns records into accesses.
+/// Expands records to accesses.
 #[derive(Clone, Copy, Debug)]
 pub struct Expander<'a> {
     /// Tables of the trace.
     pub tables: &'a Tables,
-    /// Where texels lie.
+    /// Addresses of texels.
     pub layout: &'a Layout,
     /// Filter and level of detail.
     pub sampling: SamplingOptions,
@@ -94,7 +94,7 @@ impl Expander<'_> {
     /// Calls `visit` for each access of a record. Stops at the first error.
     ///
     /// # Errors
-    /// Those of `visit`.
+    /// Errors of `visit`.
     pub fn expand(
         &self,
         origin: Origin,
@@ -150,12 +150,12 @@ impl Expander<'_> {
     }
 }
 
-/// Something that accesses are written to.
+/// A writer of accesses.
 pub trait AccessSink {
     /// Writes one access.
     ///
     /// # Errors
-    /// Those of the writer below.
+    /// Errors of the underlying writer.
     fn write(&mut self, access: &Access) -> io::Result<()>;
 }
 

@@ -1,4 +1,4 @@
-//! A ray trace sample by sample: as JSON, and as accesses to the hierarchy's memory.
+//! The samples of a ray trace as JSON, and their accesses to the hierarchy's memory.
 
 use crate::raytrace::{
     BvhSummary, PixelRecord, RayKind, RayRecord, RayTile, RaytraceTables, Visit,
@@ -18,11 +18,11 @@ pub struct RaySample<'a> {
     pub pixel: [u32; 2],
     /// Number of the sample in its pixel.
     pub sample: u32,
-    /// What it sees.
+    /// Its hit and colour.
     pub record: &'a PixelRecord,
     /// Its rays.
     pub rays: &'a [RayRecord],
-    /// Visits of all of them, `None` where the trace lists none.
+    /// Visits of all rays, or `None` if the trace has no visits.
     visits: Option<&'a [Visit]>,
 }
 
@@ -136,10 +136,10 @@ impl RaySample<'_> {
         })
     }
 
-    /// Calls `visit` for each access to the hierarchy, in the order made. Stops at an error.
+    /// Calls `visit` for each access to the hierarchy, in execution order. Stops at the first error.
     ///
     /// # Errors
-    /// Those of `visit`.
+    /// Errors of `visit`.
     pub fn accesses(
         &self,
         bvh: &BvhSummary,
@@ -170,7 +170,7 @@ impl RaySample<'_> {
     }
 }
 
-/// What an access of a ray reads.
+/// Kind of data that an access reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Entry {
@@ -197,9 +197,9 @@ pub struct RayAccess {
     pub y: u32,
     /// Sample of the pixel.
     pub sample: u32,
-    /// The ray's number among its sample's.
+    /// Number of the ray within its sample.
     pub ray: u32,
-    /// Why the ray was cast.
+    /// Kind of the ray.
     pub kind: RayKind,
     /// Node or triangle.
     pub entry: Entry,
@@ -208,7 +208,7 @@ pub struct RayAccess {
 }
 
 impl RayAccess {
-    /// Addresses of the cache lines that it touches; `line_bytes` is a power of two.
+    /// Addresses of the cache lines of the access; `line_bytes` is a power of two.
     pub fn lines(&self, line_bytes: u32) -> impl Iterator<Item = u64> + use<> {
         let line_bytes = u64::from(line_bytes.max(1));
         let last = self.address + u64::from(self.bytes.max(1)) - 1;
@@ -218,10 +218,10 @@ impl RayAccess {
     /// Header of the columns that [`Self::write_csv`] writes.
     pub const CSV_HEADER: &str = "address,bytes,eye,tile,x,y,sample,ray,kind,entry,index";
 
-    /// Writes a line of comma-separated values; the address is hexadecimal with `0x`.
+    /// Writes a CSV line; the address is hexadecimal with `0x`.
     ///
     /// # Errors
-    /// Those of the writer below.
+    /// Errors of the underlying writer.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         let eye = self.eye.to_string();
         let kind = self.kind.to_string();

@@ -1,8 +1,8 @@
-//! Where texels lie in memory: a pure function of the texture table and of a [`LayoutConfig`].
+//! Addresses of texels in memory: a pure function of the texture table and a [`LayoutConfig`].
 //!
-//! A texture's layers follow one another, each with its levels from fine to coarse, tightly
-//! packed. A level is an array of blocks (4x4 texels for BC1, one texel for uncompressed formats)
-//! in the configured order. Shadow maps have an order of their own.
+//! The layers of a texture are consecutive. Each has its levels from fine to coarse, without gaps. A level
+//! is an array of blocks (4x4 texels for BC1, one texel for uncompressed formats) in the configured order.
+//! Shadow maps have their own order.
 
 mod placement;
 
@@ -36,7 +36,7 @@ pub enum TextureOrder {
     LargestFirst,
 }
 
-/// Alignment that lets same-size textures collide in the same cache sets.
+/// Alignment at which textures of the same size share cache sets.
 pub const PAGE_ALIGNMENT_BYTES: u64 = 64 << 10;
 
 /// Everything that decides a layout.
@@ -62,7 +62,7 @@ impl Default for LayoutConfig {
         Self {
             texel_format: None,
             block_order: BlockOrder::Linear,
-            // GPUs tile depth textures, too.
+            // GPUs also tile depth textures.
             shadow_map_order: BlockOrder::Morton,
             base_align_bytes: 64,
             texture_order: TextureOrder::Table,
@@ -70,13 +70,13 @@ impl Default for LayoutConfig {
     }
 }
 
-/// Why textures cannot be laid out.
+/// Reasons why textures cannot be laid out.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LayoutError {
-    /// The alignment is not usable.
+    /// An unusable alignment.
     #[error("base alignment: expected a power of two of bytes, found {0}")]
     Alignment(u64),
-    /// The textures do not fit into the address space.
+    /// Textures that exceed the address space.
     #[error("texture {index} ({name}): expected addresses below 2^63, found more")]
     TooLarge {
         /// Index in the table.
@@ -86,7 +86,7 @@ pub enum LayoutError {
     },
 }
 
-/// Size of a format's unit of storage.
+/// A format's unit of storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlockInfo {
     /// Width and height in texels.
@@ -149,7 +149,7 @@ impl TextureLayout {
         self.layer_bytes * u64::from(self.layers)
     }
 
-    /// Address of the block that holds a texel; `None` where the level does not exist.
+    /// Address of the block that contains a texel; `None` if the level does not exist.
     #[must_use]
     pub fn address(&self, layer: u32, level: u32, texel: [u32; 2]) -> Option<u64> {
         let level = self.levels.get(level as usize)?;
@@ -171,7 +171,7 @@ pub struct BlockAt {
     pub layer: u32,
     /// Mip level.
     pub level: u32,
-    /// Column and row, in blocks; beyond the level where the layout pads it.
+    /// Column and row in blocks; outside the level if it is padding.
     pub block: [u32; 2],
 }
 
@@ -186,7 +186,7 @@ impl Layout {
     /// Lays out `textures`, from address 0.
     ///
     /// # Errors
-    /// When the alignment is no power of two or the textures are too large to address.
+    /// The alignment is not a power of two, or the textures are too large to address.
     pub fn new(textures: &[Texture], config: &LayoutConfig) -> Result<Self, LayoutError> {
         let align = config.base_align_bytes;
         if !align.is_power_of_two() {
@@ -231,7 +231,7 @@ impl Layout {
         self.end
     }
 
-    /// The block that an address lies in; `None` between textures and behind the last one.
+    /// The block at an address; `None` between textures and after the last one.
     #[must_use]
     pub fn block_at(&self, address: u64) -> Option<BlockAt> {
         let holds = |texture: &TextureLayout| {
@@ -254,7 +254,7 @@ impl Layout {
         })
     }
 
-    /// Address of the block that holds a texel; `None` where texture or level does not exist.
+    /// Address of the block that contains a texel; `None` if the texture or level does not exist.
     #[must_use]
     pub fn address(&self, texture: u32, layer: u32, level: u32, texel: [u32; 2]) -> Option<u64> {
         let texture = self.textures.get(texture as usize)?;
@@ -269,7 +269,7 @@ fn too_large(index: usize, texture: &Texture) -> LayoutError {
     }
 }
 
-/// Format in memory: the override is for colour, and depth cannot be stored as colour blocks.
+/// Format in memory. The override applies only to colour textures; depth textures keep their format.
 fn memory_format(texture: &Texture, config: &LayoutConfig) -> TexelFormat {
     match (texture.format, config.texel_format) {
         (TexelFormat::R32f, _) | (_, None) => texture.format,
@@ -303,7 +303,7 @@ fn place(texture: &Texture, config: &LayoutConfig) -> Option<TextureLayout> {
             Some(layout)
         })
         .collect::<Option<Vec<_>>>()?;
-    // Every layer's size times the layers must stay an address.
+    // The size of all layers together must be a valid address.
     offset_bytes.checked_mul(u64::from(texture.layers))?;
     Some(TextureLayout {
         base: 0,

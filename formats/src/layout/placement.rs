@@ -5,25 +5,25 @@ use super::BlockOrder;
 /// Edge of a tile of blocks, as a shift.
 const TILE_SHIFT: u32 = 2;
 
-/// A block order with what it needs to know about its level, ready for fast engines to tabulate.
+/// A block order with the dimensions of its level, so that fast engines can tabulate it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BlockPlacement {
     /// `y * pitch + x`.
     Linear {
-        /// Blocks in a row.
+        /// Blocks per row.
         pitch: u32,
     },
-    /// Bits of x and y interleaved, x lowest, until the shorter axis runs out; the rest of the
-    /// longer axis lies above.
+    /// Bits of x and y interleaved, x lowest, for the bits of the shorter axis; the remaining bits of the
+    /// longer axis are above.
     Morton {
-        /// Bits of x and of y.
+        /// Number of bits of x and of y.
         bits: [u32; 2],
     },
-    /// Tile row by tile row, tile by tile, row by row within.
+    /// By tile row, by tile, and by row within the tile.
     Tiled {
-        /// Width and height of a tile, as shifts; smaller than 4x4 only in levels that are.
+        /// Width and height of a tile, as shifts; less than 4x4 only for smaller levels.
         shift: [u32; 2],
-        /// Tiles in a row.
+        /// Tiles per row.
         pitch: u32,
     },
 }
@@ -42,7 +42,7 @@ impl BlockPlacement {
         }
     }
 
-    /// Blocks that a level of `blocks` takes in memory, padding included.
+    /// Number of blocks of a level in memory, including padding.
     pub(super) fn blocks(&self, blocks: [u32; 2]) -> u64 {
         match *self {
             Self::Linear { pitch } => u64::from(pitch) * u64::from(blocks[1]),
@@ -75,7 +75,7 @@ impl BlockPlacement {
 }
 
 impl BlockPlacement {
-    /// The block with a number in memory order, padding included.
+    /// The block with a number in memory order, including padding.
     #[must_use]
     pub fn block(&self, index: u64) -> [u32; 2] {
         match *self {
@@ -106,14 +106,14 @@ impl BlockPlacement {
     }
 }
 
-/// The lowest `bits` even bits of a number, side by side.
+/// Extracts the lowest `bits` even bits of a number.
 fn collect(interleaved: u64, bits: u32) -> u32 {
     (0..bits).fold(0, |value, bit| {
         value | ((interleaved >> (2 * bit)) as u32 & 1) << bit
     })
 }
 
-/// Spreads 32 bits so that a zero follows each.
+/// Inserts a zero bit after each of 32 bits.
 fn interleave(v: u32) -> u64 {
     let mut v = u64::from(v);
     for (shift, mask) in [

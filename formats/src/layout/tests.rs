@@ -56,14 +56,14 @@ fn tiles_of_uncompressed_texels_are_four_lines_of_sixteen_bytes() {
 const L1_SETS: u64 = 128;
 
 #[test]
-fn a_column_of_a_shadow_map_falls_into_many_sets_unless_the_map_is_linear() {
+fn a_column_of_a_shadow_map_uses_many_sets_unless_the_map_is_linear() {
     let textures = [texture([2048, 2048], 1, 4, TexelFormat::R32f)];
     let sets = |config: &LayoutConfig| {
         let layout = Layout::new(&textures, config).unwrap();
         let set = |y| layout.address(0, 1, 0, [77, y]).unwrap() / 16 % L1_SETS;
         (0..64).map(set).collect::<HashSet<u64>>().len()
     };
-    // Two rows share a line of 2x2 texels, and the bits of y below the seventh of the address choose the set.
+    // Two rows share a line of 2x2 texels. The bits of y below the seventh address bit select the set.
     assert_eq!(sets(&LayoutConfig::default()), 8);
     let linear = LayoutConfig {
         shadow_map_order: BlockOrder::Linear,
@@ -133,7 +133,7 @@ fn a_format_override_leaves_shadow_maps_alone() {
 }
 
 #[test]
-fn an_alignment_that_is_no_power_of_two_is_refused() {
+fn an_alignment_that_is_not_a_power_of_two_is_refused() {
     let config = LayoutConfig {
         base_align_bytes: 48,
         ..LayoutConfig::default()
@@ -154,7 +154,7 @@ fn textures_beyond_the_address_space_are_refused() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
-    /// Every block of every level and layer of every texture has bytes of its own.
+    /// Every block of every level and layer of every texture has its own bytes.
     #[test]
     fn no_two_blocks_share_an_address(
         width in 1..40u32, height in 1..40u32, layers in 1..3u32, order in 0..3usize,
@@ -189,7 +189,7 @@ proptest! {
 }
 
 proptest! {
-    /// Every address of every block leads back to it, whatever the order of the blocks and of the textures.
+    /// Every address of a block maps back to the block, for any order of blocks and textures.
     #[test]
     fn blocks_are_found_by_their_addresses(
         shapes in prop::collection::vec((1_u32..70, 1_u32..70, 1_u32..4, 0_usize..3), 1..4),

@@ -1,7 +1,7 @@
-//! An eye of the ray tracer: pixel to ray and point to pixel.
+//! The camera of an eye of the ray tracer: pixel to ray and point to pixel.
 //!
-//! Both programs use these functions, so a ray that replay makes for a pixel has the same bits as
-//! the one that was traced: only IEEE 754 basic operations and square roots are used.
+//! Both programs use these functions, so replay computes exactly the rays that were traced. Only IEEE 754
+//! basic operations and square roots are used.
 
 use crate::view::{EyeView, FovTangents};
 use glam::Vec3;
@@ -25,11 +25,11 @@ pub struct EyeCamera {
 }
 
 impl EyeCamera {
-    /// The camera of an eye's view, moved to be relative to `origin`.
+    /// The camera of an eye's view, relative to `origin`.
     #[must_use]
     pub fn new(view: &EyeView, fov: FovTangents, size_px: [u32; 2], origin: [f64; 3]) -> Self {
         let [x, y, z, _] = view.world_to_eye;
-        // A rotation's inverse is its transpose: rows of world-to-eye are the eye's axes.
+        // A rotation's inverse is its transpose, so the rows of world-to-eye are the eye's axes.
         let axis = |row: usize| Vec3::new(x[row], y[row], z[row]).normalize_or_zero();
         let position = std::array::from_fn(|a| (f64::from(view.position[a]) - origin[a]) as f32);
         Self {
@@ -55,8 +55,8 @@ impl EyeCamera {
         (d / d.dot(d).sqrt()).to_array()
     }
 
-    /// Where a point is seen: image coordinates in pixels from the top left, and its depth along
-    /// the view direction in metres. `None` behind the eye.
+    /// Image position of a point in pixels from the top left, and its depth along the view direction in
+    /// metres. `None` for points behind the eye.
     #[must_use]
     pub fn project(&self, position: [f32; 3]) -> Option<([f32; 2], f32)> {
         let d = Vec3::from(position) - Vec3::from(self.position);
@@ -72,21 +72,21 @@ impl EyeCamera {
         Some(([u, v], depth))
     }
 
-    /// The point that lies `t` metres along a direction from the eye.
+    /// The point at distance `t` metres from the eye along a direction.
     #[must_use]
     pub fn at(&self, direction: [f32; 3], t: f32) -> [f32; 3] {
         std::array::from_fn(|a| self.position[a] + t * direction[a])
     }
 }
 
-/// Image position of a sample of a pixel: its centre where there is one sample, else points of
-/// the R2 sequence shifted by a hash of the pixel (the same for both eyes).
+/// Image position of a sample of a pixel: the centre for a single sample, else points of the R2 sequence
+/// shifted by a hash of the pixel (the same for both eyes).
 #[must_use]
 pub fn sample_position_px(x: u32, y: u32, sample: u32, samples_per_px: u32) -> [f32; 2] {
     if samples_per_px <= 1 {
         return [x as f32 + 0.5, y as f32 + 0.5];
     }
-    // Fractions of 2^32: the sequence's generators are 1/g and 1/g^2 with g = 1.3247179572.
+    // Fractions of 2^32. The sequence's generators are 1/g and 1/g^2 with g = 1.3247179572.
     const R2: [u32; 2] = [3_242_174_889, 2_447_445_414];
     let shift = hash(x.wrapping_mul(0x9E37_79B9) ^ hash(y));
     let fraction = |axis: usize, shift: u32| {
@@ -144,12 +144,12 @@ mod tests {
     }
 
     #[test]
-    fn a_point_behind_the_eye_is_not_seen() {
+    fn a_point_behind_the_eye_is_not_visible() {
         assert_eq!(camera().project([1.0, 2.0, 4.0]), None);
     }
 
     #[test]
-    fn samples_lie_in_their_pixel_and_differ() {
+    fn samples_are_inside_their_pixel_and_differ() {
         let points: Vec<_> = (0..16).map(|s| sample_position_px(5, 9, s, 16)).collect();
         for (i, [x, y]) in points.iter().enumerate() {
             assert!((5.0..6.0).contains(x) && (9.0..10.0).contains(y));

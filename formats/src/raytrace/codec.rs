@@ -1,7 +1,7 @@
-//! The bytes of a tile: columns of small differences in variable-length integers.
+//! The bytes of a tile: columns of small differences as variable-length integers.
 //!
-//! What follows from the eye, the pixel and the triangle table is not stored: position, geometric
-//! normal, object and material. FORMAT.md has the layout.
+//! Values that can be computed from the eye, the pixel and the triangle table are not stored: position,
+//! geometric normal, object and material. FORMAT.md has the layout.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::camera::sample_position_px;
@@ -18,13 +18,13 @@ use nom::number::complete::u8 as byte;
 
 /// Ray byte: bits 0-1 kind, 2-3 outcome, then flags.
 const HAS_ALPHA_TESTS: u8 = 1 << 4;
-/// The parent is the pixel's primary ray, and no number follows.
+/// Flag: the parent is the pixel's primary ray, and no number follows.
 const PARENT_IS_PRIMARY: u8 = 1 << 5;
 
 /// Bits of a visit: the zigzag of a difference of 32-bit numbers, and the kind.
 const VISIT_BITS: u32 = 34;
 
-/// Fewest bytes of a tile of so many samples: the hit bits, and for each sample three colours, its
+/// Smallest size of a tile with this many samples: the hit bits, and for each sample three colours, its
 /// number of rays and a ray of three bytes.
 pub(super) fn least_bytes(samples: u64) -> u64 {
     samples.div_ceil(8) + (3 + 1 + 3) * samples
@@ -86,7 +86,7 @@ pub(super) fn encode(tile: &RayTile, has_visits: bool) -> Result<Vec<u8>, Broken
     Ok(out)
 }
 
-/// Writes red of all, then green, then blue.
+/// Writes red of all pixels, then green, then blue.
 fn put_colors(colors: impl Iterator<Item = [f32; 3]> + Clone, out: &mut Vec<u8>) {
     for channel in 0..3 {
         let mut previous = 0;
@@ -115,7 +115,7 @@ fn put_ray(own: u32, ray: &RayRecord, out: &mut Vec<u8>) {
     }
 }
 
-/// Checks what a reader will rely on.
+/// Checks the invariants that readers rely on.
 fn check(tile: &RayTile, has_visits: bool) -> Result<(), Broken> {
     let broken =
         |what: String, expected: &str, found: String| Err(Broken::new(what, expected, found));
@@ -165,7 +165,7 @@ fn check(tile: &RayTile, has_visits: bool) -> Result<(), Broken> {
     Ok(())
 }
 
-/// Reads a tile whose `origin_px` and `size_px` are set.
+/// Reads a tile; its `origin_px` and `size_px` must be set.
 pub(super) fn decode<'a>(
     tables: &RaytraceTables,
     eye: &EyeCamera,
@@ -257,7 +257,7 @@ pub(super) fn decode<'a>(
     Ok((input.rest(), ()))
 }
 
-/// Reads a value of 16 bits by its difference.
+/// Reads a 16-bit value by its difference.
 fn decode_short<'a>(
     input: &mut Cursor<'a>,
     previous: &mut u32,
@@ -292,7 +292,7 @@ fn decode_rays<'a>(input: &mut Cursor<'a>, tile: &mut RayTile) -> Result<(), nom
         let count = input.number_u32("a ray count")?;
         pixel.first_ray = total;
         pixel.ray_count = count;
-        // A ray takes three bytes at least.
+        // A ray takes at least three bytes.
         total = total
             .checked_add(count)
             .filter(|total| count > 0 && *total as usize <= input.rest().len() / 3)
@@ -340,7 +340,7 @@ fn decode_ray<'a>(
         let parent = if head & PARENT_IS_PRIMARY != 0 {
             Some(0)
         } else {
-            // The primary ray has its flag.
+            // The primary ray as parent has its own flag.
             own.checked_sub(input.number_u32("a parent")?)
                 .filter(|p| *p > 0)
         };
@@ -363,7 +363,7 @@ fn decode_ray<'a>(
         _ => input.number_u32("an alpha-test count")?,
     };
     if head & HAS_ALPHA_TESTS != 0 && alpha_tests == 0 {
-        return Err(at.fault("alpha tests where the flag says so", 0));
+        return Err(at.fault("alpha tests, as the flag requires", 0));
     }
     Ok(RayRecord {
         kind,

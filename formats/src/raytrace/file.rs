@@ -1,4 +1,4 @@
-//! Writing and reading a `.raytrace`: tables at once, tiles one by one from any thread.
+//! Writes and reads a `.raytrace`: tables at once, tiles one by one from any thread.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{RayTile, RaytraceTables, codec, tables};
@@ -14,9 +14,9 @@ use nom::number::complete::le_u32;
 use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 
-/// The tiles' bytes, the left eye's first.
+/// Chunk of the encoded tiles, the left eye's first.
 pub const RAY_TILES: ChunkTag = ChunkTag(*b"RAYS");
-/// Where each tile is.
+/// Chunk of the tile index.
 pub const RAY_INDEX: ChunkTag = ChunkTag(*b"RTIX");
 /// Size of an index entry: offset, bytes, CRC-32, rays, zero.
 pub const RAY_INDEX_ENTRY_BYTES: usize = 24;
@@ -37,10 +37,10 @@ impl EncodedRayTile {
     }
 }
 
-/// Encodes a tile. Pure, so that tiles can be encoded in parallel.
+/// Encodes a tile. A pure function, so that tiles can be encoded in parallel.
 ///
 /// # Errors
-/// When the tile breaks an invariant of the format.
+/// The tile violates an invariant of the format.
 pub fn encode_ray_tile(tile: &RayTile, has_visits: bool) -> Result<EncodedRayTile> {
     let bytes = codec::encode(tile, has_visits).map_err(|broken| {
         let what = format!("tile at {:?}, {}", tile.origin_px, broken.what);
@@ -71,15 +71,15 @@ impl RaytraceWriter<AtomicFile> {
     /// Starts a file that appears under its name when it is finished.
     ///
     /// # Errors
-    /// When the temporary file beside `path` cannot be written.
+    /// The temporary file in the folder of `path` cannot be written.
     pub fn create(path: &Path) -> Result<Self> {
         Self::start(ContainerWriter::create(path, Kind::Raytrace)?)
     }
 
-    /// Writes index and tables, and renames the file to its name. Returns its size in bytes.
+    /// Writes index and tables, and renames the file. Returns its size in bytes.
     ///
     /// # Errors
-    /// When writing fails, tiles are missing, or a table breaks an invariant; no file is left.
+    /// Writing failed, tiles are missing, or a table violates an invariant; no file is left.
     pub fn finish(self, tables: &RaytraceTables) -> Result<u64> {
         self.complete(tables)?.finish()
     }
@@ -89,15 +89,15 @@ impl RaytraceWriter<Cursor<Vec<u8>>> {
     /// Starts a trace in memory.
     ///
     /// # Errors
-    /// None in practice; the signature is that of the file's.
+    /// None in practice; the signature matches that for files.
     pub fn in_memory() -> Result<Self> {
         Self::start(ContainerWriter::in_memory(Kind::Raytrace)?)
     }
 
-    /// Writes index and tables, and yields the bytes.
+    /// Writes index and tables, and returns the bytes.
     ///
     /// # Errors
-    /// When tiles are missing or a table breaks an invariant.
+    /// Tiles are missing, or a table violates an invariant.
     pub fn into_bytes(self, tables: &RaytraceTables) -> Result<Vec<u8>> {
         self.complete(tables)?.into_bytes()
     }
@@ -116,7 +116,7 @@ impl<W: Write + Seek> RaytraceWriter<W> {
     /// Appends the next tile.
     ///
     /// # Errors
-    /// When writing fails.
+    /// Writing failed.
     pub fn tile(&mut self, tile: &EncodedRayTile) -> Result<()> {
         self.container.append(&tile.bytes)?;
         let bytes = u32::try_from(tile.bytes.len()).unwrap_or(u32::MAX);
@@ -164,7 +164,7 @@ fn index_entry(input: &[u8]) -> Parsed<'_, IndexEntry> {
     Ok((rest, IndexEntry { span, rays }))
 }
 
-/// An opened ray trace.
+/// An open ray trace.
 #[derive(Debug)]
 pub struct Raytrace {
     container: Container,
@@ -176,7 +176,7 @@ impl Raytrace {
     /// Maps a trace and reads its tables and index.
     ///
     /// # Errors
-    /// When the file cannot be read or is malformed; the error names the place.
+    /// The file cannot be read or is malformed; the error names the place.
     pub fn open(path: &Path) -> Result<Self> {
         Self::from_container(Container::open(path)?)
     }
@@ -184,15 +184,15 @@ impl Raytrace {
     /// Reads a trace from memory.
     ///
     /// # Errors
-    /// When the bytes are malformed.
+    /// The bytes are malformed.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
         Self::from_container(Container::from_bytes(bytes)?)
     }
 
-    /// Reads tables and index of an open container, and checks everything but what the tiles hold.
+    /// Reads tables and index of an open container, and checks everything except the content of the tiles.
     ///
     /// # Errors
-    /// When it is malformed, or of another kind.
+    /// The container is malformed, or of the other kind.
     pub fn from_container(container: Container) -> Result<Self> {
         container.expect_kind(Kind::Raytrace)?;
         let tables = tables::read(&container)?;
@@ -230,24 +230,24 @@ impl Raytrace {
         &self.container
     }
 
-    /// CRC-32 of the content, which names the trace in results: the same for captures by another
-    /// program, driver or path (FORMAT.md).
+    /// CRC-32 of the content, which identifies the trace in results. It does not depend on the program,
+    /// driver and path of the capture (FORMAT.md).
     #[must_use]
     pub fn content_checksum(&self) -> u32 {
         self.container.content_checksum(tables::META)
     }
 
-    /// Rays of a tile as the index says; 0 for a tile that is not there.
+    /// Number of rays of a tile from the index; 0 for a missing tile.
     #[must_use]
     pub fn tile_rays(&self, eye: Eye, tile: u32) -> u32 {
         self.entry(eye, tile).map_or(0, |entry| entry.rays)
     }
 
-    /// Decodes a tile of an eye into `out`, whose memory is reused. Tiles are numbered row by row
-    /// from the top left. May be called from many threads.
+    /// Decodes a tile of an eye into `out`, reusing its memory. Tiles are numbered row by row from the top
+    /// left. May be called from many threads.
     ///
     /// # Errors
-    /// When there is no such tile, or its bytes are damaged; `out` is then empty.
+    /// There is no such tile, or its bytes are damaged; `out` is then empty.
     pub fn decode_tile(&self, eye: Eye, tile: u32, out: &mut RayTile) -> Result<()> {
         out.clear();
         let entry = self.entry(eye, tile)?;
@@ -307,8 +307,7 @@ fn tile_numbers(tables: &RaytraceTables) -> impl Iterator<Item = u32> + use<> {
     (0..tiles).chain(0..tiles)
 }
 
-/// Checks that a tile's bytes and rays are enough for its samples, before anything is allocated
-/// for these.
+/// Checks that a tile's bytes and rays are enough for its samples, before any allocation.
 fn check_entry(
     tables: &RaytraceTables,
     entry: &IndexEntry,

@@ -1,8 +1,8 @@
-//! Half floats (IEEE 754 binary16), in which colours are stored.
+//! Half floats (IEEE 754 binary16), used for colours.
 
 use half::f16;
 
-/// The half float nearest to a value, ties to even; values beyond its range become its largest.
+/// The half float nearest to a value, ties to even; values out of range are clamped to the largest.
 #[must_use]
 pub fn encode(value: f32) -> u16 {
     f16::from_f32(value.clamp(f16::MIN.into(), f16::MAX.into())).to_bits()
@@ -14,7 +14,7 @@ pub fn decode(half: u16) -> f32 {
     f16::from_bits(half).into()
 }
 
-/// A colour as it will be read back.
+/// A colour rounded as it will be read.
 #[must_use]
 pub fn round3(color: [f32; 3]) -> [f32; 3] {
     color.map(|c| decode(encode(if c.is_nan() { 0.0 } else { c })))
@@ -25,7 +25,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_half_survives_both_ways() {
+    fn every_half_is_unchanged_by_decoding_and_encoding() {
         for half in 0..=u16::MAX {
             let value = decode(half);
             if value.is_finite() {
@@ -35,7 +35,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_takes_the_nearest_half_and_the_even_one_of_two() {
+    fn rounding_takes_the_nearest_half_and_ties_to_even() {
         for half in 0..0x7BFFu16 {
             let (low, high) = (decode(half), decode(half + 1));
             let middle = (low + high) / 2.0;
@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn values_beyond_the_range_become_the_largest() {
+    fn values_out_of_range_become_the_largest() {
         assert_eq!(decode(encode(1e9)), 65504.0);
         assert_eq!(decode(encode(f32::NEG_INFINITY)), -65504.0);
         assert_eq!(round3([f32::NAN, 0.5, 2.0]), [0.0, 0.5, 2.0]);

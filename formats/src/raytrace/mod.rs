@@ -1,9 +1,9 @@
-//! The ray trace (`.raytrace`): its data model.
+//! The data model of the ray trace (`.raytrace`).
 //!
-//! A trace holds one stereo frame: for each eye and each 16x16 tile the pixels row by row, and for
-//! each pixel its primary hit, its colour and the tree of rays that it spawned with what each ray
-//! cost in the bounding volume hierarchy. Lengths are metres; positions are `f32` relative to
-//! [`RaytraceMeta::origin`], so that a scene far from the world's origin loses no precision.
+//! A trace holds one stereo frame. For each eye and each 16x16 tile it has the pixels row by row. Each
+//! pixel has its primary hit, its colour and the tree of its rays, with the cost of each ray in the
+//! bounding volume hierarchy. Lengths are metres. Positions are `f32` relative to [`RaytraceMeta::origin`],
+//! so that a scene far from the world's origin loses no precision.
 
 pub mod camera;
 mod codec;
@@ -25,7 +25,7 @@ pub use file::{
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// What the whole trace says about itself.
+/// Description of the whole trace.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RaytraceMeta {
     /// Scene, camera, HMD, eye matrices, tool and command line; `backend` is `rays` and `driver`
@@ -33,46 +33,46 @@ pub struct RaytraceMeta {
     pub trace: TraceMeta,
     /// World position that every position of the trace is relative to, metres.
     pub origin: [f64; 3],
-    /// Left and right eye, relative to `origin`: what rays are made of.
+    /// Cameras of the left and right eye, relative to `origin`; rays are computed from them.
     pub eyes: [EyeCamera; 2],
     /// Levels of secondary rays: a primary ray has depth 0, the deepest reflection `max_depth`.
     pub max_depth: u32,
-    /// Samples per pixel; a tile holds this many records a pixel.
+    /// Samples per pixel; a tile holds this many records per pixel.
     pub samples_per_px: u32,
-    /// True where every ray lists the nodes and triangles that it visited.
+    /// Whether every ray lists the nodes and triangles that it visited.
     pub has_visits: bool,
-    /// Radiance of the sky and of the ground below the horizon, linear RGB: what a miss sees and
-    /// what lights surfaces evenly.
+    /// Radiance of the sky and of the ground below the horizon, linear RGB. Misses see it, and it is the
+    /// ambient light.
     pub sky: [[f32; 3]; 2],
 }
 
-/// What a material does to a ray.
+/// Effects of a material on a ray.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RayMaterial {
     /// Name for reports.
     pub name: String,
-    /// Scatters light: has a view-independent part.
+    /// Whether it scatters light, that is, has a view-independent part.
     pub diffuse: bool,
-    /// Spawns reflection rays.
+    /// Whether it spawns reflection rays.
     pub mirror: bool,
-    /// Spawns refraction rays (glass, or a blended surface that lets rays pass straight on).
+    /// Whether it spawns refraction rays (glass, or a blended surface that rays pass straight through).
     pub glass: bool,
-    /// Has a specular highlight.
+    /// Whether it has a specular highlight.
     pub glossy: bool,
-    /// May have texels through which rays go on: below the cutoff of an alpha mask, or below
-    /// 1/255 of a blended surface.
+    /// Whether rays pass through some of its texels: below the cutoff of an alpha mask, or below 1/255 of a
+    /// blended surface.
     pub alpha_masked: bool,
 }
 
 impl RayMaterial {
-    /// True where the colour depends on where it is seen from.
+    /// Whether the colour depends on the viewpoint.
     #[must_use]
     pub fn view_dependent(&self) -> bool {
         self.mirror || self.glass || self.glossy
     }
 }
 
-/// A light; one shadow ray goes to each from every shaded hit that faces it.
+/// A light. Every shaded hit that faces it casts one shadow ray.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum RayLight {
@@ -92,7 +92,7 @@ pub enum RayLight {
     },
 }
 
-/// A triangle that a primary ray of either eye hit: enough to intersect it again.
+/// A triangle hit by a primary ray of either eye, with the data to intersect it again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RayTriangle {
     /// Primitive number: triangles of all instances in submission order.
@@ -115,11 +115,11 @@ impl RayTriangle {
     }
 }
 
-/// How rays walk the hierarchy, hence what a step is.
+/// Traversal of the hierarchy, which defines a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TraversalKind {
-    /// Binary tree; a step tests both children's boxes, as T&I unit 2.0 does.
+    /// Binary tree; a step tests both children's boxes, as in T&I unit 2.0.
     Bvh2,
     /// Eight-wide tree; a step tests all children's boxes.
     Bvh8,
@@ -132,11 +132,11 @@ pub struct BvhSummary {
     pub builder: String,
     /// Pinned build settings, name and value.
     pub settings: Vec<(String, String)>,
-    /// Tree walked.
+    /// The traversed tree.
     pub traversal: TraversalKind,
     /// Triangles in the tree.
     pub triangles: u64,
-    /// Inner nodes of the tree walked; a step reads one.
+    /// Inner nodes of the traversed tree; a step reads one.
     pub nodes: u64,
     /// Leaves.
     pub leaves: u64,
@@ -151,7 +151,7 @@ pub struct BvhSummary {
 }
 
 impl BvhSummary {
-    /// Byte address of a visit when nodes lie from 0 and triangles, in leaf order, behind them.
+    /// Byte address of a visit; nodes start at 0, and triangles follow them in leaf order.
     #[must_use]
     pub fn address(&self, visit: Visit) -> u64 {
         match visit {
@@ -163,7 +163,7 @@ impl BvhSummary {
         }
     }
 
-    /// Bytes that a visit reads.
+    /// Number of bytes that a visit reads.
     #[must_use]
     pub fn visit_bytes(&self, visit: Visit) -> u32 {
         match visit {
@@ -193,7 +193,7 @@ impl std::fmt::Display for RayKind {
     }
 }
 
-/// Why a ray was cast.
+/// Kinds of rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
@@ -209,7 +209,7 @@ pub enum RayKind {
     Refraction = 3,
 }
 
-/// How a ray ended.
+/// Results of rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
@@ -219,7 +219,7 @@ pub enum Outcome {
     Miss = 0,
     /// Found its closest hit.
     Hit = 1,
-    /// A shadow ray that something blocks.
+    /// A shadow ray that is blocked.
     Occluded = 2,
 }
 
@@ -229,17 +229,17 @@ pub const NO_PARENT: u32 = u32::MAX;
 /// One ray and its cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RayRecord {
-    /// Why it was cast.
+    /// Kind of the ray.
     pub kind: RayKind,
-    /// How it ended.
+    /// Result of the ray.
     pub outcome: Outcome,
     /// 0 for a primary ray; a secondary ray has its parent's depth plus 1.
     pub depth: u8,
-    /// Index, among the same pixel's rays, of the ray whose hit spawned it; less than its own.
+    /// Index, among the same pixel's rays, of the ray whose hit spawned it; less than its own index.
     /// [`NO_PARENT`] for a primary ray.
     #[serde(serialize_with = "parent_or_null")]
     pub parent: u32,
-    /// Inner nodes visited ([`TraversalKind`] says what one step tests).
+    /// Inner nodes visited ([`TraversalKind`] defines a step).
     pub steps: u32,
     /// Triangles tested.
     pub triangle_tests: u32,
@@ -254,7 +254,7 @@ fn parent_or_null<S: serde::Serializer>(parent: &u32, out: S) -> Result<S::Ok, S
 }
 
 impl RayRecord {
-    /// Entries that the ray has in [`RayTile::visits`], where the trace holds visits.
+    /// Number of entries of the ray in [`RayTile::visits`], if the trace has visits.
     #[must_use]
     pub fn visit_count(&self) -> u64 {
         u64::from(self.steps) + u64::from(self.triangle_tests)
@@ -283,8 +283,8 @@ pub struct Hit {
 }
 
 impl Hit {
-    /// The hit of a primary ray `t` metres along a unit direction from an eye; what a trace does
-    /// not store follows from the triangle.
+    /// The hit of a primary ray at `t` metres along a unit direction from an eye. Values that the trace
+    /// does not store are computed from the triangle.
     #[must_use]
     pub fn new(
         eye: &EyeCamera,
@@ -309,20 +309,20 @@ impl Hit {
     }
 }
 
-/// One pixel (one sample of it where there are several).
+/// One pixel, or one sample of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelRecord {
-    /// Primary hit, or `None` where the sky is seen.
+    /// Primary hit, or `None` if the ray misses.
     pub hit: Option<Hit>,
-    /// Radiance that does not change with the viewpoint: diffuse with shadows, ambient, emitted;
-    /// for a miss nothing. Linear RGB, rounded to half floats.
+    /// Radiance that does not depend on the viewpoint: diffuse light with shadows, ambient light, emission;
+    /// zero for a miss. Linear RGB, rounded to half floats.
     pub view_independent: [f32; 3],
-    /// Radiance that does: highlights, reflection, refraction, sky. Linear RGB, rounded to half
-    /// floats.
+    /// Radiance that depends on the viewpoint: highlights, reflection, refraction, sky. Linear RGB, rounded
+    /// to half floats.
     pub view_dependent: [f32; 3],
-    /// First of its rays in [`RayTile::rays`]: its primary ray.
+    /// Index of its first ray, the primary ray, in [`RayTile::rays`].
     pub first_ray: u32,
-    /// Number of its rays, at least 1; parents before children.
+    /// Number of its rays, at least 1; parents come before children.
     pub ray_count: u32,
 }
 
@@ -341,17 +341,17 @@ pub struct RayTile {
     pub origin_px: [u32; 2],
     /// Width and height in pixels; less than 16 at the right and bottom edge of some images.
     pub size_px: [u32; 2],
-    /// Records row by row, `samples_per_px` a pixel.
+    /// Records row by row, `samples_per_px` per pixel.
     pub pixels: Vec<PixelRecord>,
     /// Rays of all pixels, in pixel order.
     pub rays: Vec<RayRecord>,
-    /// Visits of all rays in ray order, [`RayRecord::visit_count`] each, in the order made; empty
-    /// where the trace has none.
+    /// Visits of all rays in ray order, [`RayRecord::visit_count`] each, in execution order; empty if the
+    /// trace has none.
     pub visits: Vec<Visit>,
 }
 
 impl RayTile {
-    /// Empties the tile, keeping its memory for the next one.
+    /// Empties the tile and keeps its memory for the next one.
     pub fn clear(&mut self) {
         self.origin_px = [0; 2];
         self.size_px = [0; 2];
@@ -360,7 +360,7 @@ impl RayTile {
         self.visits.clear();
     }
 
-    /// Rays of a pixel, its primary ray first; empty for a pixel that is not of this tile.
+    /// Rays of a pixel, its primary ray first; empty for a pixel of another tile.
     #[must_use]
     pub fn rays_of(&self, pixel: &PixelRecord) -> &[RayRecord] {
         let first = pixel.first_ray as usize;
@@ -370,23 +370,23 @@ impl RayTile {
     }
 }
 
-/// Everything in a trace but its tiles.
+/// Everything in a trace except its tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RaytraceTables {
     /// Description and eyes.
     pub meta: RaytraceMeta,
-    /// The hierarchy that was walked.
+    /// The traversed hierarchy.
     pub bvh: BvhSummary,
     /// Materials.
     pub materials: Vec<RayMaterial>,
     /// Lights.
     pub lights: Vec<RayLight>,
-    /// Triangles that primary rays of either eye hit, by ascending primitive number.
+    /// Triangles hit by primary rays of either eye, by ascending primitive number.
     pub triangles: Vec<RayTriangle>,
 }
 
 impl RaytraceTables {
-    /// The triangle of a primitive that a primary ray hit.
+    /// The triangle of a primitive, if a primary ray hit it.
     #[must_use]
     pub fn triangle(&self, primitive: u32) -> Option<&RayTriangle> {
         let at = self

@@ -1,4 +1,4 @@
-//! Unit vectors in 2 x 16 bits: the octahedral map (Cigolle et al., JCGT 2014).
+//! Unit vectors in 2 x 16 bits, encoded by the octahedral map (Cigolle et al., JCGT 2014).
 
 /// The code of a unit vector.
 #[must_use]
@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_normal_comes_back_within_a_ten_thousandth() {
+    fn a_normal_is_decoded_within_a_ten_thousandth() {
         for i in 0..10_000u32 {
             // Points spread evenly over the sphere.
             let z = 1.0 - 2.0 * (i as f32 + 0.5) / 10_000.0;

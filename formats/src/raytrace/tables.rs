@@ -27,13 +27,13 @@ pub const TRIANGLES: ChunkTag = ChunkTag(*b"RTRI");
 
 /// Bytes of a triangle: primitive, object, material, nine coordinates.
 pub const TRIANGLE_ENTRY_BYTES: usize = 48;
-/// Most samples of a pixel.
+/// Maximum number of samples per pixel.
 pub const MAX_SAMPLES_PER_PX: u32 = 1024;
-/// Deepest reflection.
+/// Maximum depth of reflections.
 pub const MAX_DEPTH: u32 = 64;
-/// Largest coordinate of a vertex or an eye, to either side, in metres.
+/// Largest absolute coordinate of a vertex or an eye in metres.
 pub const MAX_COORDINATE_M: f32 = 1e18;
-/// Largest node and largest triangle in memory.
+/// Largest size of a node or a triangle in memory.
 pub const MAX_ENTRY_BYTES: u32 = 4096;
 
 /// Writes the table chunks.
@@ -107,10 +107,10 @@ fn read_triangle(input: &[u8]) -> Parsed<'_, RayTriangle> {
     Ok((rest, triangle))
 }
 
-/// Chunk of a rule that is broken, and the byte in it.
+/// Chunk and byte of a violated rule.
 type At = (ChunkTag, u64);
 
-/// Checks each table and what ties them together.
+/// Checks each table and the references between them.
 fn check(tables: &RaytraceTables) -> std::result::Result<(), (At, Broken)> {
     check_meta(&tables.meta).map_err(|broken| ((META, 0), broken))?;
     check_bvh(&tables.bvh).map_err(|broken| ((BVH, 0), broken))?;

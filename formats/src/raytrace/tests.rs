@@ -1,4 +1,4 @@
-//! The file: round trip, damage, and what must not be written.
+//! Tests of the file: round trip, damage, and data that must not be written.
 
 use super::*;
 use crate::error::FormatError;
@@ -109,7 +109,7 @@ fn tables(has_visits: bool) -> RaytraceTables {
     }
 }
 
-/// A made-up tile that obeys the format, from numbers that decide everything about it.
+/// A generated tile that obeys the format and depends only on the arguments.
 fn tile(tables: &RaytraceTables, eye: Eye, number: u32, seed: u64) -> RayTile {
     let mut state = seed | 1;
     let mut next = |below: u32| {
@@ -205,7 +205,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn tables_and_tiles_come_back(seed in any::<u64>(), has_visits in any::<bool>()) {
+    fn tables_and_tiles_are_read_as_written(seed in any::<u64>(), has_visits in any::<bool>()) {
         let tables = tables(has_visits);
         let seed = seed >> 8;
         let trace = Raytrace::from_bytes(file(&tables, seed)).expect("opens");
@@ -251,7 +251,7 @@ proptest! {
         };
         let at = (at * bytes.len() as f64) as usize;
         bytes[at] = value;
-        // Either outcome is fine; a panic or an endless loop is not.
+        // Either result is fine, as long as it neither panics nor loops endlessly.
         let _ = codec::decode(&tables, tables.camera(Eye::Left), &bytes, &mut whole);
     }
 }
@@ -269,7 +269,7 @@ fn read_all(bytes: Vec<u8>) -> crate::Result<()> {
 fn a_damaged_tile_is_named_by_file_chunk_and_byte() {
     let tables = tables(false);
     let mut bytes = file(&tables, 3);
-    // The tiles are the first chunk, right behind the header.
+    // The tiles are the first chunk after the header.
     bytes[crate::container::HEADER_BYTES + 5] ^= 1;
     let error = read_all(bytes).expect_err("damaged");
     let text = error.to_string();
@@ -286,7 +286,7 @@ fn a_tile_beyond_the_last_is_refused() {
 }
 
 #[test]
-fn tiles_that_break_the_format_are_not_written() {
+fn tiles_that_violate_the_format_are_not_written() {
     let tables = tables(true);
     let good = tile(&tables, Eye::Left, 0, 9);
     let text = |change: &dyn Fn(&mut RayTile)| {
@@ -350,7 +350,7 @@ fn triangles_out_of_order_or_without_a_material_are_refused() {
 }
 
 #[test]
-fn addresses_put_triangles_behind_nodes() {
+fn triangles_have_addresses_after_the_nodes() {
     let bvh = tables(false).bvh;
     assert_eq!(bvh.address(Visit::Node(3)), 192);
     assert_eq!(bvh.address(Visit::Triangle(2)), 17 * 64 + 80);

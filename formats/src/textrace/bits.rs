@@ -3,7 +3,7 @@
 /// Zero bytes after the last bit, so that a reader can always load eight bytes at once.
 pub const PADDING_BYTES: usize = 8;
 
-/// Most bits that [`BitReader::peek`] is sure to hold.
+/// Minimum number of bits that [`BitReader::peek`] returns.
 pub(in crate::textrace) const PEEK_BITS: u32 = 57;
 
 /// Appends bits to bytes.
@@ -76,12 +76,12 @@ impl<'a> BitReader<'a> {
         self.bit += count as usize;
     }
 
-    /// The bytes that no read bit lies in.
+    /// The bytes of which no bit was read.
     pub(in crate::textrace) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.bytes_read()..).unwrap_or_default()
     }
 
-    /// The bits between the last one read and the end of its byte.
+    /// The bits between the last read bit and the end of its byte.
     pub(in crate::textrace) fn left_in_byte(&self) -> u8 {
         let byte = self.bytes.get(self.bit >> 3);
         match self.bit & 7 {
@@ -90,7 +90,7 @@ impl<'a> BitReader<'a> {
         }
     }
 
-    /// Bytes of which at least a bit was read, some of them perhaps beyond the end.
+    /// Number of bytes with at least one read bit; may exceed the length of the input.
     pub(in crate::textrace) fn bytes_read(&self) -> usize {
         self.bit.div_ceil(8)
     }

@@ -1,4 +1,4 @@
-//! The tile index: where each tile's bytes are and what they hold.
+//! The tile index: position, size and encoding of each tile.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::Encoding;
@@ -11,21 +11,21 @@ use nom::number::complete::{le_u32, le_u64};
 /// Size of an index entry.
 pub const INDEX_ENTRY_BYTES: usize = 32;
 
-/// One entry of the index; all zero but for the encoding where nothing touched the tile.
+/// One entry of the index. For an untouched tile, all fields except the encoding are zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct IndexEntry {
-    /// Where the tile lies.
+    /// Position of the tile.
     pub span: TileSpan,
     /// Quad records.
     pub records: u32,
     /// Primitive runs.
     pub runs: u32,
-    /// How the bytes are encoded.
+    /// Encoding of the bytes.
     pub encoding: Encoding,
 }
 
 impl IndexEntry {
-    /// Where the tile lies, if anything touched it.
+    /// Position of the tile, if it is touched.
     pub(super) fn touched(&self) -> Option<TileSpan> {
         (self.records > 0).then_some(self.span)
     }
@@ -57,7 +57,7 @@ impl IndexEntry {
             ensure(
                 input,
                 (span, records, runs) == Default::default(),
-                || "an untouched tile's entry to be zero but for its encoding".to_owned(),
+                || "an untouched tile's entry to be zero except its encoding".to_owned(),
                 format_args!(
                     "{} bytes at {}, {records} records, {runs} runs",
                     span.bytes, span.offset

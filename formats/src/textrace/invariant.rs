@@ -1,4 +1,4 @@
-//! What must hold for every tile, whoever writes it and however it was encoded.
+//! The invariants of every tile, independent of writer and encoding.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{Draw, NO_GROUP, QuadRecord, Tile};
@@ -34,7 +34,7 @@ pub(super) const QUAD_POSITIONS: [(u8, u8); 64] = {
     positions
 };
 
-/// Checks a whole tile against the draw table.
+/// Checks a tile against the draw table.
 pub(super) fn check(draws: &[Draw], tile: &Tile) -> Result<(), Broken> {
     let mut records = tile.records.as_slice();
     let mut first = 0u32;

@@ -1,9 +1,9 @@
-//! The texture-address trace (`.textrace`): its data model, and reading and writing it.
+//! The texture-address trace (`.textrace`): its data model, and reading and writing.
 //!
-//! A trace holds, for every pass (one view of one frame), for every 16x16 tile, the primitives in
-//! submission order, and for each primitive the covered 2x2 quads with the texture coordinates of
-//! every uv group that its draw samples. Addresses are not stored: they follow from the texture
-//! table and from the layout that replay chooses.
+//! A trace has passes (one view of one frame), which consist of 16x16 tiles. A tile has its primitives in
+//! submission order, and each primitive has its covered 2x2 quads with the texture coordinates of every uv
+//! group that its draw samples. Addresses are not stored: replay computes them from the texture table and
+//! the chosen layout.
 
 mod bits;
 mod delta;
@@ -29,10 +29,10 @@ use crate::texture::{Sampler, Texture};
 use crate::view::{Eye, FrameViews, Hmd};
 use serde::{Deserialize, Serialize};
 
-/// Fixed-point steps per texel of a group's `extent` in which uv, dx, dy and cross are stored.
+/// Fixed-point steps per texel of a group's `extent`, for uv, dx, dy and cross.
 ///
-/// A lane's coordinate is the sum of at most four rounded terms, so it is exact to
-/// `4 * 0.5 / 2048` = 1/1024 texel.
+/// A lane's coordinate is the sum of at most four rounded terms, so its error is at most `4 * 0.5 / 2048` =
+/// 1/1024 texel.
 pub const SUBTEXELS: i32 = 2048;
 
 /// The tile index: one fixed-size entry for every tile of every pass.
@@ -40,17 +40,17 @@ pub const TILE_INDEX: ChunkTag = ChunkTag(*b"TIDX");
 /// The encoded tiles, in index order.
 pub const TILES: ChunkTag = ChunkTag(*b"TILE");
 
-/// How a tile's bytes are encoded. Each tile names its own.
+/// Encoding of a tile's bytes. Each tile names its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum Encoding {
-    /// Records as they are in memory.
+    /// Records as in memory.
     Raw = 0,
     /// Bit-packed differences from a linear prediction.
     #[default]
     Delta = 1,
-    /// A plane for each primitive, and what quads leave over.
+    /// A plane for each primitive, and the residuals of its quads.
     Planes = 3,
 }
 
@@ -64,7 +64,7 @@ impl Encoding {
             .find(|encoding| *encoding as u64 == id)
     }
 
-    /// Most records that `bytes` bytes can hold, however well they compress.
+    /// Maximum number of records in `bytes` bytes, at the best compression.
     fn most_records(self, bytes: u32) -> u64 {
         match self {
             Self::Raw => u64::from(bytes) / raw::RECORD_BYTES as u64,
@@ -74,14 +74,14 @@ impl Encoding {
     }
 }
 
-/// The whole description of a trace but for its quads.
+/// The description of a trace: everything except its tables and tiles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TraceMeta {
     /// Program and version that wrote the trace, `tracegen 0.1.0`.
     pub tool: String,
-    /// Its arguments without the output paths, so that the same capture gives the same bytes.
+    /// Its arguments without the output paths, so that equal captures have equal bytes.
     pub command_line: Vec<String>,
-    /// Scene name or path as given.
+    /// Scene name or path as given on the command line.
     pub scene: String,
     /// Triangles in the scene, instances counted.
     pub scene_triangles: u64,
@@ -89,46 +89,46 @@ pub struct TraceMeta {
     pub camera: String,
     /// Capture backend, `lavapipe` or `osmesa`.
     pub backend: String,
-    /// Driver string as it names itself.
+    /// Driver string, as reported by the driver.
     pub driver: String,
-    /// Seed of whatever was random in the capture.
+    /// Seed of all random numbers of the capture.
     pub seed: u64,
     /// The display.
     pub hmd: Hmd,
     /// Eye matrices by frame, relative to `origin_m`.
     pub frames: Vec<FrameViews>,
-    /// What the recorded fragments say of what is seen; older traces do not tell.
+    /// Properties of the recorded fragments; missing in older traces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surfaces: Option<Surfaces>,
-    /// World position that the eyes' places are relative to, metres: zero but for a scene far out,
-    /// whose coordinates would lose their digits in single precision.
+    /// World position that the eyes' positions are relative to, in metres. Zero except for scenes far from
+    /// the origin, whose coordinates would lose precision in single precision.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub origin_m: [f64; 3],
-    /// What the frames were rendered with, where that was chosen or given by name.
+    /// Techniques of the frames, if they were chosen automatically or given by name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub techniques: Option<ChosenTechniques>,
 }
 
-/// The techniques of a path's frames, by name.
+/// The techniques of the frames of a path, by name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ChosenTechniques {
-    /// Of each frame, in the order of `frames`.
+    /// Technique of each frame, in the order of `frames`.
     pub frames: Vec<String>,
-    /// The same as `tracegen raster --technique` takes it.
+    /// The same in the syntax of `tracegen raster --technique`.
     pub schedule: String,
-    /// Why they were chosen; absent where a user named them.
+    /// Reason of an automatic choice; absent if a user named the techniques.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub choice: Option<Choice>,
 }
 
-/// What a search was asked for and what it found.
+/// The request and the result of a search.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Choice {
-    /// As asked for: `flip=0.01`.
+    /// The requested budget: `flip=0.01`.
     pub budget: String,
-    /// The cost that is as small as the budget allows: `time`, `fragments`, `bytes` or `energy`.
+    /// The cost that was minimised within the budget: `time`, `fragments`, `bytes` or `energy`.
     pub objective: String,
-    /// In words.
+    /// Explanation.
     pub reason: String,
 }
 
@@ -136,18 +136,18 @@ fn is_zero(origin_m: &[f64; 3]) -> bool {
     *origin_m == [0.0; 3]
 }
 
-/// Which fragments were recorded, and which of them hide what lies behind.
+/// Which fragments were recorded, and which draws are opaque.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Surfaces {
     /// Only fragments that passed the depth test when they were drawn.
     pub depth_tested: bool,
-    /// First and number of draws in a row whose fragments may turn out transparent when they are
-    /// shaded: alpha-masked and blended ones. Ascending and apart.
+    /// Ranges (first and number) of draws whose fragments may be transparent: alpha-masked and blended
+    /// ones. Ascending and disjoint.
     pub not_opaque: Vec<[u32; 2]>,
 }
 
 impl Surfaces {
-    /// Ranges of the draws that are not opaque, from a flag by draw.
+    /// Ranges of the draws that are not opaque, from one flag per draw.
     pub fn ranges(opaque: impl IntoIterator<Item = bool>) -> Vec<[u32; 2]> {
         let mut ranges: Vec<[u32; 2]> = Vec::new();
         for (draw, opaque) in (0..).zip(opaque) {
@@ -204,7 +204,7 @@ impl TraceMeta {
     }
 }
 
-/// What a pass renders.
+/// Kinds of passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
@@ -213,7 +213,7 @@ pub enum PassKind {
     Main = 0,
     /// A layer of a shadow map (texture accesses of alpha-masked casters).
     Shadow = 1,
-    /// A part of the picture of one eye or of both, with a size and matrices of its own.
+    /// A part of the picture of one eye or both, with its own size and matrices.
     Layer = 2,
 }
 
@@ -222,12 +222,12 @@ pub enum PassKind {
 pub struct Pass {
     /// Frame number.
     pub frame: u32,
-    /// What it renders.
+    /// Kind of the pass.
     pub kind: PassKind,
-    /// Eye, or `None` for a pass that belongs to both.
+    /// Eye, or `None` for a pass of both eyes.
     pub eye: Option<Eye>,
-    /// Number of a layer among those of its frame and eye: the left and the right layer of a number
-    /// show the same part. 0 for passes that are no layers.
+    /// Number of a layer within its frame and eye. The left and the right layer with the same number show
+    /// the same part. 0 for passes that are not layers.
     pub layer: u16,
     /// Width and height in pixels.
     pub size_px: [u32; 2],
@@ -236,7 +236,7 @@ pub struct Pass {
 }
 
 impl Pass {
-    /// The pass shows what eyes see: all but shadow maps.
+    /// Whether the pass is visible to an eye, that is, not a shadow map.
     #[must_use]
     pub fn is_seen(&self) -> bool {
         self.kind != PassKind::Shadow
@@ -248,13 +248,13 @@ impl Pass {
         self.tiles[0] * self.tiles[1]
     }
 
-    /// Number of tiles of a pass that has not been checked.
+    /// Number of tiles of an unchecked pass.
     pub(crate) fn tile_count_u64(&self) -> u64 {
         u64::from(self.tiles[0]) * u64::from(self.tiles[1])
     }
 }
 
-/// One texture read that a draw makes per fragment.
+/// One texture read per fragment of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sample {
     /// Index into the texture table.
@@ -267,11 +267,11 @@ pub struct Sample {
     pub offset: [i8; 2],
 }
 
-/// Textures that one draw samples at the same texture coordinates: one quad record serves all.
+/// Textures that one draw samples at the same texture coordinates; one quad record serves all.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UvGroup {
-    /// Texels per unit of u and v that define the fixed-point step `1 / (SUBTEXELS * extent)`:
-    /// the largest level-0 size among the group's textures, by axis.
+    /// Texels per unit of u and v that define the fixed-point step `1 / (SUBTEXELS * extent)`: by axis, the
+    /// largest level-0 size among the group's textures.
     pub extent: [u32; 2],
     /// The samples, in shader order.
     pub samples: Vec<Sample>,
@@ -282,24 +282,23 @@ pub struct UvGroup {
 pub struct Draw {
     /// Material name for reports.
     pub material: String,
-    /// Global number of its first primitive: primitive `p` of the draw is `first_primitive + p`
-    /// in every pass, so both eyes name the same triangle alike.
+    /// Global number of its first primitive. Primitive `p` of the draw is `first_primitive + p` in every
+    /// pass, so a triangle has the same number in both eyes.
     pub first_primitive: u32,
     /// Number of primitives.
     pub primitives: u32,
-    /// What it samples; at most 15 groups. Empty for an untextured draw, whose quads are still
-    /// recorded (with no group) because they take shader time.
+    /// Sampled groups, at most 15. Empty for an untextured draw, whose quads are recorded (without group)
+    /// because they take shader time.
     pub groups: Vec<UvGroup>,
 }
 
-/// Group number of the record of a quad that samples nothing.
+/// Group number in the record of a quad without samples.
 pub const NO_GROUP: u8 = 15;
 
 /// One covered quad of one primitive and its coordinates in one uv group.
 ///
-/// A quad with several groups is several consecutive records with the same position, groups
-/// ascending; a shadow-mapped quad that straddles two cascades has one record per cascade, each
-/// with the lanes that use it.
+/// A quad with several groups has several consecutive records with the same position and ascending groups.
+/// A shadow-mapped quad in two cascades has one record per cascade, each with the lanes that use it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct QuadRecord {
@@ -307,8 +306,8 @@ pub struct QuadRecord {
     pub x: u8,
     /// Quad row in the tile, 0 to 7.
     pub y: u8,
-    /// Covered lanes that take this sample: bit 0 top left, 1 top right, 2 bottom left, 3 bottom
-    /// right. Never 0.
+    /// Covered lanes that take this sample: bit 0 top left, 1 top right, 2 bottom left, 3 bottom right.
+    /// Never 0.
     pub mask: u8,
     /// Index into the draw's groups, or `NO_GROUP`.
     pub group: u8,
@@ -364,14 +363,14 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// Empties the tile, keeping its memory for the next one.
+    /// Empties the tile and keeps its memory for the next one.
     pub fn clear(&mut self) {
         self.runs.clear();
         self.records.clear();
     }
 }
 
-/// The tables of a trace: everything that is needed to turn a record into texel addresses.
+/// The tables of a trace: everything needed to compute texel addresses from a record.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tables {
     /// Description.

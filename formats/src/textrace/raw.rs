@@ -1,5 +1,5 @@
-//! Encoding 0: runs and records as they are in memory. For debugging, and as the twin that the
-//! compact encodings are tested against.
+//! Encoding 0: runs and records as in memory. For debugging, and as reference in tests of the compact
+//! encodings.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{PrimitiveRun, QuadRecord, Tile};

@@ -1,4 +1,4 @@
-//! Reading a `.textrace`: tables at once, tiles one by one from any thread.
+//! Reads a `.textrace`: tables at once, tiles one by one from any thread.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::geometry::{self, Geometry, TileLists};
@@ -14,10 +14,10 @@ use nom::Parser;
 use nom::multi::count;
 use std::path::Path;
 
-/// Most records that memory is set aside for before any was read.
+/// Maximum number of records for which memory is reserved before decoding.
 const MOST_RESERVED: u32 = 1 << 16;
 
-/// What the index says about a tile.
+/// Figures of a tile from the index.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileStats {
     /// Quad records.
@@ -28,7 +28,7 @@ pub struct TileStats {
     pub bytes: u32,
 }
 
-/// An opened texture-address trace.
+/// An open texture-address trace.
 #[derive(Debug)]
 pub struct Textrace {
     container: Container,
@@ -43,7 +43,7 @@ impl Textrace {
     /// Maps a trace and reads its tables and index.
     ///
     /// # Errors
-    /// When the file cannot be read or is malformed; the error names the place.
+    /// The file cannot be read or is malformed; the error names the place.
     pub fn open(path: &Path) -> Result<Self> {
         Self::from_container(Container::open(path)?)
     }
@@ -51,15 +51,15 @@ impl Textrace {
     /// Reads a trace from memory.
     ///
     /// # Errors
-    /// When the bytes are malformed.
+    /// The bytes are malformed.
     pub fn from_bytes(bytes: Vec<u8>) -> Result<Self> {
         Self::from_container(Container::from_bytes(bytes)?)
     }
 
-    /// Reads tables and index of an open container, and checks everything but what the tiles hold.
+    /// Reads tables and index of an open container, and checks everything except the content of the tiles.
     ///
     /// # Errors
-    /// When it is malformed, or of another kind.
+    /// The container is malformed, or of the other kind.
     pub fn from_container(container: Container) -> Result<Self> {
         container.expect_kind(Kind::Textrace)?;
         let tables = tables::read(&container)?;
@@ -84,7 +84,7 @@ impl Textrace {
             .iter()
             .map(|pass| {
                 let first = next;
-                // Cannot overflow: the sum was compared with the index's size above.
+                // Cannot overflow, because the sum was compared with the index's size above.
                 next += usize::try_from(pass.tile_count_u64()).unwrap_or(0);
                 first
             })
@@ -99,7 +99,7 @@ impl Textrace {
         })
     }
 
-    /// Meshes and views, in a trace that was captured with geometry.
+    /// Meshes and views, if the trace was captured with geometry.
     #[must_use]
     pub fn geometry(&self) -> Option<&Geometry> {
         self.geometry.as_ref()
@@ -108,7 +108,7 @@ impl Textrace {
     /// The primitive lists of a view of [`Self::geometry`].
     ///
     /// # Errors
-    /// When there is no such view, or its bytes are damaged.
+    /// There is no such view, or its bytes are damaged.
     pub fn tile_lists(&self, view: usize) -> Result<TileLists> {
         let views = self.geometry.as_ref();
         let found =
@@ -136,14 +136,14 @@ impl Textrace {
         &self.container
     }
 
-    /// CRC-32 of the content, which names the trace in results: the same for captures by another
-    /// program, driver or path (FORMAT.md).
+    /// CRC-32 of the content, which identifies the trace in results. It does not depend on the program,
+    /// driver and path of the capture (FORMAT.md).
     #[must_use]
     pub fn content_checksum(&self) -> u32 {
         self.container.content_checksum(tables::META)
     }
 
-    /// What the index says about a tile; zero for one that nothing touched or that is not there.
+    /// Figures of a tile from the index; zero for an untouched or missing tile.
     #[must_use]
     pub fn tile_stats(&self, pass: usize, tile: usize) -> TileStats {
         self.entry(pass, tile).map_or_else(
@@ -156,7 +156,7 @@ impl Textrace {
         )
     }
 
-    /// Quad records of all tiles.
+    /// Number of quad records of all tiles.
     #[must_use]
     pub fn records(&self) -> u64 {
         let passes = (0..).zip(&self.tables().passes);
@@ -167,18 +167,18 @@ impl Textrace {
         tiles.map(u64::from).sum()
     }
 
-    /// How a tile is encoded.
+    /// Encoding of a tile.
     ///
     /// # Errors
-    /// When there is no such tile.
+    /// There is no such tile.
     pub fn tile_encoding(&self, pass: usize, tile: usize) -> Result<Encoding> {
         Ok(self.entry(pass, tile)?.encoding)
     }
 
-    /// Decodes a tile into `out`, whose memory is reused. May be called from many threads.
+    /// Decodes a tile into `out`, reusing its memory. May be called from many threads.
     ///
     /// # Errors
-    /// When there is no such tile, or its bytes are damaged; `out` is then empty.
+    /// There is no such tile, or its bytes are damaged; `out` is then empty.
     pub fn decode_tile(&self, pass: usize, tile: usize, out: &mut Tile) -> Result<()> {
         out.clear();
         let entry = self.entry(pass, tile)?;
@@ -194,7 +194,7 @@ impl Textrace {
 
     fn decode_entry(&self, entry: &IndexEntry, out: &mut Tile) -> Result<()> {
         let IndexEntry { runs, records, .. } = *entry;
-        // Records of a few bits can be many; more than a usual tile's take memory as they come.
+        // Small records can be numerous. Beyond the size of a usual tile, memory grows while decoding.
         out.runs.reserve(runs.min(MOST_RESERVED) as usize);
         out.records.reserve(records.min(MOST_RESERVED) as usize);
         tile_chunk(&self.container).parse(&entry.span, |input| match entry.encoding {

@@ -40,15 +40,15 @@ pub const SAMPLE_BYTES: usize = 10;
 /// Bytes of a pass.
 pub const PASS_BYTES: usize = 24;
 
-/// Most groups a draw may have; the next number means "no group".
+/// Maximum number of groups per draw; the next number means "no group".
 pub const MAX_GROUPS: usize = super::NO_GROUP as usize;
 /// Largest width and height of a texture in texels.
 pub const MAX_TEXTURE_SIZE: u32 = 1 << 16;
-/// Most array layers of a texture.
+/// Maximum number of array layers of a texture.
 pub const MAX_LAYERS: u32 = 1 << 16;
-/// Minor version from which on there are layers.
+/// Minor version that introduced layers.
 const LAYERS_MINOR: u16 = 1;
-/// Id of "both eyes" in a pass.
+/// Number for "both eyes" in a pass.
 const NO_EYE: u8 = 255;
 
 /// Writes the table chunks.
@@ -101,7 +101,7 @@ fn has_layers(tables: &Tables) -> bool {
     (tables.passes.iter()).any(|pass| pass.kind == PassKind::Layer)
 }
 
-/// Checks each table and what ties them together; names the chunk that breaks a rule.
+/// Checks each table and the references between them; the error names the chunk.
 fn check(tables: &Tables) -> std::result::Result<(), (ChunkTag, Broken)> {
     let located = |chunk: ChunkTag| move |broken: Broken| (chunk, broken);
     tables.meta.check().map_err(located(META))?;
@@ -312,7 +312,7 @@ fn read_name(input: &[u8]) -> Parsed<'_, String> {
     }
 }
 
-/// Reads a one-byte or two-byte id of an enum whose values are `all`.
+/// Reads a one-byte or two-byte number of an enum with the values `all`.
 fn id<'a, N: Into<u16> + Copy, E: Copy>(
     what: &'static str,
     mut number: impl Parser<&'a [u8], Output = N, Error = Fault<'a>>,

@@ -113,7 +113,7 @@ fn record() -> impl Strategy<Value = QuadRecord> {
         })
 }
 
-/// Tiles that keep every invariant but are otherwise as wild as can be.
+/// Tiles that obey every invariant with otherwise random content.
 pub(crate) fn tile() -> impl Strategy<Value = Tile> {
     let run = (0..3000u32, prop::collection::vec(record(), 1..12));
     prop::collection::vec(run, 0..20).prop_map(|runs| {
@@ -206,7 +206,7 @@ fn every_truncation_is_refused() {
 }
 
 #[test]
-fn every_flipped_bit_is_noticed() {
+fn every_flipped_bit_is_detected() {
     for whole in Encoding::ALL.map(small) {
         for bit in 0..whole.len() * 8 {
             let mut bytes = whole.clone();
@@ -219,7 +219,7 @@ fn every_flipped_bit_is_noticed() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn tiles_come_back_as_written(a in tile(), b in tile()) {
+    fn tiles_are_read_as_written(a in tile(), b in tile()) {
         for encoding in Encoding::ALL {
             let bytes = write(encoding, &[(0, 1, a.clone()), (1, 5, b.clone())]);
             let trace = Textrace::from_bytes(bytes).unwrap();
@@ -257,7 +257,7 @@ fn draws_that_are_not_opaque_are_ranges_of_the_table() {
 }
 
 #[test]
-fn the_content_checksum_depends_on_what_was_captured_and_not_on_how() {
+fn the_content_checksum_depends_on_the_captured_content_and_not_on_the_capture() {
     let checksum = |edit: fn(&mut Tables)| {
         let mut tables = tables();
         edit(&mut tables);

@@ -1,4 +1,4 @@
-//! Writing a `.textrace`.
+//! Writes a `.textrace`.
 
 use super::geometry::{Geometry, GeometryView, Spool, TileLists};
 use super::index::IndexEntry;
@@ -33,10 +33,10 @@ impl EncodedTile {
     }
 }
 
-/// Encodes a tile in the default encoding. Pure, so that tiles can be encoded in parallel.
+/// Encodes a tile in the default encoding. A pure function, so that tiles can be encoded in parallel.
 ///
 /// # Errors
-/// When the tile breaks an invariant of the format.
+/// The tile violates an invariant of the format.
 pub fn encode_tile(tables: &Tables, tile: &Tile) -> Result<EncodedTile> {
     encode_tile_as(Encoding::default(), tables, tile)
 }
@@ -44,7 +44,7 @@ pub fn encode_tile(tables: &Tables, tile: &Tile) -> Result<EncodedTile> {
 /// Encodes a tile in a chosen encoding.
 ///
 /// # Errors
-/// When the tile breaks an invariant of the format.
+/// The tile violates an invariant of the format.
 pub fn encode_tile_as(encoding: Encoding, tables: &Tables, tile: &Tile) -> Result<EncodedTile> {
     invariant::check(&tables.draws, tile).map_err(Broken::unwritable)?;
     if tile.records.is_empty() {
@@ -76,7 +76,7 @@ pub struct TextraceWriter<W = AtomicFile> {
     container: ContainerWriter<W>,
     tables: Tables,
     index: Vec<IndexEntry>,
-    /// Index slot that the next tile may take at the earliest.
+    /// First index slot that the next tile may have.
     next_slot: usize,
     tile_bytes: u64,
     encoding: Encoding,
@@ -84,10 +84,10 @@ pub struct TextraceWriter<W = AtomicFile> {
 }
 
 impl TextraceWriter<AtomicFile> {
-    /// Starts a trace that [`Self::finish`] renames to `path`.
+    /// Starts a trace; [`Self::finish`] renames it to `path`.
     ///
     /// # Errors
-    /// When the tables break a rule of the format or the file cannot be written.
+    /// The tables violate a rule of the format, or the file cannot be written.
     pub fn create(path: &Path, tables: &Tables) -> Result<Self> {
         Self::start(ContainerWriter::create(path, Kind::Textrace)?, tables)
     }
@@ -95,7 +95,7 @@ impl TextraceWriter<AtomicFile> {
     /// Completes the file. Returns its size in bytes.
     ///
     /// # Errors
-    /// When writing fails; no file is left then.
+    /// Writing failed; no file is left.
     pub fn finish(self) -> Result<u64> {
         self.seal()?.finish()
     }
@@ -105,7 +105,7 @@ impl TextraceWriter<Cursor<Vec<u8>>> {
     /// Starts a trace in memory.
     ///
     /// # Errors
-    /// When the tables break a rule of the format.
+    /// The tables violate a rule of the format.
     pub fn in_memory(tables: &Tables) -> Result<Self> {
         Self::start(ContainerWriter::in_memory(Kind::Textrace)?, tables)
     }
@@ -113,7 +113,7 @@ impl TextraceWriter<Cursor<Vec<u8>>> {
     /// Completes the trace.
     ///
     /// # Errors
-    /// As [`Self::in_memory`].
+    /// See [`Self::in_memory`].
     pub fn into_bytes(self) -> Result<Vec<u8>> {
         self.seal()?.into_bytes()
     }
@@ -140,10 +140,10 @@ impl<W: Write + Seek> TextraceWriter<W> {
         })
     }
 
-    /// Adds geometry: its meshes and draws now, its views by [`Self::append_view`].
+    /// Adds geometry: its meshes and draws now, its views with [`Self::append_view`].
     ///
     /// # Errors
-    /// When they break a rule of the format.
+    /// The geometry violates a rule of the format.
     pub fn with_geometry(mut self, geometry: Geometry) -> Result<Self> {
         self.geometry = Some(Spool::new(geometry, &self.tables)?);
         Ok(self)
@@ -155,11 +155,10 @@ impl<W: Write + Seek> TextraceWriter<W> {
         self.geometry.is_some()
     }
 
-    /// Appends the primitive lists of a view, in the order in which views are rendered. Without geometry they are
-    /// left out.
+    /// Appends the primitive lists of a view, in rendering order. Ignored without geometry.
     ///
     /// # Errors
-    /// When they break a rule of the format, or cannot be kept.
+    /// The lists violate a rule of the format, or cannot be stored.
     pub fn append_view(&mut self, view: GeometryView, lists: &TileLists) -> Result<()> {
         match &mut self.geometry {
             Some(spool) => spool.append(&self.tables, view, lists),
@@ -167,13 +166,13 @@ impl<W: Write + Seek> TextraceWriter<W> {
         }
     }
 
-    /// Chooses how tiles are encoded.
+    /// Sets the encoding of tiles.
     #[must_use]
     pub fn with_encoding(self, encoding: Encoding) -> Self {
         Self { encoding, ..self }
     }
 
-    /// How whoever encodes tiles for [`Self::append`] should.
+    /// The encoding to use for tiles passed to [`Self::append`].
     #[must_use]
     pub fn encoding(&self) -> Encoding {
         self.encoding
@@ -182,17 +181,17 @@ impl<W: Write + Seek> TextraceWriter<W> {
     /// Encodes and appends one tile.
     ///
     /// # Errors
-    /// When the tile breaks an invariant, is out of order, or cannot be written.
+    /// The tile violates an invariant, is out of order, or cannot be written.
     pub fn write_tile(&mut self, pass: usize, tile_index: usize, tile: &Tile) -> Result<()> {
         let encoded = encode_tile_as(self.encoding, &self.tables, tile)?;
         self.append(pass, tile_index, encoded)
     }
 
-    /// Appends an encoded tile. Tiles come in ascending order of pass and tile; tiles that
-    /// nothing touched may be left out.
+    /// Appends an encoded tile. Tiles must be in ascending order of pass and tile; untouched tiles may be
+    /// left out.
     ///
     /// # Errors
-    /// When there is no such tile, it is out of order, or it cannot be written.
+    /// The tile does not exist, is out of order, or cannot be written.
     pub fn append(&mut self, pass: usize, tile_index: usize, tile: EncodedTile) -> Result<()> {
         let unwritable = |expected: String| FormatError::Unwritable {
             what: format!("tile {tile_index} of pass {pass}"),

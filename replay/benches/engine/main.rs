@@ -1,6 +1,6 @@
-//! What each stage of a replay costs on one core, in one table: beside the bandwidth at which this
-//! machine reads memory (the roofline), and beside a plain LRU loop over the same lines in a mapped
-//! file (the yardstick). `docs/results/stages.md` says how to read it.
+//! Measures each stage of a replay on one core, and compares it with the machine's memory bandwidth (the
+//! roofline) and with a plain LRU loop over the same lines in a mapped file (the yardstick).
+//! `docs/results/stages.md` explains the table.
 //!
 //! `cargo bench -p replay --bench engine [-- TRACE]`, or `TEXTRACE=file make bench`.
 
@@ -12,7 +12,7 @@ mod table;
 use formats::textrace::Textrace;
 use std::path::PathBuf;
 
-/// A golden trace: there without a driver.
+/// A golden trace, which exists without a capture.
 const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../traces/jungle.textrace");
 
 fn main() {

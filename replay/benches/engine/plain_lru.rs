@@ -1,15 +1,15 @@
-//! The yardstick: four packed tags a set, the one used last in front; lines from a mapped file. No
-//! footprints, no cores, no counts but misses: what a program that only simulates one cache does.
+//! The yardstick: four packed tags per set, the most recently used first, and lines from a mapped file. It
+//! counts only misses, without footprints and cores, like a program that simulates one cache.
 
 use memmap2::Mmap;
 use std::fs::File;
 use std::path::Path;
 
-/// Misses of a four-way LRU cache of so many sets (a power of two) on a file of little-endian 32-bit
-/// line numbers, opened and mapped here.
+/// Misses of a four-way LRU cache with `sets` sets (a power of two) on a file of little-endian 32-bit line
+/// numbers. Opening and mapping the file is included.
 pub fn misses(path: &Path, sets: u32) -> std::io::Result<u64> {
     let file = File::open(path)?;
-    // SAFETY: the file is this process's own temporary one, and nobody writes to it while it is mapped.
+    // SAFETY: the file is this process's own temporary file, and nothing writes to it while it is mapped.
     let bytes = unsafe { Mmap::map(&file)? };
     let mut tags = vec![[u32::MAX; 4]; sets as usize];
     let mut misses = 0;

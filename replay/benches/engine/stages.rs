@@ -1,4 +1,4 @@
-//! The stages of a replay, measured one by one.
+//! Measures the stages of a replay one by one.
 
 use crate::plain_lru;
 use crate::table::Row;
@@ -14,10 +14,10 @@ use std::hint::black_box;
 use std::io::Write;
 use std::time::{Duration, Instant};
 
-/// Room for the lines of any frame.
+/// Memory limit that fits the lines of any frame.
 const ROOM_BYTES: u64 = 8 << 30;
 
-/// The shortest of several runs: as many as fit into a while, at least two.
+/// The shortest of at least two runs.
 pub fn seconds(mut run: impl FnMut()) -> f64 {
     const WHILE: Duration = Duration::from_secs(3);
     let start = Instant::now();
@@ -33,7 +33,7 @@ pub fn seconds(mut run: impl FnMut()) -> f64 {
     shortest
 }
 
-/// Nothing but the lines, one after another.
+/// A stream of lines without any other data.
 struct Lines(Vec<u32>);
 
 impl Consumer for Lines {
@@ -42,7 +42,7 @@ impl Consumer for Lines {
     }
 }
 
-/// One core's caches, misses filled at once; without an L2 the L1 alone.
+/// One core's caches. Misses fill at once. Without an L2, only the L1 is used.
 struct Caches {
     l1: AnyCache,
     l2: Option<AnyCache>,
@@ -65,7 +65,7 @@ impl Consumer for Caches {
     }
 }
 
-/// Every row of the table.
+/// Measures every row of the table.
 pub fn measure(trace: &Textrace) -> Vec<Row> {
     let config = RunConfig {
         cores: 1,
@@ -125,7 +125,7 @@ fn cache(config: &LevelConfig, level: &'static str) -> AnyCache {
     AnyCache::build(config, level, 16, 1).expect("a usual cache")
 }
 
-/// Looks at every line, so that nothing of the stream is left out.
+/// Reads every line, so that the compiler keeps the whole stream.
 struct Skip(u32);
 
 impl Consumer for Skip {
@@ -149,7 +149,7 @@ fn tiles(trace: &Textrace) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// The trace with another encoding of its tiles, in memory.
+/// The trace in memory with another encoding of its tiles.
 fn encoded(trace: &Textrace, encoding: Encoding) -> Textrace {
     let tables = trace.tables();
     let mut writer = TextraceWriter::in_memory(tables).expect("the tables were read");
@@ -165,7 +165,7 @@ fn encoded(trace: &Textrace, encoding: Encoding) -> Textrace {
     Textrace::from_bytes(bytes).expect("just written")
 }
 
-/// Every tile to records: quads, and bytes of the file.
+/// Decodes every tile to records. Counts quads, and bytes of the file.
 fn decode(trace: &Textrace, encoding: Encoding) -> Row {
     let mut tile = Tile::default();
     let (mut quads, mut bytes) = (0, 0);
@@ -187,7 +187,7 @@ fn decode(trace: &Textrace, encoding: Encoding) -> Row {
     Row::new(name, quads, bytes, took)
 }
 
-/// All orders of a frame: work items.
+/// Lists the work items of all orders for a frame.
 fn orders(trace: &Textrace, frame: u32) -> Row {
     let passes = &trace.tables().passes;
     let plan = || -> usize {
@@ -202,7 +202,7 @@ fn orders(trace: &Textrace, frame: u32) -> Row {
     Row::new("orders (items)", items, bytes, took)
 }
 
-/// The plain LRU, from opening the file on.
+/// The plain LRU, including opening the file.
 fn yardstick(lines: &[u32], config: &RunConfig) -> Row {
     let file = tempfile::NamedTempFile::new().and_then(|mut file| {
         let bytes: Vec<u8> = lines.iter().flat_map(|line| line.to_le_bytes()).collect();
@@ -222,7 +222,7 @@ fn yardstick(lines: &[u32], config: &RunConfig) -> Row {
     }
 }
 
-/// Whole replays, decoding and expansion included: lines times configurations.
+/// Whole replays, including decoding and expansion. Counts lines times configurations.
 fn whole(trace: &Textrace, listed: u64) -> Vec<Row> {
     let replay = |mode, l1_kib: &[u64], l2_kib: &[u64]| {
         let config = |(l1, l2)| RunConfig {

@@ -1,16 +1,16 @@
-//! The rows side by side.
+//! Prints the rows as a table.
 
 /// A stage.
 pub struct Row {
-    /// What it does, and what it counts if not lines.
+    /// Name of the stage, with its unit if not lines.
     pub name: String,
-    /// What it went through.
+    /// Number of items processed.
     pub items: u64,
-    /// What it read of it, or wrote.
+    /// Bytes read or written.
     pub bytes: u64,
-    /// The shortest run.
+    /// Time of the shortest run.
     pub seconds: f64,
-    /// True for the plain LRU.
+    /// Whether it is the plain LRU.
     pub yardstick: bool,
 }
 

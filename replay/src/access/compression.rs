@@ -64,13 +64,19 @@ mod tests {
     use super::permille;
 
     #[test]
-    fn one_colour_needs_a_header_and_minima_and_noise_is_not_compressed() {
-        // 16 blocks of 6 bytes and the header take 112 bytes, two lines of 64, of 1024.
+    fn one_colour_leaves_a_header_and_minima_and_noise_its_three_channels() {
+        // 16 blocks of 6 bytes and the header: 112 bytes in two lines of 64, of 1024.
         assert_eq!(permille(&[90; 3 * 32 * 16], 32, 16, 64), 125);
         let noise: Vec<u8> = (0..3 * 32 * 16_u32)
-            .map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
+            .map(|i| {
+                let mixed = (i ^ (i >> 7)).wrapping_mul(2_654_435_761);
+                ((mixed ^ (mixed >> 15)).wrapping_mul(0x846c_a68b) >> 24) as u8
+            })
             .collect();
-        assert_eq!(permille(&noise, 32, 16, 64), 1000);
+        // 16 blocks of 48 bits and 16 x 3 x 8 bits, and the header: 880 bytes in 14 lines. The fourth channel is constant.
+        assert_eq!(permille(&noise, 32, 16, 64), 875);
+        // One block would need two lines instead of one: it is stored as it is.
+        assert_eq!(permille(&noise[..3 * 4 * 4], 4, 16, 64), 1000);
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! What the precision of a capture does: each capture against what `tracegen verify --write-reference`
-//! says that it should have been.
+//! Error from the limited precision of captures: compares each capture with the reference of
+//! `tracegen verify --write-reference`.
 
 use super::headline::TEXTURE_FIGURES;
 use super::inputs::Inputs;
@@ -12,10 +12,10 @@ pub const CAPTURE: Study = Study {
     key: "capture",
     title: "Capture precision",
     about: "Captures by drivers, which calculate in single precision and round, replayed in functional mode. Errors are against the reference in double precision.",
-    time: "making the trace, over the reference's",
+    time: "capture, over the reference's",
     reference: "double precision",
     recommended: "llvmpipe",
-    reason: "what its rounding moves is far below what timing and level of detail move; softpipe is there as an independent check",
+    reason: "its rounding has much less effect than timing and level of detail; softpipe serves as an independent check",
     figures: &TEXTURE_FIGURES,
     measure: captures,
 };
@@ -46,7 +46,7 @@ fn captures(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
             };
             let times = seconds(&capture.label).zip(seconds(&truth.label));
             choices.push(Choice {
-                // What is captured by default counts as the error of figures.
+                // The error of the default driver counts as the error of the figures.
                 contribution: (name == CAPTURE.recommended).then_some(Contribution::Capture),
                 name: name.to_owned(),
                 scene: scene(truth),
@@ -58,7 +58,7 @@ fn captures(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
     Ok(choices)
 }
 
-/// The rasteriser in a driver's own words.
+/// The rasteriser's name in the driver string.
 fn driver(driver: &str) -> &str {
     ["llvmpipe", "softpipe"]
         .into_iter()
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
     use crate::stream::MemoryTrace;
 
-    /// As captured by a driver, with coordinates off by so many steps.
+    /// As captured by a driver, with texture coordinates changed by `off` steps.
     fn captured(trace: &MemoryTrace, driver: &str, off: i32) -> MemoryTrace {
         let mut trace = trace.clone();
         trace.tables.meta.driver = driver.to_owned();
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn a_capture_is_held_against_the_truth_of_its_views_and_the_default_driver_counts() {
+    fn a_capture_is_compared_with_the_truth_of_its_views_and_the_default_driver_counts() {
         let truth = small_trace();
         let exact = captured(&truth, "llvmpipe (LLVM 15)", 0);
         let off = captured(&truth, "softpipe", 5 * 2048);

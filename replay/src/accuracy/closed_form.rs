@@ -1,4 +1,4 @@
-//! Utilisation by a formula in place of a cycle model.
+//! Utilisation from a formula instead of a cycle model.
 
 use super::configurations::{functional, looping};
 use super::inputs::{Inputs, time_ratio};
@@ -11,12 +11,12 @@ const FIGURES: [Figure; 1] = [figure("tmu_util_pct", "TMU utilisation", "points"
 
 pub const CLOSED_FORM: Study = Study {
     key: "closed-form",
-    title: "Closed form for a cycle model",
-    about: "Utilisation by the surface through the paper's table, at the rates of first look-ups, as the paper counts, and at those of a functional replay. Errors are against the first-miss model.",
+    title: "Closed form instead of a cycle model",
+    about: "Utilisation from the surface through the paper's table: at the rates of first look-ups, as the paper counts, and at the rates of a functional replay. Errors are against the first-miss model.",
     time: "replay, over the first-miss model's",
     reference: "first-miss model",
     recommended: "first-miss model",
-    reason: "the formula needs the model's own rates to come close, and with those it spares no time; at other rates it is off by more than orders differ",
+    reason: "the formula is accurate only at the model's own rates, so it saves no time; at other rates, its error exceeds the differences between orders",
     figures: &FIGURES,
     measure: forms,
 };
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_form_is_nearer_at_the_rates_that_it_was_made_for() {
+    fn the_form_is_more_accurate_at_the_rates_it_was_made_for() {
         let trace = small_trace();
         let choices = forms(&inputs(&trace)).unwrap();
         let [first, functional] = &choices[..] else {

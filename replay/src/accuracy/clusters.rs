@@ -1,5 +1,6 @@
-//! A functional replay of a part, counted by set, by tile and by frame: all lines of an L1 set, of the
-//! L2 sets that hold them, and of no others, are a *cluster*, which can be replayed alone and exactly.
+//! Replays a part of a trace functionally, with counts by set, tile and frame. A *cluster* is the set of
+//! all lines of an L1 set and the L2 sets that hold no other lines. It can be replayed separately with
+//! exact results.
 
 use crate::config::{BetweenFrames, ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
@@ -9,18 +10,18 @@ use crate::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, rendered,
 };
 
-/// What is replayed.
+/// The part to replay.
 pub struct Part<'a> {
-    /// Frames by number, in this order; what becomes of the caches between them is the configuration's to say.
+    /// Frame numbers, in replay order; the configuration sets the state of the caches between them.
     pub frames: &'a [u32],
-    /// Work items of the order, by their number since the start.
+    /// Selects work items of the order by their number since the start.
     pub item: &'a dyn Fn(usize) -> bool,
-    /// Clusters; all of them where there is no list.
+    /// Selects clusters; `None` selects all.
     pub clusters: Option<&'a [bool]>,
 }
 
 impl<'a> Part<'a> {
-    /// All of these frames.
+    /// Everything in these frames.
     pub fn frames(frames: &'a [u32]) -> Self {
         Self {
             frames,
@@ -34,7 +35,7 @@ impl<'a> Part<'a> {
 pub struct Counts {
     /// L2 misses by cluster.
     pub by_cluster: Vec<u64>,
-    /// L2 misses and footprints by tile, all frames together.
+    /// L2 misses and footprints by tile, summed over frames.
     pub by_tile: Vec<(u64, u64)>,
     /// L2 misses by frame, in the order of [`Part::frames`].
     pub by_frame: Vec<u64>,
@@ -68,10 +69,10 @@ impl Consumer for Counting<'_> {
     }
 }
 
-/// Replays a part of a trace with caches that are empty at first.
+/// Replays a part of a trace. The caches are empty at the start.
 ///
 /// # Errors
-/// An impossible configuration, a trace that cannot be read.
+/// An invalid configuration, or an unreadable trace.
 pub fn counts(
     trace: &dyn TileSource,
     config: &RunConfig,
@@ -120,7 +121,7 @@ pub fn counts(
     Ok(counting.counts)
 }
 
-/// The clusters of a configuration: sets of the smaller level.
+/// Number of clusters: the sets of the smaller level.
 pub fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
     let l1 = config.level.l1.sets("L1", config.line_bytes)?;
     let l2 = config.level.l2.sets("L2", config.line_bytes)?;
@@ -143,7 +144,7 @@ mod tests {
     use crate::stream::synthetic::Synthetic;
     use formats::textrace::{Pass, Surfaces};
 
-    /// Every option that moves which lines a functional replay misses moves the sample as well.
+    /// Every option that changes the misses of a functional replay changes the sample as well.
     #[test]
     fn samples_follow_assignment_flushing_and_hidden_surface_removal() {
         let mut trace = Synthetic {
@@ -230,7 +231,7 @@ mod tests {
             assert_eq!(found.by_cluster.iter().sum::<u64>(), expected.l2.misses);
             assert_eq!(found.by_cluster.len(), 16);
             assert_eq!(found.by_frame, [expected.l2.misses]);
-            // Clusters alone count what they count among all.
+            // Each cluster has the same count alone as together with the others.
             let chosen: Vec<bool> = (0..16).map(|cluster| cluster % 5 == 1).collect();
             let part = Part {
                 clusters: Some(&chosen),

@@ -1,11 +1,11 @@
-//! Configurations of the replay that stand for another one. A choice is a line here.
+//! Studies that compare configurations of the replay. A choice is one line here.
 
 use super::headline::TEXTURE_FIGURES;
 use super::inputs::{Inputs, time_ratio};
 use super::study::{Choice, Contribution, Study, StudyError};
 use crate::config::{LodFormula, Mode, RunConfig, TmuModel};
 
-/// A configuration under its name.
+/// A named configuration.
 struct Variant {
     name: &'static str,
     contribution: Option<Contribution>,
@@ -24,7 +24,7 @@ const fn variant(
     }
 }
 
-/// Replays every still trace as the reference and as each variant.
+/// Replays every single-frame trace with the reference and with each variant.
 fn measured(
     inputs: &Inputs<'_>,
     reference: fn(RunConfig) -> RunConfig,
@@ -66,7 +66,7 @@ fn lod(config: RunConfig, formula: LodFormula) -> RunConfig {
     config
 }
 
-/// Threads of a model, which are back at the first stage after so many cycles.
+/// A model whose threads return to the first stage after this many cycles.
 pub(super) fn looping(mut config: RunConfig, model: TmuModel, cycles: u32) -> RunConfig {
     config.mode = Mode::Timed;
     (config.tmu.model, config.tmu.loop_cycles) = (model, cycles);
@@ -78,11 +78,11 @@ const REPLAY_TIME: &str = "replay, over the reference's";
 pub const MODE: Study = Study {
     key: "mode",
     title: "Functional or timed",
-    about: "Caches without latencies in place of the cycle model. Errors are against the timed replay.",
+    about: "Caches without latencies instead of the cycle model. Errors are against the timed replay.",
     time: REPLAY_TIME,
     reference: "timed",
     recommended: "functional",
-    reason: "quicker, and of the same bytes and miss rates unless a cache set is crowded, as by linear shadow maps; there timed replay counts fewer bytes because its misses in flight take no way. Utilisation and cycles need timed replay",
+    reason: "faster, with the same bytes and miss rates unless a cache set is crowded, as by linear shadow maps: there, timed replay counts fewer bytes because misses in flight occupy no way. Utilisation and cycles need timed replay",
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let variants = [variant(
@@ -97,11 +97,11 @@ pub const MODE: Study = Study {
 pub const LOD: Study = Study {
     key: "lod",
     title: "Level of detail",
-    about: "How levels follow from derivatives, functional mode. Errors are against the exact logarithm of each lane's own derivatives.",
+    about: "Formulas for levels from derivatives, in functional mode. Errors are against the exact logarithm of each lane's own derivatives.",
     time: REPLAY_TIME,
     reference: "exact logarithm, per lane",
     recommended: "fast logarithm, per quad",
-    reason: "what hardware of this kind and the capturing driver do: the logarithm costs nothing, and a level a quad moves fewer bytes than timing does",
+    reason: "used by such hardware and by the capturing driver; the logarithm has no effect, and one level per quad changes fewer bytes than timing does",
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let variants = [
@@ -119,15 +119,15 @@ pub const LOD: Study = Study {
     },
 };
 
-/// The loop is moved as far as docs/models/texture-unit.md says that it may be.
+/// The range of loop lengths that docs/models/texture-unit.md allows.
 pub const LOOP: Study = Study {
     key: "loop",
     title: "Calibrated loop of the cycle model",
-    about: "Cycles until a thread that missed tries again, at both ends of what the calibration allows. Errors are against 64 cycles.",
+    about: "Cycles until a thread that missed tries again, at both ends of the calibrated range. Errors are against 64 cycles.",
     time: REPLAY_TIME,
     reference: "64 cycles",
     recommended: "64 cycles",
-    reason: "the middle of what fits; the ends move utilisation by two to three points, and bytes by hundredths of a per cent",
+    reason: "the middle of the calibrated range; its ends change utilisation by two to three points, and bytes by hundredths of a per cent",
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let calibration = Some(Contribution::Calibration);
@@ -146,11 +146,11 @@ pub const LOOP: Study = Study {
 pub const MODEL: Study = Study {
     key: "model",
     title: "Cycle model",
-    about: "Threads that stop at their first miss (the machine of --preset z2-paper) in place of threads that go on. Errors are against these.",
+    about: "Threads that stop at their first miss (the machine of --preset z2-paper) instead of threads that go on. Errors are against the latter.",
     time: REPLAY_TIME,
     reference: "primary misses",
     recommended: "primary misses",
-    reason: "its misses are real traffic; which model the level of utilisation follows is not known, so trust utilisation's ratios before its level",
+    reason: "its misses are real traffic; it is unknown which model's level of utilisation is right, so rely on ratios of utilisation rather than on its level",
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let model = Some(Contribution::Model);
@@ -161,15 +161,15 @@ pub const MODEL: Study = Study {
     },
 };
 
-/// As far as docs/models/z2.md says that it may be moved.
+/// The range of loop lengths that docs/models/z2.md allows.
 pub const FIRST_MISS_LOOP: Study = Study {
     key: "first-miss-loop",
     title: "Calibrated loop of the first-miss model",
-    about: "As above for threads that stop at their first miss. Errors are against 24 cycles.",
+    about: "The same for threads that stop at their first miss. Errors are against 24 cycles.",
     time: REPLAY_TIME,
     reference: "24 cycles",
     recommended: "24 cycles",
-    reason: "found by search on half of the paper's scenes; its neighbours move utilisation by three points, and bytes by less than a tenth of a per cent",
+    reason: "found by search on half of the paper's scenes; neighbouring values change utilisation by three points, and bytes by less than a tenth of a per cent",
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let variants = [

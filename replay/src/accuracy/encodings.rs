@@ -1,4 +1,4 @@
-//! What the encoding of a trace's tiles costs: nothing in accuracy, bytes and time.
+//! Size and time of the tile encodings; they have no effect on accuracy.
 
 use super::headline::Replayed;
 use super::inputs::{Inputs, time_ratio};
@@ -16,10 +16,10 @@ pub const ENCODING: Study = Study {
     key: "encoding",
     title: "Encoding of the trace",
     about: "Tiles written again in each encoding and replayed in functional mode; every encoding is lossless. Errors are against raw records.",
-    time: "replay, over raw's",
+    time: "replay, over that of raw",
     reference: "raw",
     recommended: "delta",
-    reason: "no error, a quarter of the file, and no slower than raw records; planes is smaller again",
+    reason: "no error, a quarter of the file size, and as fast as raw records; planes is smaller still",
     figures: &FIGURES,
     measure: encodings,
 };

@@ -1,4 +1,4 @@
-//! The headline figures, and how far those of one replay are from another's.
+//! The headline figures, and the error of one replay's figures against another's.
 
 use super::stopwatch::Stopwatch;
 use super::study::{Figure, figure};
@@ -23,17 +23,18 @@ pub const TEXTURE_FIGURES: [Figure; 6] = [
 /// The headline figure of ray traces.
 pub const REUSE: Figure = figure("reuse_pct", "right pixels reused", "points");
 
-/// All figures that the table of errors is about.
+/// All figures in the table of errors.
 pub fn headline_figures() -> impl Iterator<Item = Figure> {
     TEXTURE_FIGURES.into_iter().chain([REUSE])
 }
 
-/// Replays that were made, so that studies which share a configuration share its time, too.
+/// Caches replays, so that studies with the same configuration share the result and its time.
 #[derive(Default)]
 pub struct Replays(Mutex<Vec<(String, RunConfig, Arc<Replayed>)>>);
 
 impl Replays {
-    /// A trace under a configuration in both orders; replayed only the first time.
+    /// A trace replayed with a configuration in both orders; the second call returns the first one's
+    /// result.
     ///
     /// # Errors
     /// See [`replay`].
@@ -59,7 +60,7 @@ impl Replays {
 pub struct Replayed {
     /// Both results.
     pub results: [RunResult; 2],
-    /// What they took.
+    /// Time of both replays.
     pub time: Duration,
 }
 
@@ -95,7 +96,7 @@ impl Replayed {
         ]
     }
 
-    /// Errors against another replay, as [`TEXTURE_FIGURES`]; the larger of both orders.
+    /// Errors against another replay, in the order of [`TEXTURE_FIGURES`]; the larger of both orders.
     #[must_use]
     pub fn errors(&self, reference: &Self) -> Vec<Option<f64>> {
         let (ours, theirs) = (self.figures(), reference.figures());
@@ -110,7 +111,7 @@ impl Replayed {
     }
 }
 
-/// The error of a figure: relative where its unit is percent.
+/// The error of a figure; relative if its unit is percent.
 fn error(unit: &str, variant: f64, reference: f64) -> Option<f64> {
     match unit {
         "%" => (reference > 0.0).then(|| 100.0 * (variant / reference - 1.0)),

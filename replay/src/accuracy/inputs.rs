@@ -1,4 +1,4 @@
-//! What is measured.
+//! Inputs of the studies.
 
 use super::headline::Replays;
 use crate::config::RunConfig;
@@ -8,7 +8,7 @@ use crate::techniques::Folder;
 use serde::Deserialize;
 use std::time::Duration;
 
-/// A ray trace under its name.
+/// A named ray trace.
 pub struct Rays<'a> {
     /// Short name of the scene.
     pub label: String,
@@ -16,12 +16,12 @@ pub struct Rays<'a> {
     pub source: &'a dyn RaySource,
 }
 
-/// One arithmetic at one place, as `tracegen precision` writes it.
+/// The precision of one arithmetic at one distance, as `tracegen precision` writes it.
 #[derive(Clone, Debug, Deserialize)]
 pub struct TraversalRow {
-    /// What rays and triangles are calculated in.
+    /// Arithmetic for rays and triangles.
     pub arithmetic: String,
-    /// How far from the origin, metres.
+    /// Distance from the origin, metres.
     pub at_m: f64,
     /// Rays whose hit or miss differs from the reference's, percent.
     pub wrong_pct: f64,
@@ -31,30 +31,30 @@ pub struct TraversalRow {
     pub time_ratio: f64,
 }
 
-/// Everything that studies may measure; what is empty is not studied.
+/// Inputs of all studies. A study without input is skipped.
 pub struct Inputs<'a> {
     /// The machine.
     pub config: RunConfig,
     /// Texture traces.
     pub subjects: Vec<Subject<'a>>,
-    /// What captures of their views should have been.
+    /// References for captures of their views.
     pub truths: Vec<Subject<'a>>,
-    /// Further captures of their views, by other drivers.
+    /// Captures of their views by other drivers.
     pub captures: Vec<Subject<'a>>,
-    /// Seconds that it took to make a trace, by label.
+    /// Capture time of traces in seconds, by label.
     pub seconds: Vec<(String, f64)>,
     /// Ray traces.
     pub rays: Vec<Rays<'a>>,
-    /// Folders of `tracegen techniques`.
+    /// Folders written by `tracegen techniques`.
     pub techniques: &'a [Folder],
     /// Precision of the ray traversal.
     pub traversal: Vec<TraversalRow>,
-    /// What was replayed so far.
+    /// Cache of replays.
     pub replays: Replays,
 }
 
 impl<'a> Inputs<'a> {
-    /// Traces of a single frame: every study but that of frames.
+    /// Traces of a single frame, used by every study except that of frames.
     pub fn stills(&self) -> impl Iterator<Item = &Subject<'a>> {
         let still = |s: &&Subject<'a>| frame_count(s.source.tables()) == 1;
         self.subjects.iter().filter(still)
@@ -67,7 +67,7 @@ impl<'a> Inputs<'a> {
     }
 }
 
-/// A time over another.
+/// Ratio of two times.
 pub fn time_ratio(time: Duration, reference: Duration) -> f64 {
     time.as_secs_f64() / reference.as_secs_f64().max(1e-9)
 }

@@ -1,4 +1,4 @@
-//! Means of samples, their intervals, and how often these hold the truth.
+//! Means of samples, their confidence intervals, and how often these contain the true value.
 
 /// SplitMix64.
 pub struct Random(pub u64);
@@ -12,7 +12,7 @@ impl Random {
         z ^ z >> 31
     }
 
-    /// So many of the first `of` numbers, each set as likely.
+    /// `count` of the first `of` numbers, every subset with equal probability.
     pub fn some(&mut self, count: usize, of: usize) -> Vec<usize> {
         let mut all: Vec<usize> = (0..of).collect();
         for at in 0..count.min(of) {
@@ -31,7 +31,7 @@ const STUDENT: [f64; 30] = [
     2.052, 2.048, 2.045, 2.042,
 ];
 
-/// Beyond the table within 0.003.
+/// Values beyond the table are within 0.003.
 fn student(degrees: usize) -> f64 {
     match degrees.checked_sub(1) {
         None => f64::INFINITY,
@@ -39,8 +39,8 @@ fn student(degrees: usize) -> f64 {
     }
 }
 
-/// Mean of a sample and half the width of its 95 % interval, as textbooks have them: Student's, with
-/// the correction for a finite whole.
+/// Mean of a sample and half the width of its 95 % confidence interval, from Student's t with the finite
+/// population correction.
 pub fn interval(sample: &[f64], whole: usize) -> (f64, f64) {
     let count = sample.len() as f64;
     let mean = sample.iter().sum::<f64>() / count;
@@ -54,27 +54,27 @@ pub fn interval(sample: &[f64], whole: usize) -> (f64, f64) {
     (mean, half)
 }
 
-/// How a kind of sample does, percent.
+/// Quality of a kind of sample, percent.
 #[derive(Clone, Copy, Debug)]
 pub struct Judged {
     /// Root mean square error.
     pub error_pct: f64,
-    /// Mean error: what no larger sample takes away.
+    /// Mean error, which does not shrink with larger samples.
     pub bias_pct: f64,
     /// Mean half width of the 95 % interval.
     pub interval_pct: f64,
-    /// Intervals that hold the truth; 95 are promised.
+    /// Share of intervals that contain the true value; nominally 95.
     pub holds_pct: f64,
 }
 
-/// Sums up draws of (estimate, half width) against the truth.
+/// Evaluates draws of (estimate, half width) against the true value.
 pub fn judged(truth: f64, draws: &[(f64, f64)]) -> Judged {
     let count = draws.len().max(1) as f64;
     let percent = |value: f64| 100.0 * value / truth.max(1.0);
     let errors = draws.iter().map(|(mean, _)| mean - truth);
     let squares = errors.clone().map(|e| e * e).sum::<f64>();
     let holds = draws.iter();
-    // Rounding: an estimate from everything is the truth.
+    // Allow for rounding, because an estimate from all values equals the true value.
     let holds = holds.filter(|(mean, half)| (mean - truth).abs() <= half + 1e-9 * truth);
     Judged {
         error_pct: percent((squares / count).sqrt()),
@@ -84,9 +84,9 @@ pub fn judged(truth: f64, draws: &[(f64, f64)]) -> Judged {
     }
 }
 
-/// Draws samples of one in so many values at random and estimates the sum of what they stand for.
+/// Draws random samples of every `one_in`-th value and estimates the sum of all values.
 pub fn drawn(values: &[f64], one_in: u64, truth: f64) -> Judged {
-    /// Enough to tell 95 % from 92.
+    /// Enough draws to distinguish 95 % from 92 %.
     const DRAWS: u64 = 400;
     let whole = values.len();
     let count = (whole / one_in as usize).max(2);
@@ -108,7 +108,8 @@ mod tests {
         drawn(values, one_in, values.iter().sum())
     }
 
-    /// Values that are alike but for noise: intervals hold the truth about as often as they promise.
+    /// For values that differ only by noise, intervals contain the true value about as often as their level
+    /// says.
     #[test]
     fn intervals_hold_where_values_are_alike_and_lie_where_few_have_it_all() {
         let mut random = Random(5);

@@ -1,7 +1,7 @@
-//! What a quicker or another way of counting costs in accuracy, and what it spares in time.
+//! Measures the run time and the error of faster methods.
 //!
-//! A *study* is about one choice and holds each possibility against a reference; it is a file here
-//! and a line of [`STUDIES`].
+//! A *study* varies one choice and compares each possibility with a reference. It is a file here and a line
+//! of [`STUDIES`].
 
 mod captures;
 mod closed_form;
@@ -50,7 +50,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_study_of_a_texture_trace_yields_its_figures_and_what_it_recommends() {
+    fn every_study_of_a_texture_trace_yields_its_figures_and_its_recommendation() {
         let trace = small_trace();
         let inputs = inputs(&trace);
         for study in &STUDIES {
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_of_studies_are_their_own() {
+    fn keys_of_studies_are_unique() {
         let keys: BTreeSet<&str> = STUDIES.iter().map(|study| study.key).collect();
         assert_eq!(keys.len(), STUDIES.len());
     }

@@ -1,4 +1,4 @@
-//! Rules of reprojection and their thresholds: what is reused, and what that does to the image.
+//! Studies of reprojection rules and their thresholds: reuse and image error.
 
 use super::headline::REUSE;
 use super::inputs::{Inputs, Rays};
@@ -28,7 +28,7 @@ pub const RULES: Study = Study {
     time: "modelled frame, over both eyes traced in full",
     reference: "trace everything",
     recommended: DEFAULT_RULE,
-    reason: "next to the front of both costs: rules that err less trace more pixels again",
+    reason: "close to the front of both costs: rules with less error trace more pixels again",
     figures: &RULE_FIGURES,
     measure: rules,
 };
@@ -61,17 +61,17 @@ fn rules(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
 pub const REUSED: Study = Study {
     key: "reuse",
     title: "Errors of the share of reused pixels",
-    about: "What the share of right pixels that are reused owes to thresholds and to rounding. Errors are against the default rule on the trace as it is.",
+    about: "Effect of thresholds and rounding on the share of right pixels that are reused. Errors are against the default rule on the unchanged trace.",
     time: "modelled frame, over the default rule's",
     reference: "as traced",
     recommended: "as traced",
-    reason: "thresholds are a choice; rounding hits moves nothing that one would see",
+    reason: "thresholds are a choice; rounding of hits has no visible effect",
     figures: &[REUSE],
     measure: reuse,
 };
 
-/// Hits are moved along their rays by at most this share of the distance: a few times what the
-/// traversal's single precision loses (study of traversal).
+/// Hits are moved along their rays by at most this share of the distance, a few times the rounding error of
+/// single precision (see the study of traversal).
 const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
 fn reuse(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
@@ -115,7 +115,7 @@ fn reuse(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
     Ok(choices)
 }
 
-/// A trace whose hits are off by rounding.
+/// A trace with rounding errors added to its hits.
 struct Moved<'a>(&'a dyn RaySource);
 
 impl RaySource for Moved<'_> {
@@ -136,7 +136,7 @@ impl RaySource for Moved<'_> {
             .iter_mut()
             .filter_map(|pixel| pixel.hit.as_mut())
         {
-            // Any number that is another one for another hit.
+            // Any number that differs between hits.
             let hash = (hit.t.to_bits() ^ hit.position[0].to_bits()).wrapping_mul(0x9e37_79b9);
             let share = ROUNDING * (hash as f32 / (u32::MAX / 2) as f32 - 1.0);
             hit.t += hit.t * share;
@@ -155,7 +155,7 @@ mod tests {
     use crate::sgrt::synthetic::{View, globe, trace, wall};
 
     #[test]
-    fn every_rule_is_a_choice_and_thresholds_move_the_share_that_is_reused() {
+    fn every_rule_is_a_choice_and_thresholds_change_the_reused_share() {
         let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
         scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
         let rays = trace(&scene, View::default());

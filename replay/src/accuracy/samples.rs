@@ -1,4 +1,4 @@
-//! External traffic estimated from some sets, tiles or frames, and how often the intervals lie.
+//! Studies of estimating external traffic from some sets, tiles or frames, and of the confidence intervals.
 
 use super::clusters::{Counts, Part, cluster_count, counts, frames};
 use super::inputs::{Inputs, time_ratio};
@@ -16,16 +16,16 @@ const FIGURES: [Figure; 4] = [
     figure("holds_pct", "interval holds the truth", "%"),
 ];
 
-const TIME: &str = "functional replay of the sample, over the whole's";
+const TIME: &str = "functional replay of the sample, over that of the whole trace";
 
 pub const SETS: Study = Study {
     key: "sets",
     title: "Samples of cache sets",
-    about: "External bytes of Morton order from some sets of both levels, 400 random draws. Sets hold exactly what they hold, so that there is no bias.",
+    about: "External bytes of Morton order from some sets of both levels, 400 random draws. Sets are independent of each other, so there is no bias.",
     time: TIME,
     reference: "all sets",
     recommended: "all sets",
-    reason: "lines have to be made of quads before it is known which sets they fall into, so that a sample spares little time",
+    reason: "quads must be expanded to lines before their sets are known, so a sample saves little time",
     figures: &FIGURES,
     measure: |inputs| each(inputs.stills(), inputs, sets),
 };
@@ -33,11 +33,11 @@ pub const SETS: Study = Study {
 pub const TILES: Study = Study {
     key: "tiles",
     title: "Samples of tiles",
-    about: "External bytes of Morton order from every so many tiles, from up to 8 first ones. What lies between them is not replayed, so that caches are colder: the interval knows nothing of that and lies.",
+    about: "External bytes of Morton order from every n-th tile, starting at up to 8 different tiles. The tiles in between are not replayed, so caches are colder. The interval does not include that bias.",
     time: TIME,
     reference: "all tiles",
     recommended: "all tiles",
-    reason: "a bias that no interval shows makes the estimate useless",
+    reason: "its bias, which no interval shows, makes the estimate useless",
     figures: &FIGURES,
     measure: |inputs| each(inputs.stills(), inputs, tiles),
 };
@@ -45,16 +45,16 @@ pub const TILES: Study = Study {
 pub const FRAMES: Study = Study {
     key: "frames",
     title: "Samples of frames",
-    about: "External bytes of all frames of a camera's path from some frames, 400 random draws: each from empty caches, or after the frame before it has filled them.",
+    about: "External bytes of all frames along a camera path from some frames, 400 random draws: each frame starts with empty caches, or with caches filled by the frame before.",
     time: TIME,
     reference: "all frames",
     recommended: "1/4 of the frames, warmed",
-    reason: "no bias, and an interval that nearly holds what it promises; frames from empty caches fetch again what they should have found, and their interval lies",
+    reason: "no bias, and an interval close to its nominal level; frames that start with empty caches fetch lines again, and their intervals miss the true value",
     figures: &FIGURES,
     measure: |inputs| each(inputs.moving(), inputs, sampled_frames),
 };
 
-/// The samples of a trace.
+/// Computes the choices of a study for one trace.
 type Sampler = fn(&Subject<'_>, &RunConfig) -> Result<Vec<Choice>, StudyError>;
 
 fn each<'a, 's: 'a>(
@@ -91,7 +91,7 @@ fn choice(subject: &Subject<'_>, name: String, time_ratio: f64, judged: Judged) 
     }
 }
 
-/// Replays a part and takes its time.
+/// Replays a part and measures its time.
 fn replayed(
     subject: &Subject<'_>,
     config: &RunConfig,
@@ -102,8 +102,8 @@ fn replayed(
     Ok((found, start.elapsed()))
 }
 
-/// Draws come from one replay that counts by set, which gives what replays of these sets alone would;
-/// one of them is replayed alone for its time.
+/// Draws use one replay with counts by set, because replaying only these sets has the same counts. One draw
+/// is replayed alone to measure its time.
 fn sets(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyError> {
     let frames = frames(subject.source);
     let (whole, whole_time) = replayed(subject, config, &Part::frames(&frames))?;
@@ -135,9 +135,9 @@ fn sets(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyE
     Ok(choices)
 }
 
-/// A ratio of misses to footprints, scaled up by all footprints.
+/// Estimates by the ratio of misses to footprints, scaled to all footprints.
 fn tiles(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyError> {
-    /// First tiles that are tried at most: each is a replay.
+    /// Largest number of first tiles; each is a replay.
     const STARTS: u64 = 8;
     let frames = frames(subject.source);
     let (whole, whole_time) = replayed(subject, config, &Part::frames(&frames))?;
@@ -162,7 +162,7 @@ fn tiles(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, Study
                 .collect();
             let (misses, sampled) = sums(&found.by_tile);
             let ratio = misses as f64 / sampled.max(1) as f64;
-            // The ratio estimator's residuals.
+            // Residuals of the ratio estimator.
             let residuals: Vec<f64> = tiles.iter().map(|t| t.0 - ratio * t.1).collect();
             if residuals.len() < 2 {
                 continue;
@@ -182,7 +182,7 @@ fn tiles(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, Study
     Ok(choices)
 }
 
-/// Every frame is replayed alone and after the one before it; draws choose among these.
+/// Replays every frame from empty caches and after the frame before it; draws choose among these results.
 fn sampled_frames(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyError> {
     let all = frames(subject.source);
     let (whole, whole_time) = replayed(subject, config, &Part::frames(&all))?;
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
     use crate::stream::MemoryTrace;
 
-    /// The same view so many times.
+    /// The same view repeated `times` times.
     fn repeated(trace: &MemoryTrace, times: u32) -> MemoryTrace {
         let mut out = trace.clone();
         out.tables.passes.clear();
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn sets_have_no_bias_and_tiles_have() {
+    fn set_samples_have_no_bias_and_tile_samples_have() {
         let trace = small_trace();
         let inputs = inputs(&trace);
         let bias = |choices: Vec<Choice>| choices[0].values[1].unwrap();
@@ -245,10 +245,10 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_repeat_are_estimated_by_any_warmed_one_and_too_high_by_cold_ones() {
+    fn repeated_frames_are_estimated_by_any_warmed_one_and_overestimated_by_cold_ones() {
         let trace = repeated(&small_trace(), 8);
         let mut inputs = inputs(&trace);
-        // All of a frame stays in the caches.
+        // The whole frame fits in the caches.
         inputs.config.level.l2.size_bytes = 1 << 22;
         let choices = (FRAMES.measure)(&inputs).unwrap();
         assert_eq!(choices.len(), 4);
@@ -257,7 +257,7 @@ mod tests {
             choice.values[1].unwrap()
         };
         assert!(bias("1/2 of the frames, cold") > 500.0);
-        // One of eight frames had nothing before it.
+        // The first of eight frames has no frame before it.
         assert!(
             bias("1/2 of the frames, warmed").abs() < 20.0,
             "{choices:?}"

@@ -1,15 +1,15 @@
-//! Time that this thread has worked, which does not depend on what else the machine does.
+//! Processor time of this thread, which does not depend on other load on the machine.
 
 use std::time::{Duration, Instant};
 
-/// A running measurement; the work has to stay on the thread that started it.
+/// A running measurement. The work must stay on the thread that started it.
 pub struct Stopwatch {
     started: Instant,
     worked: Option<Duration>,
 }
 
 impl Stopwatch {
-    /// Starts.
+    /// Starts the measurement.
     pub fn start() -> Self {
         Self {
             started: Instant::now(),
@@ -17,7 +17,7 @@ impl Stopwatch {
         }
     }
 
-    /// Time on a processor since the start; by the clock where the system does not tell.
+    /// Processor time since the start; wall-clock time on systems that do not report it.
     pub fn elapsed(&self) -> Duration {
         let worked = worked()
             .zip(self.worked)
@@ -26,7 +26,7 @@ impl Stopwatch {
     }
 }
 
-/// What Linux says that the thread has spent on processors.
+/// Processor time of the thread, as Linux reports it.
 fn worked() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds = text.split_whitespace().next()?.parse().ok()?;
@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sleep_is_no_work_where_the_system_tells() {
+    fn sleep_takes_no_processor_time() {
         let watch = Stopwatch::start();
         std::thread::sleep(Duration::from_millis(60));
         let slept = watch.elapsed();

@@ -1,9 +1,9 @@
-//! What a study is: choices of one thing, each with its time and its error against a reference.
+//! Types of a study: choices, each with its time and its error against a reference.
 
 use super::inputs::Inputs;
 use std::error::Error;
 
-/// Why a study cannot be made.
+/// Reason why a study failed.
 pub type StudyError = Box<dyn Error + Send + Sync>;
 
 /// A figure of a choice.
@@ -17,12 +17,12 @@ pub struct Figure {
     pub unit: &'static str,
 }
 
-/// A figure.
+/// Makes a figure.
 pub const fn figure(key: &'static str, name: &'static str, unit: &'static str) -> Figure {
     Figure { key, name, unit }
 }
 
-/// What an error of the headline figures comes from.
+/// Source of a headline figure's error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contribution {
     /// Rounding of the capture.
@@ -31,14 +31,14 @@ pub enum Contribution {
     Lod,
     /// Functional or timed.
     Timing,
-    /// Numbers of a model that were calibrated, and thresholds.
+    /// Calibrated numbers of a model, and thresholds.
     Calibration,
     /// Another cycle model.
     Model,
 }
 
 impl Contribution {
-    /// All of them, in the order of the table of errors.
+    /// All sources, in the order of the table of errors.
     pub const ALL: [Self; 5] = [
         Self::Capture,
         Self::Lod,
@@ -47,19 +47,19 @@ impl Contribution {
         Self::Model,
     ];
 
-    /// Heading in that table.
+    /// Heading in the table of errors.
     #[must_use]
     pub fn title(self) -> &'static str {
         match self {
             Self::Capture => "capture precision",
             Self::Lod => "LOD formula",
-            Self::Timing => "functional for timed",
+            Self::Timing => "functional instead of timed",
             Self::Calibration => "calibration",
             Self::Model => "cycle model",
         }
     }
 
-    /// Name in its file.
+    /// Name in the CSV file.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -72,39 +72,39 @@ impl Contribution {
     }
 }
 
-/// Choices of one thing; a row of [`super::STUDIES`].
+/// A study: the alternatives of one choice. A row of [`super::STUDIES`].
 pub struct Study {
     /// Short name, for files.
     pub key: &'static str,
     /// Heading.
     pub title: &'static str,
-    /// What is chosen, and what errors are against.
+    /// What is varied, and what errors are measured against.
     pub about: &'static str,
-    /// What times are of.
+    /// What times are measured of, and relative to what.
     pub time: &'static str,
-    /// The choice that the others are held against.
+    /// The choice that the others are compared with.
     pub reference: &'static str,
-    /// The choice to make where nothing speaks against it.
+    /// The recommended choice.
     pub recommended: &'static str,
-    /// Why.
+    /// Reason of the recommendation.
     pub reason: &'static str,
-    /// What is measured of a choice; the first one is the error that the user asks about.
+    /// Figures of each choice; the first one is the error.
     pub figures: &'static [Figure],
-    /// Measures every choice; none where the inputs have nothing for this study.
+    /// Measures every choice; empty if the inputs have nothing for this study.
     pub measure: fn(&Inputs<'_>) -> Result<Vec<Choice>, StudyError>,
 }
 
-/// A choice on a scene.
+/// The measurements of a choice on a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// What is chosen.
+    /// Name of the choice.
     pub name: String,
-    /// What it was measured on.
+    /// Scene of the measurement.
     pub scene: String,
-    /// What of the headline figures' error it is; none where it is no choice of theirs.
+    /// Source of headline-figure errors that it measures, if any.
     pub contribution: Option<Contribution>,
-    /// Time over the reference's; no part of what is the same on every machine.
+    /// Time over the reference's; excluded from machine-independent results.
     pub time_ratio: Option<f64>,
-    /// As [`Study::figures`].
+    /// Values in the order of [`Study::figures`].
     pub values: Vec<Option<f64>>,
 }

@@ -1,4 +1,4 @@
-//! Rendering techniques, as `tracegen techniques` has measured and rendered them.
+//! Study of rendering techniques, from the measurements of `tracegen techniques`.
 
 use super::inputs::Inputs;
 use super::study::{Choice, Figure, Study, StudyError, figure};
@@ -13,11 +13,11 @@ const FIGURES: [Figure; 2] = [
 pub const TECHNIQUES: Study = Study {
     key: "techniques",
     title: "Rendering techniques",
-    about: "What a frame may leave out or do more coarsely. Errors are against each eye rendered in full; docs/models/techniques.md has every figure of them.",
+    about: "Work that a frame may skip or do at lower quality. Errors are against each eye rendered in full; docs/models/techniques.md describes all figures.",
     time: "frame through the capturing rasteriser, over the baseline's (median)",
     reference: "per-eye",
     recommended: "per-eye",
-    reason: "a choice between time and image: the hollow points are never it",
+    reason: "time and image quality must be weighed; hollow points are dominated and never the right choice",
     figures: &FIGURES,
     measure: measured,
 };
@@ -50,7 +50,7 @@ mod tests {
     use crate::techniques::{Folder, testing};
 
     #[test]
-    fn each_technique_but_the_baseline_is_a_choice() {
+    fn each_technique_except_the_baseline_is_a_choice() {
         let root = tempfile::tempdir().unwrap();
         testing::folder(root.path());
         let folders = [Folder::open(root.path()).unwrap()];

@@ -8,7 +8,7 @@ use crate::result::TraceId;
 use crate::stream::synthetic::Synthetic;
 use crate::stream::{MemoryTrace, TileSource};
 
-/// A trace that fits no cache of [`inputs`].
+/// A trace that fits in no cache of [`inputs`].
 pub fn small_trace() -> MemoryTrace {
     Synthetic {
         size_px: [96, 96],
@@ -19,12 +19,12 @@ pub fn small_trace() -> MemoryTrace {
     .generate()
 }
 
-/// A trace under a label.
+/// A labelled trace.
 pub fn subject<'a>(trace: &'a dyn TileSource, label: &str) -> Subject<'a> {
     Subject::new(trace, TraceId::default(), label.to_owned())
 }
 
-/// One trace and nothing else.
+/// Inputs with a single trace.
 pub fn inputs(trace: &dyn TileSource) -> Inputs<'_> {
     Inputs {
         config: RunConfig {

@@ -1,4 +1,4 @@
-//! Precision of the ray traversal, as `tracegen precision` has measured it.
+//! Study of the precision of the ray traversal, from the measurements of `tracegen precision`.
 
 use super::inputs::Inputs;
 use super::study::{Choice, Figure, Study, StudyError, figure};
@@ -15,11 +15,11 @@ const FIGURES: [Figure; 2] = [
 pub const TRAVERSAL: Study = Study {
     key: "traversal",
     title: "Precision of the ray traversal",
-    about: "A sphere of 20,480 triangles at some distance from the origin, traced by one plain program in three arithmetics, and by the one that captures. Errors are against signed volumes in double precision; rays whose answer hangs on the rounding of vertices do not count.",
+    about: "A sphere of 20,480 triangles at some distance from the origin, traced by a plain program in three arithmetics, and by the capturing tracer. Errors are against signed volumes in double precision. Rays whose result depends on the rounding of vertices do not count.",
     time: "tracing, over double precision's",
     reference: "double precision",
     recommended: "tracegen rays (single, recentred)",
-    reason: "as right as double precision anywhere; without recentring single precision is wrong from a kilometre on, and double precision buys nothing",
+    reason: "as accurate as double precision at any distance; without recentring, single precision fails from a kilometre on, and double precision has no advantage",
     figures: &FIGURES,
     measure: measured,
 };

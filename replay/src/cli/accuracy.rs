@@ -1,4 +1,4 @@
-//! `replay accuracy`: run time against error, measured.
+//! `replay accuracy`: measures run time against error.
 
 use super::ConfigArgs;
 use super::addresses::two_levels_only;
@@ -17,7 +17,7 @@ use shell::{Output, Progress};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Files that are written into the folder.
+/// Names of the files in the output folder.
 const FILES: [&str; 5] = [
     "accuracy.html",
     "accuracy.json",
@@ -29,37 +29,37 @@ const FILES: [&str; 5] = [
 /// Arguments of `replay accuracy`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Everything runs one after another on one thread, and times are what that thread has worked, so that they can be
-compared; they are in times.csv and on the page, and nowhere else. errors.csv has the form of the table that reports show.
+    after_help = "All measurements run one after another on one thread. The times are that thread's processor time, so they can be
+compared. They are in times.csv and on the page, and nowhere else. errors.csv has the same form as the table of errors on reports.
 
 Examples:
   replay accuracy crytek.textrace atrium.textrace -o out/accuracy
   replay accuracy crytek.textrace --truth crytek-reference.textrace --rays crytek.raytrace -o out/accuracy"
 )]
 pub struct Args {
-    /// Texture traces; those of several frames are for samples of frames alone
+    /// Texture traces; traces of several frames are used only to measure samples of frames
     #[arg(required = true, value_name = "TRACE")]
     traces: Vec<PathBuf>,
-    /// What a capture of a TRACE's views should have been (`tracegen verify --write-reference`)
+    /// Reference trace for the views of a TRACE (`tracegen verify --write-reference`)
     #[arg(long, value_name = "TRACE")]
     truth: Vec<PathBuf>,
-    /// Another driver's capture of a TRACE's views, to be held against --truth
+    /// Capture of the views of a TRACE by another driver, compared with --truth
     #[arg(long, value_name = "TRACE")]
     capture: Vec<PathBuf>,
-    /// Seconds that it took to make the traces: a CSV file with the columns `trace` (a file's name without
-    /// extension) and `seconds`
+    /// Capture time of the traces: a CSV file with the columns `trace` (file name without extension) and
+    /// `seconds`
     #[arg(long, value_name = "CSV")]
     seconds: Option<PathBuf>,
-    /// Ray traces, for rules of reprojection
+    /// Ray traces, to measure reprojection rules
     #[arg(long, value_name = "RAYTRACE")]
     rays: Vec<PathBuf>,
-    /// Folders of `tracegen techniques`
+    /// Folders written by `tracegen techniques`
     #[arg(long, value_name = "DIR")]
     techniques: Vec<PathBuf>,
-    /// Precision of the ray traversal (`tracegen precision`)
+    /// Precision of the ray traversal (JSON written by `tracegen precision`)
     #[arg(long, value_name = "JSON")]
     traversal: Option<PathBuf>,
-    /// Folder for tables, charts and page
+    /// Folder for tables, charts and the page
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     #[command(flatten)]
@@ -69,7 +69,7 @@ pub struct Args {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// Wrong arguments, an unreadable trace, an output that cannot be written.
+/// Wrong arguments, an unreadable trace, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     shell::Threads::default().start()?;
     let config = args.machine.resolve()?;
@@ -144,7 +144,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Every study that has something to measure.
+/// Runs every study that has inputs.
 fn measured(inputs: &Inputs<'_>) -> Result<AccuracyReport> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let progress = Progress::new("measuring", STUDIES.len() as u64, "studies");
@@ -163,7 +163,7 @@ fn measured(inputs: &Inputs<'_>) -> Result<AccuracyReport> {
     })
 }
 
-/// What `tracegen precision` writes.
+/// The file that `tracegen precision` writes.
 #[derive(Deserialize)]
 struct TraversalFile {
     schema: String,

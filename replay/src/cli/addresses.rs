@@ -1,4 +1,4 @@
-//! `replay run --addresses`: the caches alone, fed with the addresses of any program.
+//! `replay run --addresses`: replays plain addresses of any program through the caches.
 
 use super::ConfigArgs;
 use super::experiment_args::parse_caches;
@@ -11,51 +11,56 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Forms by name.
+/// Forms of address files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum FormName {
-    /// 32-bit little-endian addresses of reads
+    /// Read addresses, 32 bits, little-endian
     U32,
-    /// 64-bit ones
+    /// Read addresses, 64 bits, little-endian
     U64,
-    /// Dinero's text, `LABEL HEXADDR` a line, or Dinero IV's with sizes
+    /// Text of Dinero, `LABEL HEXADDR` per line, or of Dinero IV, with sizes
     Din,
-    /// gem5's packet trace
+    /// Packet trace of gem5
     Gem5,
 }
 
-/// Kinds of access by name.
+/// Kinds of accesses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum KindName {
     /// Data reads (din label 0)
     Read,
-    /// Data writes (label 1); they look up and fill as reads do
+    /// Data writes (din label 1); they look up and fill like reads
     Write,
     /// Instruction fetches (label 2)
     Fetch,
 }
 
-/// Plain addresses in place of a trace.
+/// Plain addresses as input instead of a trace.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Plain addresses")]
 pub struct AddressInput {
-    /// Plain addresses in place of a trace, gzip or zstd or neither; - is standard input
+    /// File with plain addresses instead of a trace, uncompressed, gzip or zstd; - is standard input
     #[arg(long, value_name = "FILE")]
     addresses: Option<PathBuf>,
-    /// Form of the addresses [default: by name (.u32, .u64, .din, .gem5) or content]
-    #[arg(long, value_name = "FORM")]
+    /// Form of the addresses [default: from the name (.u32, .u64, .din, .gem5) or the content]
+    #[arg(long, value_name = "FORM", hide_short_help = true)]
     address_form: Option<FormName>,
-    /// Kinds of access that the caches see [default: all]
-    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    /// Kinds of accesses that the caches process [default: all]
+    #[arg(
+        long,
+        value_name = "KINDS",
+        value_delimiter = ',',
+        hide_short_help = true
+    )]
     kinds: Option<Vec<KindName>>,
 }
 
 impl AddressInput {
-    /// Where the addresses are, if they were asked for.
+    /// The address file, if given.
     ///
     /// # Errors
-    /// A flag that means nothing without addresses, or one of `machine` that means nothing with them.
-    /// (Clap does not ask for an argument that conflicts with the trace.)
+    /// A flag that needs `--addresses` without it, or a flag of `machine` that cannot be used with it.
+    /// (Clap does not check an argument that conflicts with the trace.)
     pub fn path(&self, machine: &ConfigArgs) -> Result<Option<&Path>> {
         let Some(path) = &self.addresses else {
             let flags = [
@@ -67,13 +72,13 @@ impl AddressInput {
         };
         if let Some(flag) = machine.first_of_traces() {
             bail!(
-                "{flag} cannot be used with --addresses: it is about tiles, textures or the texture unit"
+                "{flag} cannot be used with --addresses: it applies only to traces with tiles and textures"
             );
         }
         Ok(Some(path))
     }
 
-    /// The file of `--addresses`; none for standard input.
+    /// The file of `--addresses`; `None` for standard input.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         self.addresses
@@ -81,10 +86,10 @@ impl AddressInput {
             .filter(|path| *path != Path::new("-"))
     }
 
-    /// Opens what is at `path`.
+    /// Opens the address file at `path`.
     ///
     /// # Errors
-    /// It cannot be read, or its form is not known.
+    /// The file cannot be read, or its form is unknown.
     pub fn open(&self, path: &Path) -> Result<AddressFile<'static>> {
         let form = self.address_form.map(|form| match form {
             FormName::U32 => AddressForm::U32,
@@ -95,7 +100,7 @@ impl AddressInput {
         Ok(AddressFile::open(path, form)?)
     }
 
-    /// The kinds of access that count.
+    /// The kinds of accesses to process.
     #[must_use]
     pub fn kinds(&self) -> KindSet {
         let kind = |name: &KindName| match name {
@@ -109,7 +114,7 @@ impl AddressInput {
     }
 }
 
-/// Refuses the first flag that was given.
+/// Fails if any of these flags is given.
 fn only_with_addresses(flags: &[(&str, bool)]) -> Result<()> {
     match flags.iter().find(|(_, given)| *given) {
         Some((flag, _)) => bail!("{flag}: only with --addresses"),
@@ -117,7 +122,7 @@ fn only_with_addresses(flags: &[(&str, bool)]) -> Result<()> {
     }
 }
 
-/// Refuses a configuration with more than an L1 and an L2, which `place` cannot simulate.
+/// Fails if the configuration has more than an L1 and an L2, because `place` cannot simulate it.
 ///
 /// # Errors
 /// The configuration has `[prefetch]`, `[[level]]`, `[dram]`, `[frame]`, sectors, a victim cache or an inclusion.
@@ -134,7 +139,7 @@ pub fn two_levels_only(config: &RunConfig, place: &str) -> Result<()> {
     Ok(())
 }
 
-/// What plain addresses are called.
+/// Display name of an address file.
 #[must_use]
 pub fn name_of(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
@@ -147,23 +152,24 @@ pub fn name_of(path: &Path) -> String {
 pub struct AddressArgs {
     #[command(flatten)]
     input: AddressInput,
-    /// Several L1/L2 sizes in KiB, replayed in one pass if LRU
+    /// L1/L2 sizes in KiB, comma-separated; LRU sizes are replayed in one pass
     #[arg(
         long,
         value_name = "L1/L2,...",
-        conflicts_with_all = ["l1", "l2"]
+        conflicts_with_all = ["l1", "l2"],
+        hide_short_help = true
     )]
     caches: Option<String>,
-    /// Print CSV, a row a configuration
-    #[arg(long, conflicts_with = "json")]
+    /// Print CSV, one row per configuration
+    #[arg(long, conflicts_with = "json", hide_short_help = true)]
     csv: bool,
 }
 
 impl AddressArgs {
-    /// Where the addresses are, if they were asked for.
+    /// The address file, if given.
     ///
     /// # Errors
-    /// As [`AddressInput::path`].
+    /// See [`AddressInput::path`].
     pub fn path(&self, machine: &ConfigArgs) -> Result<Option<&Path>> {
         let path = self.input.path(machine)?;
         if path.is_none() {
@@ -172,7 +178,7 @@ impl AddressArgs {
         Ok(path)
     }
 
-    /// Replays the addresses at `path` and prints what the caches made of them.
+    /// Replays the addresses at `path` and prints the cache statistics.
     ///
     /// # Errors
     /// Wrong cache sizes, unreadable input.

@@ -1,4 +1,4 @@
-//! `replay calibrate`: settings tried on some scenes and judged on others, against the Z2 paper.
+//! `replay calibrate`: chooses settings on some scenes and evaluates them on others, against the Z2 paper.
 
 use super::ConfigArgs;
 use super::subjects::Traces;
@@ -27,36 +27,36 @@ pub struct Args {
     /// Texture traces
     #[arg(required = true, value_name = "TRACE")]
     traces: Vec<PathBuf>,
-    /// Values to try of a key of the configuration; several keys: every combination
+    /// A configuration key and the values to try; with several keys, every combination is tried
     #[arg(long = "try", value_name = "KEY=V1,V2,...", required = true)]
     tries: Vec<String>,
-    /// Take traces of one scene for captures of it at several distances between the eyes (tracegen raster --ipd), and try
-    /// every distance; each scene needs the same ones
+    /// Treat traces of the same scene as captures with different eye distances (tracegen raster --ipd), and
+    /// try every distance; each scene needs the same distances
     #[arg(long)]
     by_ipd: bool,
-    /// Labels of the scenes that settings are not chosen by, comma-separated; every second one if
-    /// not given
+    /// Labels of the scenes to evaluate on, comma-separated; settings are chosen on the others [default:
+    /// every second scene]
     #[arg(long, value_name = "LABELS")]
     held_out: Option<String>,
-    /// What settings are chosen by
+    /// Error to minimise
     #[arg(long, value_enum, default_value_t = Objective::Surface)]
     objective: Objective,
-    /// Folder that keeps results, so that a search goes on where it stopped
+    /// Folder for results; a repeated search reads them and continues
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Print one JSON object (schema replay.calibration/1)
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// Runs the subcommand.
 ///
 /// # Errors
-/// Wrong arguments, an impossible configuration, an unreadable trace.
+/// Wrong arguments, an invalid configuration, or an unreadable trace.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let preset = args.machine.preset().unwrap_or(Preset::Z2_PAPER);
     let usual = crate::config::RunConfig::default();
@@ -120,7 +120,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// `KEY=V1,V2,...`; values are numbers and truth values where they read as such, else text.
+/// Parses `KEY=V1,V2,...`; values are numbers, booleans or text.
 fn axis(text: &str) -> Result<Axis> {
     let (key, values) = text
         .split_once('=')
@@ -128,7 +128,7 @@ fn axis(text: &str) -> Result<Axis> {
         .with_context(|| format!("--try {text}: expected KEY=V1,V2,..."))?;
     ensure!(
         !experiment::is_of_the_table(key),
-        "--try {key}: the paper's table varies it"
+        "--try {key}: the paper's table already varies this key"
     );
     let value = |text: &str| {
         let text = text.trim();
@@ -175,7 +175,10 @@ mod tests {
     fn what_cannot_be_tried_is_refused() {
         for (text, message) in [
             ("loop", "--try loop: expected KEY=V1,V2,..."),
-            ("order=morton", "--try order: the paper's table varies it"),
+            (
+                "order=morton",
+                "--try order: the paper's table already varies this key",
+            ),
         ] {
             assert_eq!(axis(text).unwrap_err().to_string(), message);
         }

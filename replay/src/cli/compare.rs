@@ -1,4 +1,4 @@
-//! `replay compare`: how two captures of the same views differ, and what that does to the caches.
+//! `replay compare`: compares two captures of the same views, and their cache misses.
 
 use super::ConfigArgs;
 use super::experiment_args::parse_orders;
@@ -16,7 +16,7 @@ use toml::Value;
 /// Arguments of `replay compare`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Exit code: 0 compared, 2 unreadable, or not of the same views and textures.
+    after_help = "Exit code: 0 compared, 2 unreadable, or different views or textures.
 
 Examples:
   replay compare lavapipe.textrace osmesa.textrace
@@ -24,31 +24,31 @@ Examples:
   replay compare a.textrace b.textrace --orders all --l1 16KiB --l2 256KiB"
 )]
 pub struct Args {
-    /// One capture
+    /// First capture
     a: PathBuf,
-    /// The other one, of the same views
+    /// Second capture, of the same views
     b: PathBuf,
-    /// Orders to replay both in, comma-separated, or `all`
+    /// Orders for the replays of both, comma-separated, or `all`
     #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
     orders: String,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Print one JSON object (schema replay.compare/1)
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// Runs the subcommand.
 ///
 /// # Errors
-/// Wrong arguments, an unreadable trace, captures of different views or textures.
+/// Wrong arguments, an unreadable trace, or captures of different views or textures.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let config = args.machine.resolve()?;
     ensure!(
         args.machine.first_of_traces() != Some("--order"),
-        "--order is varied here; use --orders"
+        "--order: this command varies the order; use --orders"
     );
     let orders = parse_orders(&args.orders)?;
     args.threads.start()?;

@@ -1,4 +1,4 @@
-//! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
+//! Flags that set the machine. Flags override `--config`, which overrides the defaults.
 
 use crate::config::FrameMachine;
 use crate::config::{
@@ -8,6 +8,7 @@ use crate::config::{
 use crate::experiment::parse_config;
 use crate::memory::dram::DramPreset;
 use crate::preset::Preset;
+use crate::registry::most_similar;
 use crate::size::parse_bytes;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -16,153 +17,203 @@ use serde::de::value::Error as ValueError;
 use serde::de::{DeserializeOwned, IntoDeserializer};
 use std::path::{Path, PathBuf};
 
-/// Reads an enum of the formats crate by its serialised name.
+/// Parses an enum of the formats crate by its serialised name.
 fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
-    T::deserialize(text.into_deserializer()).map_err(|e: ValueError| e.to_string())
+    T::deserialize(text.into_deserializer()).map_err(|error: ValueError| {
+        let message = error.to_string();
+        // "unknown variant `x`, expected one of `a`, `b`"
+        let names = message.split('`').skip(3).step_by(2);
+        match most_similar(text, names) {
+            Some(name) => format!("{message}; did you mean `{name}`?"),
+            None => message,
+        }
+    })
 }
 
 /// Flags of the replay configuration.
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Machine")]
 pub struct ConfigArgs {
-    /// TOML file with the configuration; flags win over it
+    /// TOML file with the configuration; flags override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Machine by name in place of the defaults; flags win over it
+    /// Named machine instead of the defaults; flags override it
     #[arg(long, conflicts_with = "config")]
     preset: Option<Preset>,
     /// Tile order
     #[arg(long)]
     order: Option<Order>,
-    /// Texture units with clocks, or footprints without latencies
+    /// Model: texture units with timing, or cache counts only
     #[arg(long)]
     mode: Option<Mode>,
-    /// Size of each core's L1
+    /// Size of the L1 of each core
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     l1: Option<u64>,
-    /// Size of the shared L2
+    /// Size of the L2 that all cores share
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     l2: Option<u64>,
-    /// Size of an L3 below the L2, 16 ways unless --config says otherwise
-    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    /// Size of an L3 below the L2; 16 ways unless --config sets them
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes, hide_short_help = true)]
     l3: Option<u64>,
     /// Associativity of L1 and L2
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     ways: Option<u32>,
     /// Associativity of the L1
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     l1_ways: Option<u32>,
     /// Associativity of the L2
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     l2_ways: Option<u32>,
     /// Replacement policy of L1 and L2
     #[arg(long)]
     replacement: Option<Replacement>,
     /// Line size of L1 and L2
-    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes, hide_short_help = true)]
     line: Option<u64>,
     /// Shader cores
     #[arg(long, value_name = "N")]
     cores: Option<u32>,
     /// Assignment of tiles to cores
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     assign: Option<Assign>,
     /// Seed of the random order and of random replacement
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     seed: Option<u64>,
 
-    /// What misses are broken down by in --json; with draw, tables list the busiest draws
-    #[arg(long, value_name = "PARTS")]
+    /// Breakdown of the misses in --json; with `draw`, tables also list the draws with most misses
+    #[arg(long, value_name = "PARTS", hide_short_help = true)]
     count_by: Option<CountBy>,
-    /// Width and height of a tile: 8, 16 (as recorded), 32 or 64
-    #[arg(long, value_name = "PIXELS")]
+    /// Width and height of a tile in pixels: 8, 16 (as recorded), 32 or 64
+    #[arg(long, value_name = "PIXELS", hide_short_help = true)]
     tile_px: Option<u32>,
     /// Hidden-surface removal
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     hsr: Option<Hsr>,
-    /// The caches between the frames of a trace
-    #[arg(long)]
+    /// State of the caches at the start of each frame of a trace
+    #[arg(long, hide_short_help = true)]
     between_frames: Option<BetweenFrames>,
 
-    /// Prefetcher of the L2, of its usual number of lines unless `[prefetch]` of --config says otherwise
-    #[arg(long, value_name = "PREFETCHER")]
+    /// Prefetcher of the L2; `[prefetch]` of --config sets the number of lines
+    #[arg(long, value_name = "PREFETCHER", hide_short_help = true)]
     prefetch: Option<Prefetching>,
-    /// DRAM below the caches, with two channels unless `[dram]` of --config says otherwise: lpddr4, lpddr5, ddr4, gddr6
+    /// DRAM below the caches: lpddr4, lpddr5, ddr4, gddr6; `[dram]` of --config sets the number of channels
+    /// (2 by default)
     #[arg(long, value_name = "DEVICE", value_parser = named::<DramPreset>)]
     dram: Option<DramPreset>,
-    /// Traffic of the whole frame, on a machine with the defaults of `[frame]`; needs a trace with --geometry
-    #[arg(long, value_name = "MACHINE")]
+    /// Model the traffic of the whole frame on this machine; needs a trace captured with --geometry
+    #[arg(long, value_name = "MACHINE", hide_short_help = true)]
     frame: Option<FrameMachine>,
 
-    /// Filter in place of the recorded one: trilinear, bilinear, nearest
-    #[arg(long, value_parser = named::<FilterOverride>, help_heading = "Sampling")]
+    /// Texture filter, instead of the recorded one: trilinear, bilinear, nearest
+    #[arg(long, value_parser = named::<FilterOverride>, help_heading = "Sampling", hide_short_help = true)]
     filter: Option<FilterOverride>,
     /// Level-of-detail formula: llvmpipe, softpipe, exact, per-lane
-    #[arg(long, value_parser = named::<LodFormula>, help_heading = "Sampling")]
+    #[arg(long, value_parser = named::<LodFormula>, help_heading = "Sampling", hide_short_help = true)]
     lod: Option<LodFormula>,
-    /// Added to the level of detail
+    /// Bias added to the level of detail
     #[arg(
         long,
         value_name = "LEVELS",
         allow_hyphen_values = true,
-        help_heading = "Sampling"
+        help_heading = "Sampling",
+        hide_short_help = true
     )]
     lod_bias: Option<f32>,
-    /// Footprints of a long and narrow pixel at most, 1 to 16
-    #[arg(long, value_name = "N", help_heading = "Sampling")]
+    /// Largest number of footprints per anisotropic pixel, 1 to 16
+    #[arg(
+        long,
+        value_name = "N",
+        help_heading = "Sampling",
+        hide_short_help = true
+    )]
     max_anisotropy: Option<u32>,
-    /// How long and narrow pixels are filtered: probes (several footprints along the longer axis, at Vulkan's level),
-    /// rounded-probes (at the level of EXT_texture_filter_anisotropic's example), ellipse (all texels of the pixel's
-    /// ellipse)
-    #[arg(long, value_name = "MODEL", value_parser = named::<AnisotropyModel>, help_heading = "Sampling")]
+    /// Anisotropic filtering: probes (several footprints along the longer axis, Vulkan's level),
+    /// rounded-probes (level from the example in EXT_texture_filter_anisotropic), ellipse (all texels in
+    /// the pixel's ellipse)
+    #[arg(long, value_name = "MODEL", value_parser = named::<AnisotropyModel>, help_heading = "Sampling", hide_short_help = true)]
     anisotropy: Option<AnisotropyModel>,
-    /// Count the helper lanes of partly covered quads, too
-    #[arg(long, help_heading = "Sampling")]
+    /// Also count the helper lanes of partly covered quads
+    #[arg(long, help_heading = "Sampling", hide_short_help = true)]
     helper_lanes: bool,
 
-    /// Format of the colour textures in memory: bc1, bc7, astc-6x6, rgba8, ...
-    #[arg(long, value_name = "FORMAT", value_parser = named::<TexelFormat>, help_heading = "Layout")]
+    /// Texel format of colour textures in memory: bc1, bc7, astc-6x6, rgba8, ...
+    #[arg(long, value_name = "FORMAT", value_parser = named::<TexelFormat>, help_heading = "Layout", hide_short_help = true)]
     texel_format: Option<TexelFormat>,
-    /// Order of the blocks of a level of colour textures: linear, morton, tiled
-    #[arg(long, value_parser = named::<BlockOrder>, help_heading = "Layout")]
+    /// Order of the blocks in each level of a colour texture: linear, morton, tiled
+    #[arg(long, value_parser = named::<BlockOrder>, help_heading = "Layout", hide_short_help = true)]
     block_order: Option<BlockOrder>,
-    /// Order of the texels of shadow maps: morton (the default), tiled, linear
-    #[arg(long, value_parser = named::<BlockOrder>, help_heading = "Layout")]
+    /// Order of the texels in shadow maps: morton (the default), tiled, linear
+    #[arg(long, value_parser = named::<BlockOrder>, help_heading = "Layout", hide_short_help = true)]
     shadow_map_order: Option<BlockOrder>,
-    /// Alignment of each texture's first byte
-    #[arg(long, value_name = "SIZE", value_parser = parse_bytes, help_heading = "Layout")]
+    /// Alignment of the first byte of each texture
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes, help_heading = "Layout", hide_short_help = true)]
     base_align: Option<u64>,
     /// Order of the textures in memory: table, largest-first
-    #[arg(long, value_parser = named::<TextureOrder>, help_heading = "Layout")]
+    #[arg(long, value_parser = named::<TextureOrder>, help_heading = "Layout", hide_short_help = true)]
     texture_order: Option<TextureOrder>,
 
-    /// What a thread does whose lines are not in the L1
-    #[arg(long, value_name = "MODEL", help_heading = "Texture unit")]
+    /// How a thread waits for lines that are not in the L1
+    #[arg(
+        long,
+        value_name = "MODEL",
+        help_heading = "Texture unit",
+        hide_short_help = true
+    )]
     tmu: Option<TmuModel>,
-    /// Cycles that a line takes from the L2 to an L1
-    #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
+    /// Cycles to transfer a line from the L2 to an L1
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        help_heading = "Texture unit",
+        hide_short_help = true
+    )]
     l2_cycles: Option<u32>,
-    /// Cycles that a line takes from memory to the last level
-    #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
+    /// Cycles to transfer a line from memory to the last level
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        help_heading = "Texture unit",
+        hide_short_help = true
+    )]
     memory_cycles: Option<u32>,
-    /// Cycles that a thread which missed takes to be back at the first stage
-    #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
+    /// Cycles until a thread that missed returns to the first stage
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        help_heading = "Texture unit",
+        hide_short_help = true
+    )]
     loop_cycles: Option<u32>,
-    /// Threads (quads) that a core holds at once
-    #[arg(long, value_name = "N", help_heading = "Texture unit")]
+    /// Threads (quads) in flight per core
+    #[arg(
+        long,
+        value_name = "N",
+        help_heading = "Texture unit",
+        hide_short_help = true
+    )]
     tmu_threads: Option<u32>,
-    /// Missing footprints that one issue slot tries
-    #[arg(long, value_name = "N", help_heading = "Texture unit")]
+    /// Footprints that a thread retries per issue slot after a miss
+    #[arg(
+        long,
+        value_name = "N",
+        help_heading = "Texture unit",
+        hide_short_help = true
+    )]
     retry_footprints: Option<u32>,
-    /// Lines that a thread fetches in one trip
-    #[arg(long, value_name = "N", help_heading = "Texture unit")]
+    /// Lines that a thread fetches per trip through the loop
+    #[arg(
+        long,
+        value_name = "N",
+        help_heading = "Texture unit",
+        hide_short_help = true
+    )]
     fetches_per_trip: Option<u32>,
-    /// When a line that misses gets its way in a cache
-    #[arg(long, help_heading = "Texture unit")]
+    /// When a missing line is allocated in a cache
+    #[arg(long, help_heading = "Texture unit", hide_short_help = true)]
     allocation: Option<Allocation>,
 }
 
-/// Sets what a flag gives.
+/// Overwrites `target` if the flag is given.
 fn set<T>(target: &mut T, flag: Option<T>) {
     if let Some(value) = flag {
         *target = value;
@@ -178,19 +229,19 @@ impl ConfigArgs {
         self.resolve_over(RunConfig::default())
     }
 
-    /// The configuration: `defaults` with the preset, or `--config` where it is given, then the flags.
+    /// The configuration: `defaults` with the preset, or `--config` if given, then the flags.
     ///
     /// # Errors
-    /// As [`Self::resolve`].
+    /// See [`Self::resolve`].
     pub fn resolve_over(&self, defaults: RunConfig) -> Result<RunConfig> {
         let preset = |config| self.preset.map_or(config, |preset| preset.over(config));
         self.resolve_file_over(preset(defaults))
     }
 
-    /// The configuration that is not the preset's: the defaults or `--config`, then the flags.
+    /// The configuration without the preset: the defaults or `--config`, then the flags.
     ///
     /// # Errors
-    /// As [`Self::resolve`].
+    /// See [`Self::resolve`].
     pub fn resolve_without_preset(&self) -> Result<RunConfig> {
         self.resolve_file_over(RunConfig::default())
     }
@@ -212,7 +263,7 @@ impl ConfigArgs {
         Ok(config)
     }
 
-    /// The first flag that means something for tiles, textures or the texture unit alone, not for plain
+    /// The first flag given that applies only to tiles, textures or the texture unit, and so not to plain
     /// addresses.
     #[must_use]
     pub fn first_of_traces(&self) -> Option<&'static str> {
@@ -259,7 +310,7 @@ impl ConfigArgs {
         self.config.as_deref()
     }
 
-    /// Puts the flags over a configuration.
+    /// Applies the flags to a configuration.
     ///
     /// # Errors
     /// A line size that does not fit its type.
@@ -314,5 +365,21 @@ impl ConfigArgs {
         set(&mut config.tmu.fetches_per_trip, self.fetches_per_trip);
         set(&mut config.tmu.allocation, self.allocation);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mistyped_value_comes_with_a_suggestion() {
+        let error = named::<LodFormula>("llvmpip").unwrap_err();
+        assert!(error.ends_with("; did you mean `llvmpipe`?"), "{error}");
+        assert!(
+            !named::<LodFormula>("other")
+                .unwrap_err()
+                .contains("did you mean")
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! `replay convert`: a trace in another encoding, or as plain accesses for other simulators.
+//! `replay convert`: writes a trace in another encoding, or its accesses for other simulators.
 
 use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
@@ -20,35 +20,35 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// What to convert to.
+/// Output forms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Target {
-    /// Dinero's text: `0 HEXADDR` a line
+    /// Text for Dinero: `0 HEXADDR` per line
     Din,
-    /// Addresses of 32 bits, little-endian
+    /// Addresses, 32 bits, little-endian
     U32,
-    /// Addresses of 64 bits
+    /// Addresses, 64 bits, little-endian
     U64,
-    /// gem5's packet trace: protocol-buffer messages
+    /// Packet trace for gem5 (protocol-buffer messages)
     Gem5,
-    /// Ramulator 2's LoadStoreTrace: `LD 0xADDR` a line
+    /// LoadStoreTrace for Ramulator 2: `LD 0xADDR` per line
     Ramulator,
-    /// Ramulator 2's SimpleO3 trace: `0 ADDR` a line, decimal
+    /// SimpleO3 trace for Ramulator 2: `0 ADDR` per line, decimal
     RamulatorO3,
-    /// ChampSim's 64-byte instruction records, a load each; addresses begin at 2^40
+    /// 64-byte instruction records for ChampSim, one load each; addresses start at 2^40
     Champsim,
-    /// Comma-separated accesses with texture, level and texel, or ray and node
+    /// Accesses as CSV, with texture, level and texel, or with ray and node
     Csv,
-    /// The same as one JSON object a line
+    /// The columns of csv as JSON Lines
     Jsonl,
-    /// A texture trace, its tiles encoded anew
+    /// Texture trace with its tiles encoded again
     Textrace,
-    /// A ray trace, its tiles encoded anew
+    /// Ray trace with its tiles encoded again
     Raytrace,
 }
 
 impl Target {
-    /// The form, if accesses are written as addresses alone.
+    /// The plain form, if the output has only addresses.
     fn plain(self) -> Option<PlainForm> {
         Some(match self {
             Self::Din => PlainForm::Din,
@@ -71,7 +71,7 @@ impl Target {
     }
 }
 
-/// Compressions by name.
+/// Compressions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum CompressionName {
     /// gzip
@@ -80,26 +80,26 @@ pub enum CompressionName {
     Zstd,
 }
 
-/// Tile encodings by name.
+/// Tile encodings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum EncodingName {
-    /// Records as they are in memory
+    /// Records as in memory
     Raw,
     /// Bit-packed differences
     #[default]
     Delta,
-    /// A plane for each primitive: about 0.5 of the size, slower to read and to write
+    /// One plane per primitive: about half the size of delta, slower to read and write
     Planes,
 }
 
-/// Access granularities by name.
+/// Access granularities.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum GranularityName {
-    /// Every distinct texel of a footprint, at the address of its block; every node or triangle
-    /// that a ray visits, at its first byte
+    /// Every distinct texel of a footprint, at the address of its block; for rays, every visited node or
+    /// triangle, at its first byte
     Texel,
-    /// Every distinct cache line of a footprint, which `replay run` counts as look-ups, or of a
-    /// visit
+    /// Every distinct cache line of a footprint, which `replay run` counts as look-ups; for rays, every
+    /// distinct line of a visit
     #[default]
     Line,
 }
@@ -112,27 +112,27 @@ pub enum GranularityName {
   replay convert c.textrace --to csv --granularity texel -o c.csv
   replay convert c.textrace --to textrace --encoding raw -o raw.textrace
   replay convert r.raytrace --to csv | head
-Rays come tile by tile, left eye first; their accesses need a trace with visits
+Rays are written tile by tile, left eye first. Their accesses need a trace with visits
 (tracegen rays --visits).")]
 pub struct ConvertArgs {
     /// Trace, .textrace or .raytrace
     pub trace: PathBuf,
-    /// What to write
+    /// Output form
     #[arg(long)]
     pub to: Target,
     /// Output file; - is standard output
     #[arg(short, long, value_name = "FILE", default_value = "-")]
     pub output: PathBuf,
-    /// Compress accesses [default: as the output's name asks, .gz or .zst]
+    /// Compression of the accesses [default: from the output's extension, .gz or .zst]
     #[arg(long, value_name = "METHOD")]
     pub compress: Option<CompressionName>,
-    /// What counts as an access [default: line]
+    /// Unit of an access [default: line]
     #[arg(long)]
     pub granularity: Option<GranularityName>,
     /// Tile encoding of --to textrace [default: delta]
     #[arg(long)]
     pub encoding: Option<EncodingName>,
-    /// Order, sampling and layout; what concerns caches has no effect here
+    /// Order, sampling and layout; cache settings have no effect here
     #[command(flatten)]
     pub machine: ConfigArgs,
 }
@@ -140,7 +140,7 @@ pub struct ConvertArgs {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// The trace cannot be read, the configuration is impossible, or the output cannot be written.
+/// The trace cannot be read, the configuration is invalid, or the output cannot be written.
 pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     args.check()?;
     let config = args.machine.resolve()?;
@@ -170,7 +170,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
 }
 
 impl ConvertArgs {
-    /// Refuses flags that say nothing about what is written.
+    /// Fails if a flag does not apply to the output form.
     fn check(&self) -> Result<()> {
         ensure!(
             self.encoding.is_none() || self.to == Target::Textrace,
@@ -182,13 +182,13 @@ impl ConvertArgs {
                 "--granularity: expected accesses to write, found a trace"
             );
             if let Some(flag) = self.machine.first_of_traces() {
-                bail!("{flag}: a trace holds records, whatever the machine: it is for accesses");
+                bail!("{flag}: it has no effect on a trace, only on accesses");
             }
         }
         Ok(())
     }
 
-    /// What accesses are compressed by: the flag, or else the name of the output.
+    /// Compression of the accesses: from the flag, or from the output's extension.
     fn compression(&self) -> Result<Option<Compression>> {
         let named = Compression::of_name(&self.output.to_string_lossy());
         if self.to.is_trace() {
@@ -198,7 +198,7 @@ impl ConvertArgs {
             };
             ensure!(
                 self.compress.is_none() && named.is_none(),
-                "{asked}: a trace is not compressed as a whole: its tiles are packed by --encoding"
+                "{asked}: a trace cannot be compressed as a whole; use --encoding, which compresses its tiles"
             );
             return Ok(None);
         }
@@ -211,7 +211,7 @@ impl ConvertArgs {
             && flag != named
         {
             bail!(
-                "--compress {}: expected {}, which the name {} asks for",
+                "--compress {}: expected {}, because the output is named {}",
                 flag.name(),
                 named.name(),
                 self.output.display()
@@ -235,7 +235,7 @@ fn write_accesses(
         && !trace.tables().meta.has_visits
     {
         bail!(
-            "{}: the trace lists no visits, so it has no addresses; `tracegen rays --visits` lists them",
+            "{}: the trace has no visits and therefore no addresses; capture it with `tracegen rays --visits`",
             trace.container().file()
         );
     }
@@ -266,7 +266,7 @@ fn write_accesses(
     }
 }
 
-/// Writes the accesses of one core that works through the whole order alone.
+/// Writes the accesses of one core that renders the whole order.
 fn accesses(
     trace: &Textrace,
     config: &RunConfig,
@@ -304,7 +304,7 @@ fn accesses(
     Ok(())
 }
 
-/// Writes what the rays read of the hierarchy, in file order.
+/// Writes the accesses of rays to the hierarchy, in file order.
 fn ray_accesses(
     trace: &Raytrace,
     config: &RunConfig,
@@ -335,7 +335,7 @@ fn ray_accesses(
     Ok(())
 }
 
-/// Writes the trace itself.
+/// Writes the trace in the requested encoding.
 fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
     match (trace, args.to) {
         (Trace::Texture(trace), Target::Textrace) => {
@@ -370,7 +370,7 @@ fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
             writer.finish(tables)?;
         }
         _ => bail!(
-            "{}: a {} cannot become a trace of the other kind",
+            "{}: a {} cannot be converted to the other kind of trace",
             trace.container().file(),
             trace.container().kind()
         ),

@@ -1,4 +1,5 @@
-//! `replay diff`: how two traces' descriptions differ, and their first differing entries and record.
+//! `replay diff`: lists different keys of two traces' descriptions, and the first different entries and
+//! record.
 
 use super::dump::record_lines;
 use super::tiles::{ray_tiles, tiles};
@@ -15,14 +16,14 @@ use std::process::ExitCode;
 /// Arguments of `replay diff`.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Exit code: 0 the same, 1 different, 2 unreadable.
-Every differing line of the description is printed, then the first differing entry of each table and
-the first differing record. How tiles are encoded makes no difference.
+Prints every different line of the description, then the first different entry of each table, then
+the first different record. The tile encoding is not compared.
 
 Example: replay diff a.textrace b.textrace")]
 pub struct DiffArgs {
-    /// One trace
+    /// First trace
     pub left: PathBuf,
-    /// The other
+    /// Second trace
     pub right: PathBuf,
     /// Ignore the description (tool, command line, driver, ...)
     #[arg(long)]
@@ -44,7 +45,7 @@ pub fn run(args: &DiffArgs) -> Result<ExitCode> {
     Ok(ExitCode::FAILURE)
 }
 
-/// Describes the differences; none where the traces hold the same.
+/// Lists the differences; empty if the traces have equal content.
 fn differences(left: &Trace, right: &Trace, ignore_meta: bool) -> Result<Vec<String>> {
     match (left, right) {
         (Trace::Texture(left), Trace::Texture(right)) => textures(left, right, ignore_meta),
@@ -66,7 +67,7 @@ fn textures(left: &Textrace, right: &Textrace, ignore_meta: bool) -> Result<Vec<
     found.extend(entries("sampler", &a.samplers, &b.samplers)?);
     found.extend(entries("draw", &a.draws, &b.draws)?);
     let passes = entries("pass", &a.passes, &b.passes)?;
-    // Without the same tiles there are no records of the same place.
+    // Records can only be compared if both traces have the same tiles.
     let same_tiles = passes.is_none();
     found.extend(passes);
     if same_tiles {
@@ -76,7 +77,7 @@ fn textures(left: &Textrace, right: &Textrace, ignore_meta: bool) -> Result<Vec<
     Ok(found)
 }
 
-/// The first difference of what two traces say of geometry; checksums of lists are compared.
+/// The first difference in the geometry; primitive lists are compared by checksum.
 fn geometry(left: &Textrace, right: &Textrace) -> Option<String> {
     let (a, b) = (left.geometry(), right.geometry());
     if a == b {
@@ -156,7 +157,7 @@ fn first_sample(left: &Raytrace, right: &Raytrace) -> Result<Option<String>> {
                 .collect::<Result<_, _>>()?)
         };
         let place = format!("{eye} eye tile {index} sample");
-        // Texture coordinates may be NaN, which differs from itself but not in print.
+        // Text is compared because NaN texture coordinates are not equal to themselves.
         let found = lines(&place, of(left, &a)?, of(right, &b)?);
         if found.is_some() {
             return Ok(found);
@@ -169,7 +170,7 @@ fn differ(what: &str, left: impl std::fmt::Display, right: impl std::fmt::Displa
     format!("{what} differs\n< {left}\n> {right}")
 }
 
-/// All different keys of two descriptions, those that only one has as well.
+/// All different keys of two descriptions, with keys that only one of them has.
 fn keys<T: serde::Serialize>(what: &str, left: &T, right: &T) -> Result<Vec<String>> {
     fn walk(path: &str, a: &Value, b: &Value, found: &mut Vec<String>) {
         match (a, b) {
@@ -211,7 +212,7 @@ fn entries<T: PartialEq + serde::Serialize>(
     Ok(counts)
 }
 
-/// First different line of two lists, if there is one.
+/// First different line of two lists, if any.
 fn lines(place: &str, left: Vec<String>, right: Vec<String>) -> Option<String> {
     let count = left.len().max(right.len());
     let at = (0..count).find(|at| left.get(*at) != right.get(*at))?;

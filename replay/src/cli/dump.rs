@@ -1,4 +1,4 @@
-//! `replay dump`: decoded records as JSON Lines.
+//! `replay dump`: prints decoded records as JSON Lines.
 
 use super::tiles::{NumberRange, ray_tiles, tiles};
 use anyhow::{Result, bail};
@@ -13,8 +13,8 @@ use std::process::ExitCode;
 /// Arguments of `replay dump`.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "A texture trace has a line a record, a ray trace a line a sample of a pixel,
-with its rays and, where the trace lists them, their visits.
+    after_help = "A texture trace has one line per record. A ray trace has one line per sample of a pixel,
+with its rays and, if the trace has them, their visits.
 
 Examples:
   replay dump c.textrace --pass 0 --tile 1200
@@ -24,13 +24,13 @@ Examples:
 pub struct DumpArgs {
     /// Trace, .textrace or .raytrace
     pub trace: PathBuf,
-    /// Passes, a number or a range such as 0..2; of a ray trace 0 is the left eye, 1 the right
+    /// Passes: a number or a range such as 0..2; in ray traces, 0 is the left eye and 1 the right
     #[arg(long, value_name = "RANGE")]
     pub pass: Option<NumberRange>,
-    /// Tiles of each pass, a number or a range such as 40..48
+    /// Tiles of each pass: a number or a range such as 40..48
     #[arg(long, value_name = "RANGE")]
     pub tile: Option<NumberRange>,
-    /// Primitive lists in place of records: a line for each tile of each view that was captured with --geometry
+    /// Print primitive lists instead of records: one line per tile of each view captured with --geometry
     #[arg(long, conflicts_with_all = ["pass", "tile"])]
     pub lists: bool,
 }
@@ -38,7 +38,7 @@ pub struct DumpArgs {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// The trace cannot be read, has no such pass or tile, or the output cannot be written.
+/// The trace cannot be read, it does not have such a pass or tile, or the output cannot be written.
 pub fn run(args: &DumpArgs) -> Result<ExitCode> {
     let trace = Trace::open(&args.trace)?;
     let mut out = shell::stdout();
@@ -83,7 +83,7 @@ fn dump(trace: &Trace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
     )
 }
 
-/// Prints the records of the chosen tiles; true if there is a chosen tile.
+/// Prints the records of the chosen tiles; returns false if no tile matches.
 fn records(
     trace: &Textrace,
     chosen: impl Fn(usize, usize) -> bool,
@@ -101,7 +101,7 @@ fn records(
     Ok(any)
 }
 
-/// The records of a tile as lines of JSON.
+/// The records of a tile as JSON Lines.
 pub fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Iterator<Item = String> {
     tile.runs.iter().flat_map(move |run| {
         let origin = Origin {
@@ -120,7 +120,7 @@ pub fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Iterator<Ite
 fn primitive_lists(trace: &Textrace, out: &mut impl Write) -> Result<()> {
     let Some(geometry) = trace.geometry() else {
         bail!(
-            "{}: expected a trace with primitive lists, which `tracegen raster --geometry` captures; found none",
+            "{}: expected a trace with primitive lists (captured with `tracegen raster --geometry`), found none",
             trace.container().file()
         );
     };
@@ -135,7 +135,7 @@ fn primitive_lists(trace: &Textrace, out: &mut impl Write) -> Result<()> {
     Ok(())
 }
 
-/// Prints the samples of the chosen tiles; true if there is a chosen tile.
+/// Prints the samples of the chosen tiles; returns false if no tile matches.
 fn samples(
     trace: &Raytrace,
     chosen: impl Fn(usize, usize) -> bool,
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pass_that_is_not_there_is_an_error() {
+    fn a_missing_pass_is_an_error() {
         let file = file_of(&Synthetic::default().generate());
         let trace = Trace::open(file.path()).unwrap();
         let args = DumpArgs {

@@ -1,4 +1,4 @@
-//! Arguments that `replay paper` and `replay report` share: what to vary, and what to write.
+//! Arguments that `replay paper` and `replay report` share: axes and outputs.
 
 use super::ConfigArgs;
 use super::subjects::Traces;
@@ -21,8 +21,6 @@ pub struct ExperimentArgs {
     /// Texture traces
     #[arg(required = true, value_name = "TRACE")]
     traces: Vec<PathBuf>,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Orders to compare, comma-separated, or `all`
     #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
     orders: String,
@@ -33,22 +31,25 @@ pub struct ExperimentArgs {
         default_value = "8/128,16/128,8/256,16/256"
     )]
     caches: String,
-    /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
+    /// Scene of the paper to compare with: SCENE for every trace, or LABEL=SCENE; `none` for no comparison
     #[arg(long = "as", value_name = "SCENE")]
     stand_ins: Vec<String>,
-    /// EmbeddedPicture of both eyes for the page, LABEL=FILE (or FILE for a single trace)
+    /// Rendered picture of both eyes for the page: LABEL=FILE (or FILE if there is one trace)
     #[arg(long = "image", value_name = "LABEL=FILE")]
     images: Vec<String>,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 impl ExperimentArgs {
-    /// Replays every point and hands the report and the pictures that it is to show to `print`; exit code 1
-    /// when the orders replayed different accesses. The `outputs` that will be written are checked first.
+    /// Replays every point and passes the report and the pictures to `print`. Returns exit code 1 if the
+    /// orders replayed different accesses. Checks `outputs` first.
     ///
     /// # Errors
-    /// Wrong arguments, an unreadable trace or picture, an output that cannot be written, what `print` says.
+    /// Wrong arguments, an unreadable trace or picture, an output that cannot be written, or an error of
+    /// `print`.
     pub fn run(
         &self,
         outputs: &[Output],
@@ -61,12 +62,12 @@ impl ExperimentArgs {
         let usual = RunConfig::default();
         ensure!(
             base.order == usual.order,
-            "--order is varied here; use --orders"
+            "--order: this command varies the order; use --orders"
         );
         ensure!(
             (base.level.l1.size_bytes, base.level.l2.size_bytes)
                 == (usual.level.l1.size_bytes, usual.level.l2.size_bytes),
-            "--l1 and --l2 are varied here; use --caches"
+            "--l1 and --l2: this command varies the sizes; use --caches"
         );
         let images = self.images.iter().map(|image| {
             let file = image
@@ -81,7 +82,7 @@ impl ExperimentArgs {
         if let Some(preset) = self.machine.preset() {
             ensure!(
                 base.is_looping(),
-                "--preset: it stands beside the timed model; leave out --mode"
+                "--preset: it is compared with the timed model; leave out --mode"
             );
             plan = plan.beside(preset, self.machine.resolve()?)?;
         }
@@ -107,7 +108,7 @@ impl ExperimentArgs {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// Sets what `--as` says over what follows from the scenes' names.
+    /// Sets the scenes of `--as`, which override those found by the scenes' names.
     fn choose_stand_ins(&self, subjects: &mut [Subject]) -> Result<()> {
         let labels: Vec<String> = subjects.iter().map(|s| s.label.clone()).collect();
         for (label, _) in self.stand_ins.iter().filter_map(|s| s.rsplit_once('=')) {
@@ -125,16 +126,16 @@ impl ExperimentArgs {
         Ok(())
     }
 
-    /// True where the page is to show pictures.
+    /// True if the page shows pictures.
     #[must_use]
     pub fn has_pictures(&self) -> bool {
         !self.images.is_empty()
     }
 
-    /// The pictures that were asked for, each with its trace's label.
+    /// The pictures of `--image`, each with the label of its trace.
     ///
     /// # Errors
-    /// A label that no trace has, a file that is no picture.
+    /// A label that no trace has, or a file that is not a picture.
     fn pictures(&self, subjects: &[Subject]) -> Result<Vec<EmbeddedPicture>> {
         let known: Vec<&str> = subjects.iter().map(|s| s.label.as_str()).collect();
         let pictures: Vec<Result<EmbeddedPicture>> = self
@@ -162,17 +163,16 @@ impl ExperimentArgs {
     }
 }
 
-/// Writes the report's page, and the same numbers beside it as JSON and CSV.
+/// Writes the report's page, and JSON and CSV files with the same numbers.
 ///
 /// # Errors
-/// A plot that cannot be drawn, a file that cannot be written.
+/// A plot that cannot be drawn, or a file that cannot be written.
 pub fn write_report(report: &PaperReport, pictures: &[EmbeddedPicture], path: &Path) -> Result<()> {
     let html = page::page(report, pictures)?;
     write_page(path, &html, &report.json()?, &report.csv())
 }
 
-/// The page at `path`, and JSON and CSV with the same numbers beside it; a page that goes to
-/// standard output goes alone.
+/// The page at `path`, and JSON and CSV files with the same numbers; for standard output, only the page.
 #[must_use]
 pub fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
     let mut outputs = vec![Output::text(flag, path)];
@@ -182,7 +182,7 @@ pub fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
     outputs
 }
 
-/// Writes a page, and the same numbers beside it as JSON and CSV.
+/// Writes a page, and JSON and CSV files with the same numbers.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -194,10 +194,10 @@ pub fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> 
     write_atomically(path, page.as_bytes())
 }
 
-/// Orders by name, comma-separated, or `all`.
+/// Parses comma-separated names of orders, or `all`.
 ///
 /// # Errors
-/// A name that no order has.
+/// An unknown name.
 pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
     if text == "all" {
         let others = Order::all().filter(|o| !z2::ORDERS.contains(o));
@@ -207,8 +207,10 @@ pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
     for name in text.split(',').map(str::trim) {
         let Some(order) = Order::find(name) else {
             let known: Vec<&str> = Order::all().map(|o| o.name()).collect();
+            let similar = Order::similar(name);
+            let hint = similar.map_or(String::new(), |o| format!("; did you mean `{}`?", o.name()));
             bail!(
-                "--orders: expected `all` or some of {}, found `{name}`",
+                "--orders: expected `all` or some of {}, found `{name}`{hint}",
                 known.join(", ")
             );
         };
@@ -219,10 +221,10 @@ pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
     Ok(orders)
 }
 
-/// L1 and L2 sizes in bytes, from KiB as in `8/128,16/256`.
+/// Parses L1 and L2 sizes in KiB, such as `8/128,16/256`, to bytes.
 ///
 /// # Errors
-/// Anything else.
+/// Any other syntax.
 pub fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
     let kib = |number: &str| {
         number
@@ -251,7 +253,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_orders_begin_with_the_papers() {
+    fn all_orders_begin_with_those_of_the_paper() {
         let orders = parse_orders("all").unwrap();
         assert_eq!(orders[..3], z2::ORDERS);
         assert_eq!(orders.len(), Order::all().len());
@@ -267,6 +269,19 @@ mod tests {
                 known.join(", ")
             )
         );
+    }
+
+    #[test]
+    fn a_mistyped_order_comes_with_a_suggestion() {
+        for (typed, order) in [
+            ("z2-sts", "z2-sta"),
+            ("Mortn", "morton"),
+            ("hilber", "hilbert"),
+        ] {
+            let error = parse_orders(typed).unwrap_err().to_string();
+            let hint = format!("found `{typed}`; did you mean `{order}`?");
+            assert!(error.ends_with(&hint), "{error}");
+        }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! `replay info`: what a trace holds.
+//! `replay info`: prints a summary of a trace.
 
 use super::tiles::{ray_tiles, tiles};
 use crate::report::columns::{Column, Show};
@@ -26,7 +26,7 @@ const SCHEMA: &str = "replay.info/1";
 pub struct InfoArgs {
     /// Trace, .textrace or .raytrace
     pub trace: PathBuf,
-    /// Print one JSON object (schema replay.info/1) with the whole tables
+    /// Print one JSON object (schema replay.info/1) with the complete tables
     #[arg(long)]
     pub json: bool,
 }
@@ -101,7 +101,7 @@ fn chunks(container: &Container) -> Vec<Value> {
     container.directory().iter().map(chunk).collect()
 }
 
-/// Counts of some tiles, from the index alone.
+/// Counts of some tiles, read from the index only.
 #[derive(Default)]
 struct Counts {
     tiles: u64,
@@ -163,7 +163,7 @@ fn passes(trace: &Textrace) -> Result<Value> {
     Ok(all.into())
 }
 
-/// What the text says first, whatever the trace holds.
+/// The first lines of the text, for any kind of trace.
 fn heading(container: &Container, meta: &TraceMeta, checksum: u32) -> String {
     format!(
         "{}: {} {} (content {checksum:08x}, file {:08x}), {} bytes\nscene {}, {} triangles, camera {}, {} frame(s)\n\
@@ -203,7 +203,7 @@ fn texture_text(trace: &Textrace, value: &Value) -> String {
     text += "\n";
     text += &texture_table(&trace.tables().textures);
     text += &format!(
-        "\n{} draws, {} samplers; {} records in {} tile bytes, {:.2} bytes a record\n",
+        "\n{} draws, {} samplers; {} records in {} tile bytes, {:.2} bytes per record\n",
         trace.tables().draws.len(),
         trace.tables().samplers.len(),
         totals["records"],
@@ -213,7 +213,7 @@ fn texture_text(trace: &Textrace, value: &Value) -> String {
     text
 }
 
-/// What the frames were rendered with, and why.
+/// The techniques that the frames were rendered with, and why they were chosen.
 fn techniques_text(techniques: &ChosenTechniques) -> String {
     let schedule = &techniques.schedule;
     match &techniques.choice {
@@ -280,7 +280,7 @@ fn texture_table(textures: &[Texture]) -> String {
     Table::new(&columns, &rows).text()
 }
 
-/// Rays of one eye and what they cost.
+/// Ray and traversal counts of one eye.
 #[derive(Clone, Copy, Default)]
 struct RayCounts {
     samples: u64,
@@ -346,12 +346,12 @@ fn kind_name(kind: RayKind) -> String {
     lower(&kind)
 }
 
-/// A variant's name as the tables write it.
+/// Name of a variant as the tables write it.
 fn lower(variant: &impl std::fmt::Debug) -> String {
     format!("{variant:?}").to_lowercase()
 }
 
-/// Counts of the left and of the right eye; every tile is decoded.
+/// Counts of the left and of the right eye; decodes every tile.
 fn ray_counts(trace: &Raytrace) -> Result<[RayCounts; 2]> {
     let tiles: Vec<(Eye, u32)> = ray_tiles(trace.tables()).collect();
     let of_tiles: Vec<RayCounts> = tiles

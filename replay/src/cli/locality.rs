@@ -1,4 +1,4 @@
-//! `replay locality`: reuse distances and what follows from them, order beside order.
+//! `replay locality`: reuse distances and statistics derived from them, by order.
 
 use super::ConfigArgs;
 use super::addresses::{AddressInput, name_of, two_levels_only};
@@ -15,7 +15,7 @@ use shell::{Output, Progress, is_stdout};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What `--orders` is without a value.
+/// Default of `--orders`.
 const USUAL_ORDERS: &str = "morton,z2-lrta,z2-sta,z2-sta-merge";
 
 /// Arguments of `replay locality`.
@@ -35,40 +35,40 @@ pub struct Args {
         conflicts_with = "addresses"
     )]
     traces: Vec<PathBuf>,
-    #[command(flatten)]
-    addresses: AddressInput,
-    #[command(flatten)]
-    machine: ConfigArgs,
     /// Orders to compare, comma-separated, or `all` [default: morton,z2-lrta,z2-sta,z2-sta-merge]
     #[arg(long, value_name = "ORDERS", conflicts_with = "addresses")]
     orders: Option<String>,
-    /// Also analyse what all cores ask for as one stream
+    /// Also analyse the accesses of all cores as one stream
     #[arg(long)]
     merged: bool,
     /// Print one JSON object (schema replay.locality/1)
     #[arg(long)]
     json: bool,
-    /// Also write the tables as CSV files into this folder, with the exact count of every distance
+    /// Also write the tables as CSV files into this folder, with exact counts of every distance
     #[arg(long, value_name = "DIR")]
     csv: Option<PathBuf>,
-    /// Also write a page with plots, with JSON and CSV beside it
+    /// Also write a page with plots, and JSON and CSV files with the same numbers
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    addresses: AddressInput,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// Runs the subcommand.
 ///
 /// # Errors
-/// An impossible configuration, an unreadable trace, an output that cannot be written.
+/// An invalid configuration, an unreadable trace, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.threads.start()?;
     let config = args.machine.resolve()?;
     two_levels_only(&config, "locality")?;
     ensure!(
         config.order == RunConfig::default().order,
-        "--order is varied here; use --orders"
+        "--order: this command varies the order; use --orders"
     );
     let orders = parse_orders(args.orders.as_deref().unwrap_or(USUAL_ORDERS))?;
     let prints = check_outputs(args)?;
@@ -121,7 +121,7 @@ fn of_traces(args: &Args, config: &RunConfig, orders: &[Order]) -> Result<Vec<Tr
 fn of_addresses(args: &Args, path: &Path, config: &RunConfig) -> Result<TraceFigures> {
     ensure!(
         !args.merged,
-        "--merged cannot be used with --addresses: there are no cores"
+        "--merged cannot be used with --addresses: plain addresses have no cores"
     );
     let file = args.addresses.open(path)?;
     Ok(TraceFigures {
@@ -132,7 +132,7 @@ fn of_addresses(args: &Args, path: &Path, config: &RunConfig) -> Result<TraceFig
     })
 }
 
-/// Checks the outputs; true where standard output is left for the result.
+/// Checks the outputs; returns true if standard output is free for the result.
 fn check_outputs(args: &Args) -> Result<bool> {
     if let Some(folder) = &args.csv {
         shell::check_folder("--csv", folder)?;

@@ -1,4 +1,4 @@
-//! The command line, one file a subcommand.
+//! The command line, with one file per subcommand.
 
 mod accuracy;
 mod addresses;
@@ -63,7 +63,7 @@ struct Cli {
 enum Command {
     /// Replay one trace in one tile order through one cache configuration.
     Run(Box<run::Args>),
-    /// Print what a trace holds.
+    /// Print a summary of a trace.
     Info(info::InfoArgs),
     /// Check every checksum and invariant of a trace.
     Validate(validate::ValidateArgs),
@@ -71,23 +71,23 @@ enum Command {
     Dump(dump::DumpArgs),
     /// Print the first difference between two traces.
     Diff(diff::DiffArgs),
-    /// Hold two captures of the same views against each other, and what differs in the caches.
+    /// Compare two captures of the same views, fragment by fragment and by cache misses.
     Compare(Box<compare::Args>),
     /// Write a trace's accesses for other simulators, or the trace in another encoding.
     Convert(Box<convert::ConvertArgs>),
-    /// Replay the Z2 paper's experiment: its caches and orders, beside its published figures.
+    /// Replay the Z2 paper's experiment and compare it with the published figures.
     Paper(Box<paper::Args>),
-    /// Measure what quicker or other ways of counting cost in accuracy and spare in time.
+    /// Measure the run time and the error of faster methods.
     Accuracy(Box<accuracy::Args>),
-    /// Try settings of the paper's machine on some scenes and judge them on others.
+    /// Choose settings of the paper's machine on some scenes and evaluate them on others.
     Calibrate(Box<calibrate::Args>),
-    /// Replay every point of an experiment file; goes on where it stopped.
+    /// Replay every point of an experiment file; an interrupted sweep continues.
     Sweep(sweep::Args),
-    /// Write the experiment as one self-contained page, with JSON and CSV beside it.
+    /// Write the Z2 paper's experiment as a self-contained page, with JSON and CSV files.
     Report(Box<report::Args>),
-    /// Hold techniques of stereo rendering against each other: time, image error, caches.
+    /// Compare stereo rendering techniques: frame time, image error, cache misses.
     Techniques(Box<techniques::Args>),
-    /// Reuse distances, working sets, miss-ratio curves, OPT and the 3C split, order by order.
+    /// Analyse reuse distances, working sets, miss-ratio curves, OPT and 3C misses, by order.
     Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
@@ -124,7 +124,7 @@ pub fn main() -> ExitCode {
     )
 }
 
-/// Opens a texture trace and names it as results do.
+/// Opens a texture trace and returns its identification for results.
 ///
 /// # Errors
 /// The file cannot be read or is damaged.
@@ -134,7 +134,7 @@ pub fn open_textrace(path: &Path) -> Result<(Textrace, TraceId)> {
     Ok((trace, id))
 }
 
-/// Warns where bytes of the first-miss model will be printed that do not belong to the Z2 paper's machine.
+/// Warns before printing memory traffic of the first-miss model on a machine other than the Z2 paper's.
 fn warn_of_first_miss_bytes(plan: &Plan) {
     let bare = |config: &RunConfig| {
         config.tmu_model() == Some(TmuModel::FirstMiss) && Preset::Z2_PAPER.over(*config) != *config
@@ -142,7 +142,7 @@ fn warn_of_first_miss_bytes(plan: &Plan) {
     if plan.points.iter().any(|point| bare(&point.config)) {
         shell::warn(
             "--tmu first-miss without --preset z2-paper: external bytes count every fetch from memory, also of lines that \
-             were replaced before their waiting thread came back for them, up to several times the memory traffic of \
+             were replaced before the waiting thread used them. They can be several times the memory traffic of \
              --tmu looping; use --tmu looping for memory traffic",
         );
     }

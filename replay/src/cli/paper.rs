@@ -1,4 +1,4 @@
-//! `replay paper`: the Z2 paper's experiment as a table.
+//! `replay paper`: prints the Z2 paper's experiment as a table.
 
 use super::experiment_args::{ExperimentArgs, page_outputs, write_report};
 use super::parquet_arg::ParquetArg;
@@ -20,33 +20,33 @@ use std::process::ExitCode;
   replay paper mine.textrace --as crytek-sponza --html out/report.html
   replay paper a.textrace --preset z2-paper --json")]
 pub struct Args {
-    #[command(flatten)]
-    experiment: ExperimentArgs,
     /// Also replay in functional mode and show the difference
     #[arg(long)]
     functional: bool,
     /// Print one JSON object (schema replay.paper/1)
     #[arg(long)]
     json: bool,
-    /// Also write the rows as CSV; - writes them to standard output in place of the table
+    /// Also write the rows as CSV; - writes them to standard output instead of the table
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     #[command(flatten)]
     parquet: ParquetArg,
-    /// Also write the report page, with JSON and CSV beside it
+    /// Also write the report page, and JSON and CSV files with the same numbers
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    #[command(flatten)]
+    experiment: ExperimentArgs,
 }
 
-/// Runs the subcommand; exit code 1 when the orders replayed different accesses.
+/// Runs the subcommand. Exit code 1 if the orders replayed different accesses.
 ///
 /// # Errors
-/// Wrong arguments, an unreadable trace, an output that cannot be written.
+/// Wrong arguments, an unreadable trace, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let page = args.html.is_some();
     ensure!(
         page || !args.experiment.has_pictures(),
-        "--image: the page shows it; add --html"
+        "--image: needs --html, because only the page shows pictures"
     );
     let mut outputs: Vec<Output> = Vec::new();
     outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         })
 }
 
-/// The tables for a terminal.
+/// The tables as text for a terminal.
 #[must_use]
 pub fn text(report: &PaperReport) -> String {
     let mut text = tables::table_2(report).text();
@@ -88,7 +88,7 @@ pub fn text(report: &PaperReport) -> String {
     if let Some(table) = tables::as_the_paper_counts(report) {
         let _ = write!(
             text,
-            "\nAs the paper counts (--preset z2-paper): first look-ups, merged requests counted; what memory sends is to the right\n{}",
+            "\nCounted as in the paper (--preset z2-paper): first look-ups, with merged requests; memory traffic is in the columns on the right\n{}",
             table.text()
         );
     }
@@ -99,7 +99,7 @@ pub fn text(report: &PaperReport) -> String {
     if fit.rows > 0 {
         let _ = write!(
             text,
-            "\nTMU utilisation against the paper's surface, at first look-ups: mean absolute deviation {:.2} points, largest {:.2}, over {} rows\n",
+            "\nTMU utilisation against the paper's surface, at first look-ups: mean absolute deviation {:.2} points, maximum {:.2}, over {} rows\n",
             fit.mean_absolute_points, fit.largest_points, fit.rows
         );
     }

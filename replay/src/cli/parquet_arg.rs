@@ -1,4 +1,4 @@
-//! `--parquet` of every command that has its rows as CSV.
+//! The flag `--parquet` of every command that writes its rows as CSV.
 
 use crate::files::write_atomically;
 use crate::report::parquet;
@@ -10,29 +10,29 @@ use std::path::PathBuf;
 /// The flag.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ParquetArg {
-    /// Also write the rows as Parquet: typed columns under the CSV's names
+    /// Also write the rows as Parquet: typed columns with the names of the CSV's columns
     #[arg(long = "parquet", value_name = "FILE")]
     pub path: Option<PathBuf>,
 }
 
 impl ParquetArg {
-    /// What will be written.
+    /// The output file, if given.
     #[must_use]
     pub fn output(&self) -> Option<Output> {
         let path = self.path.as_deref()?;
         Some(Output::binary("--parquet", path))
     }
 
-    /// Whether it takes standard output from the command's own result.
+    /// Whether it writes to standard output instead of the command's result.
     #[must_use]
     pub fn takes_stdout(&self) -> bool {
         self.path.as_deref().is_some_and(is_stdout)
     }
 
-    /// Writes the rows, if they are asked for.
+    /// Writes the rows if the flag is given.
     ///
     /// # Errors
-    /// A cell that its column cannot hold, a file that cannot be written.
+    /// A cell that its column's type cannot hold, or a file that cannot be written.
     pub fn write(&self, rows: impl FnOnce() -> Table) -> Result<()> {
         let Some(path) = &self.path else {
             return Ok(());

@@ -1,4 +1,4 @@
-//! `replay report`: the Z2 paper's experiment as a page.
+//! `replay report`: writes the Z2 paper's experiment as a page.
 
 use super::experiment_args::{ExperimentArgs, page_outputs, write_report};
 use super::parquet_arg::ParquetArg;
@@ -14,19 +14,19 @@ use std::process::ExitCode;
   replay report crytek.textrace --image crytek-sponza=crytek.png -o out/report.html
   replay report *.textrace --orders all -o out/report.html")]
 pub struct Args {
-    #[command(flatten)]
-    experiment: ExperimentArgs,
-    /// The page; JSON and CSV with the same numbers are written beside it
+    /// Page to write; JSON and CSV files with the same numbers are written next to it
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
     parquet: ParquetArg,
+    #[command(flatten)]
+    experiment: ExperimentArgs,
 }
 
-/// Runs the subcommand; exit code 1 when the orders replayed different accesses.
+/// Runs the subcommand. Exit code 1 if the orders replayed different accesses.
 ///
 /// # Errors
-/// Wrong arguments, an unreadable trace, an output that cannot be written.
+/// Wrong arguments, an unreadable trace, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut outputs = page_outputs("--output", &args.output);
     outputs.extend(args.parquet.output());

@@ -1,5 +1,5 @@
-//! `replay reproject`: ray traces through the model of a ray-tracing GPU that reuses the left
-//! image for the right one.
+//! `replay reproject`: replays ray traces through a ray-tracing GPU model that reuses the left image for
+//! the right one.
 
 use super::parquet_arg::ParquetArg;
 use crate::files::{self, write_atomically};
@@ -32,44 +32,44 @@ use std::process::ExitCode;
   replay reproject *.raytrace --html out/reprojection.html
   replay reproject chess.raytrace --curve --sensitivity --html chess.html")]
 pub struct ReprojectArgs {
-    /// Ray traces.
+    /// Ray traces
     #[arg(value_name = "FILE", required_unless_present = "print_config")]
     files: Vec<PathBuf>,
     #[arg(long, value_name = "NAME", help = presets::help(), value_parser = preset)]
     preset: Option<&'static Preset>,
     #[arg(long, value_name = "RULE", help = rule_help())]
     rule: Option<Rule>,
-    /// What a reused pixel takes from the left one [default: primary].
+    /// Values that a reprojected pixel reuses [default: primary]
     #[arg(long, value_enum)]
     reuse: Option<Reuse>,
-    /// Model parameters (TOML) that differ from the defaults.
+    /// TOML file with model parameters; others keep their defaults
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
-    /// Prints the parameters in use, with their comments where they are the defaults, and ends.
+    /// Print the model parameters as TOML (the defaults with comments) and stop
     #[arg(long)]
     print_config: bool,
-    /// Adds cycles saved against image error over rules and levels of reuse.
+    /// Add a chart of cycles saved against image error, over rules and levels of reuse
     #[arg(long)]
     curve: bool,
-    /// Adds what halving and doubling each parameter does to the ratios.
+    /// Add the sensitivity of the ratios to halving and doubling each parameter
     #[arg(long)]
     sensitivity: bool,
-    /// Prints JSON: one object, or one a line for several files.
+    /// Print one JSON object per file, one per line
     #[arg(long, conflicts_with = "csv")]
     json: bool,
-    /// Prints CSV: a row for the rule and one for plain reuse, per file.
+    /// Print CSV: per file, one row for the rule and one for plain reuse
     #[arg(long)]
     csv: bool,
     #[command(flatten)]
     parquet: ParquetArg,
-    /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
-    /// [default: the scene that a built-in one of the paper's stands for].
+    /// Scene of the paper to compare with: SCENE for every trace, or LABEL=SCENE; `none` for no comparison
+    /// [default: by the name of the scene]
     #[arg(long = "as", value_name = "SCENE")]
     paper_scenes: Vec<String>,
-    /// Writes the right image, its bad pixels in yellow and its FLIP map side by side (one file).
+    /// Write the right image, its bad pixels in yellow and its FLIP map side by side (one input file)
     #[arg(long, value_name = "PNG")]
     image: Option<PathBuf>,
-    /// Writes a report with charts and pictures.
+    /// Write a page with charts and pictures
     #[arg(long, value_name = "HTML")]
     html: Option<PathBuf>,
     #[command(flatten)]
@@ -103,7 +103,7 @@ impl ReprojectArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// A file that cannot be read, parameters that cannot be used, an output that cannot be written.
+/// A file that cannot be read, invalid parameters, or an output that cannot be written.
 pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     args.threads.start()?;
     let config = read_config(args.preset, args.config.as_deref())?;
@@ -120,7 +120,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         "--image: expected one FILE, found {}",
         args.files.len()
     );
-    // A wrong --as is refused before the work.
+    // Report a wrong --as before the replays.
     paper::values("", "", &args.paper_scenes)?;
     let prints = check_outputs(&args)?;
     let mut entries = Vec::new();
@@ -150,7 +150,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks the outputs before the work; true if the result is to be printed.
+/// Checks the outputs before the replays; returns true if the result is to be printed.
 fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
     let outputs = [
         args.image.as_deref().map(|p| Output::binary("--image", p)),
@@ -233,7 +233,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
     Ok(Entry { report, pictures })
 }
 
-/// The right image, its bad pixels, and its error.
+/// The right image, its bad pixels, and its error map, side by side.
 fn triptych(ours: &RuleRun) -> Picture {
     let bad = picture::bad_pixels(&ours.decisions, &ours.picture);
     Picture::side_by_side(&[&ours.picture, &bad, &ours.flip.picture()], 8)
@@ -267,7 +267,7 @@ mod tests {
         Cli::try_parse_from(words).expect("valid arguments").args
     }
 
-    /// A small trace in a folder of its own.
+    /// A small trace in its own folder.
     fn trace_file() -> (tempfile::TempDir, String) {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.raytrace");
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trace_file_gives_the_result_of_the_trace_in_memory() {
+    fn a_trace_file_and_the_same_trace_in_memory_have_equal_results() {
         let (_folder, path) = trace_file();
         let args = args(&[&path]);
         let entry = report_on(Path::new(&path), &args, &SgrtConfig::default()).expect("a report");
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn picture_and_page_are_written_beside_nothing_else() {
+    fn picture_and_page_are_the_only_files_written() {
         let (folder, path) = trace_file();
         let out = |name: &str| folder.path().join(name).display().to_string();
         let (png, html) = (out("a.png"), out("a.html"));
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_that_cannot_be_used_name_file_and_key() {
+    fn invalid_parameters_are_reported_with_file_and_key() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("p.toml");
         std::fs::write(&path, "[tni]\nunits = 0\n").expect("written");

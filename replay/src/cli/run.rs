@@ -1,4 +1,4 @@
-//! `replay run`: one trace, one order, one configuration; or plain addresses through caches.
+//! `replay run`: replays one trace in one order with one configuration, or plain addresses through caches.
 
 use super::ConfigArgs;
 use super::addresses::AddressArgs;
@@ -25,36 +25,46 @@ use std::time::Instant;
   replay run --addresses gcc.din.gz --l1 32KiB --l2 256KiB --line 64 --ways 8
   replay convert c.textrace --to u32 | replay run --addresses - --address-form u32 --caches 8/128,16/256")]
 pub struct Args {
-    /// Texture trace; may be left out with --addresses and --print-config
+    /// Texture trace; optional with --addresses and --print-config
     #[arg(required_unless_present_any = ["print_config", "addresses"], conflicts_with = "addresses")]
     trace: Option<PathBuf>,
-    #[command(flatten)]
-    machine: ConfigArgs,
-    #[command(flatten)]
-    addresses: AddressArgs,
     /// Print one JSON object (schema replay.run/1, or replay.addresses/1)
     #[arg(long)]
     json: bool,
     /// Also count by tile (in the JSON)
-    #[arg(long, requires = "json", conflicts_with = "addresses")]
+    #[arg(
+        long,
+        requires = "json",
+        conflicts_with = "addresses",
+        hide_short_help = true
+    )]
     tiles: bool,
-    /// Also write which core works on which tiles when, for ui.perfetto.dev (timed mode)
+    /// Also write which tiles each core renders over time, for ui.perfetto.dev (timed mode)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["addresses", "compare_modes", "print_config"])]
     timeline: Option<PathBuf>,
-    /// Rendered picture whose tiles say how far colour is compressed without loss (with --frame, tile-based machines)
-    #[arg(long, value_name = "FILE", conflicts_with = "addresses")]
+    /// Rendered picture; colour compression is computed from its tiles (with --frame, tile-based machines)
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with = "addresses",
+        hide_short_help = true
+    )]
     picture: Option<PathBuf>,
     /// Replay in both modes and print the difference
-    #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"])]
+    #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"], hide_short_help = true)]
     compare_modes: bool,
     /// Print the whole configuration as TOML and stop
     #[arg(long, conflicts_with_all = ["json", "compare_modes", "addresses"])]
     print_config: bool,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    addresses: AddressArgs,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
-/// What the command writes, standard output included.
+/// All outputs of the command, including standard output.
 fn outputs(args: &Args) -> Vec<Output> {
     let timeline = args.timeline.iter();
     let mut outputs: Vec<Output> = timeline
@@ -67,7 +77,7 @@ fn outputs(args: &Args) -> Vec<Output> {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// An impossible configuration or an unreadable trace.
+/// An invalid configuration or an unreadable trace.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut config = args.machine.resolve()?;
     if let Some(path) = args.addresses.path(&args.machine)? {
@@ -78,7 +88,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     config.timeline = args.timeline.is_some();
     ensure!(
         !config.timeline || config.is_looping(),
-        "--timeline: expected --mode timed --tmu looping: only there time passes as on the texture units"
+        "--timeline: expected --mode timed --tmu looping, the only model that records when work items run"
     );
     if let Some(picture) = &args.picture {
         let Some(frame) = &mut config.frame else {
@@ -113,7 +123,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let outcome = experiment::run(&plan, &subjects, None, &|_| ())?;
     let seconds = start.elapsed().as_secs_f64();
     let rows = outcome.rows();
-    // On stderr: a result must not depend on the machine.
+    // On stderr, because results must not depend on the host machine.
     let footprints: u64 = rows.iter().map(|row| row.result.footprints).sum();
     shell::note(&format!(
         "{:.1} M footprints/s ({footprints} footprints in {seconds:.3} s, decoding included)",

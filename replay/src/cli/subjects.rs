@@ -1,4 +1,4 @@
-//! The texture traces of an experiment, opened and named.
+//! Opens and names the texture traces of an experiment.
 
 use crate::experiment::{Subject, labels};
 use crate::result::TraceId;
@@ -34,7 +34,7 @@ impl Traces {
         self.0.iter().map(|(_, id, _)| id)
     }
 
-    /// Quad records of each trace.
+    /// Number of quad records of each trace.
     #[must_use]
     pub fn records(&self) -> Vec<u64> {
         self.0.iter().map(|(trace, ..)| trace.records()).collect()
@@ -49,7 +49,7 @@ impl Traces {
             .sum()
     }
 
-    /// The traces under the names of their files.
+    /// The traces, labelled with their file names.
     #[must_use]
     pub fn subjects_by_file(&self) -> Vec<Subject<'_>> {
         let opened = self.0.iter();
@@ -58,7 +58,7 @@ impl Traces {
             .collect()
     }
 
-    /// The traces under names of their own.
+    /// The traces, labelled with their scene names if these are unique.
     #[must_use]
     pub fn subjects(&self) -> Vec<Subject<'_>> {
         let named: Vec<_> = self

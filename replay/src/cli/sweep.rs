@@ -1,4 +1,4 @@
-//! `replay sweep`: the points of an experiment file, here or on many machines.
+//! `replay sweep`: replays the points of an experiment file on one or many machines.
 
 use super::parquet_arg::ParquetArg;
 use super::subjects::Traces;
@@ -22,9 +22,9 @@ use std::process::ExitCode;
 
 A sweep that was stopped goes on where it stopped when it is started again with the same --out.")]
 pub struct Args {
-    /// Experiment: [base], [axes] and [one-at-a-time] over keys of the configuration
+    /// Experiment file: [base], [axes] and [one-at-a-time] over configuration keys
     experiment: PathBuf,
-    /// Texture traces; win over the file's own list
+    /// Texture traces; they override the list in the experiment file
     traces: Vec<PathBuf>,
     /// Folder for results.json, results.csv, report.html and points/ [default: out/NAME]
     #[arg(short, long, value_name = "DIR")]
@@ -34,39 +34,39 @@ pub struct Args {
     json: bool,
     #[command(flatten)]
     parquet: ParquetArg,
-    /// Print the points and stop; with --json also their keys and costs, and which are done
+    /// Print the points and stop; with --json also their keys, their costs and which are done
     #[arg(long, conflicts_with_all = ["emit_slurm", "merge_only"])]
     plan: bool,
-    #[command(flatten)]
-    shards: ShardArgs,
-    /// Replay nothing: put together what shards have kept, or list what is missing
+    /// Replay nothing: merge the rows that shards have written, or list the missing ones
     #[arg(long, conflicts_with_all = ["shard", "emit_slurm"], help_heading = "Many machines")]
     merge_only: bool,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    shards: ShardArgs,
 }
 
 impl Args {
-    /// Refuses flags that say nothing together.
+    /// Fails if a flag has no effect in combination with another.
     fn check(&self) -> Result<()> {
         let sharded = self.shards.shard.is_some();
         ensure!(
             self.json || !self.plan || self.out.is_none(),
-            "--plan --out: the folder says what is done, which --json tells; add --json"
+            "--plan --out: expected --json, because only the JSON lists which points are in the folder"
         );
         ensure!(
             self.json || !self.plan || !sharded,
-            "--plan --shard: shards are of traces and points, which --json tells; add --json"
+            "--plan --shard: expected --json, because only the JSON lists the shards"
         );
         ensure!(
             self.plan || !self.json || !sharded,
-            "--shard --json: a shard writes points alone; --merge-only prints the results"
+            "--shard --json: a shard writes only points; --merge-only prints the results"
         );
         ensure!(
             self.parquet.path.is_none() || !sharded && !self.plan,
             "--parquet: expected results, found {}",
             if sharded {
-                "--shard, which writes points alone"
+                "--shard, which writes only points"
             } else {
                 "--plan"
             }
@@ -78,8 +78,8 @@ impl Args {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// A bad experiment file, an unreadable trace, an output that cannot be written, a point that is
-/// to be merged and not there.
+/// An invalid experiment file, an unreadable trace, an output that cannot be written, or a point that is
+/// missing in a merge.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.check()?;
     args.threads.start()?;
@@ -124,11 +124,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Memory of a replay beside its traces: lines of expanded frames (384 MiB), tags of the largest caches (300 MiB),
-/// and as much again as a margin for the rest.
+/// Memory of a replay in addition to its traces: lines of expanded frames (384 MiB), tags of the largest
+/// caches (300 MiB), and the same amount again as a margin.
 const BASE_MEMORY_MIB: u64 = 1024;
 
-/// A sweep that is ready to run.
+/// A sweep after all inputs are checked.
 struct Sweep<'a> {
     args: &'a Args,
     file: ExperimentFile,
@@ -144,7 +144,7 @@ impl<'a> Sweep<'a> {
         let paths = trace_paths(args, &file);
         ensure!(
             !paths.is_empty(),
-            "{}: no traces: name them in `traces` or on the command line",
+            "{}: expected traces in `traces` or on the command line, found none",
             args.experiment.display()
         );
         let usual = || Path::new("out").join(args.experiment.file_stem().unwrap_or_default());
@@ -163,10 +163,10 @@ impl<'a> Sweep<'a> {
         })
     }
 
-    /// Says which stored rows are not taken; a merge lists them where they leave a point missing.
+    /// Prints a note for each damaged stored row; a merge lists only those that leave a point missing.
     fn tell_damages(&self) {
         for damage in self.store.damages() {
-            shell::note(&format!("not taken, replayed again: {damage}"));
+            shell::note(&format!("damaged row is replayed again: {damage}"));
         }
     }
 
@@ -174,7 +174,7 @@ impl<'a> Sweep<'a> {
         Split::new(&self.plan, &self.traces.records())
     }
 
-    /// JSON, CSV and page.
+    /// Paths of the JSON, CSV and page.
     fn outputs(&self) -> [PathBuf; 3] {
         ["results.json", "results.csv", "report.html"].map(|name| self.out.join(name))
     }
@@ -196,7 +196,7 @@ impl<'a> Sweep<'a> {
         Ok(())
     }
 
-    /// Replays a shard's points, and writes nothing but them.
+    /// Replays the points of a shard and writes only their rows.
     fn run_shard(&self, shard: Shard, subjects: &[Subject]) -> Result<()> {
         let split = self.split();
         let tasks = split.tasks(&self.plan, Some(shard));
@@ -239,7 +239,7 @@ impl<'a> Sweep<'a> {
         })
     }
 
-    /// The same sweep as a Slurm job array.
+    /// A script that runs the same sweep as a Slurm job array.
     fn slurm_script(&self, shards: u32) -> Result<String> {
         let program = std::env::current_exe().context("the program's own path")?;
         let mut command = vec![shell::absolute(&program)?, "sweep".to_owned()];
@@ -272,7 +272,7 @@ impl<'a> Sweep<'a> {
     }
 }
 
-/// The command line's traces, or the file's, which are relative to it.
+/// The traces of the command line, or those of the file, which are relative to it.
 fn trace_paths(args: &Args, file: &ExperimentFile) -> Vec<PathBuf> {
     if !args.traces.is_empty() {
         return args.traces.clone();

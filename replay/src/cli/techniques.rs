@@ -1,4 +1,4 @@
-//! `replay techniques`: what `tracegen techniques` measured and rendered, held against each other.
+//! `replay techniques`: compares rendering techniques from the measurements of `tracegen techniques`.
 
 use super::ConfigArgs;
 use super::experiment_args::{page_outputs, parse_orders, write_page};
@@ -32,9 +32,7 @@ pub struct Args {
     /// Folders that `tracegen techniques` wrote
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
-    #[command(flatten)]
-    machine: ConfigArgs,
-    /// Orders to compare with and without each technique, comma-separated, or `all`
+    /// Orders to replay with and without each technique, comma-separated, or `all`
     #[arg(
         long,
         value_name = "ORDERS",
@@ -44,22 +42,24 @@ pub struct Args {
     /// Print one JSON object (schema replay.techniques/1)
     #[arg(long)]
     json: bool,
-    /// Also write the rows as CSV; - writes them to standard output in place of the table
+    /// Also write the rows as CSV; - writes them to standard output instead of the table
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     #[command(flatten)]
     parquet: ParquetArg,
-    /// Also write a page with plots and pictures, with JSON and CSV beside it
+    /// Also write a page with plots and pictures, and JSON and CSV files with the same numbers
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     #[command(flatten)]
     threads: shell::Threads,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 /// Runs the subcommand.
 ///
 /// # Errors
-/// A folder that breaks a rule, an unreadable picture or trace, an output that cannot be written.
+/// An invalid folder, an unreadable picture or trace, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.threads.start()?;
     let config = args.machine.resolve_over(RunConfig {
@@ -131,7 +131,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Refuses a folder that is given twice, whatever its names.
+/// Fails if the same folder is given twice, even under different names.
 fn check_once(folders: &[PathBuf]) -> Result<()> {
     let place = |folder: &Path| folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     for (index, folder) in folders.iter().enumerate() {
@@ -149,7 +149,8 @@ fn check_once(folders: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Checks the outputs against all files that the folders hold; true where standard output is left.
+/// Checks the outputs against all files in the folders; returns true if standard output is free for the
+/// result.
 fn check_outputs(args: &Args, folders: &[Folder]) -> Result<bool> {
     let mut outputs: Vec<Output> = Vec::new();
     outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
@@ -173,7 +174,7 @@ fn check_outputs(args: &Args, folders: &[Folder]) -> Result<bool> {
     Ok(!to_stdout && !args.parquet.takes_stdout())
 }
 
-/// Names of the folders' scenes; those of one scene go by their folders' names, too.
+/// Scene names of the folders; folders of the same scene get their own names in addition.
 fn labels(folders: &[Folder]) -> Vec<String> {
     let scene = |folder: &Folder| scene_name(&folder.manifest.scene).to_owned();
     let scenes: Vec<String> = folders.iter().map(scene).collect();
@@ -197,7 +198,7 @@ fn compare_pictures(folders: &[Folder]) -> Result<Vec<Vec<PictureFigures>>> {
     figures.collect()
 }
 
-/// What the caches say of a row: one an order, and what the eyes share.
+/// Cache figures of a row: one entry per order, and the sharing between the eyes.
 type RowCaches = (Vec<CacheFigures>, Option<Sharing>);
 
 /// The traces of all folders.
@@ -262,7 +263,7 @@ impl FolderTraces {
         Ok(caches)
     }
 
-    /// The traces of a folder, one a row that has one.
+    /// The traces of a folder by row; `None` for rows without a trace.
     fn of_rows(&self, folder: usize, of: &Folder) -> Vec<Option<&dyn TileSource>> {
         let mut out: Vec<Option<&dyn TileSource>> = vec![None; of.manifest.rows.len()];
         for (trace, (index, row)) in self.traces.sources().zip(&self.rows) {
@@ -388,10 +389,10 @@ mod tests {
         assert_eq!(rows[1]["cull_tests_ratio"], 0.5);
         assert_eq!(rows[1]["flip_mean"], 0.0);
         assert!(rows[2]["flip_mean"].as_f64().unwrap() > 0.0);
-        // The grey corner costs more time than the superfrustum and errs.
+        // The grey corner takes more time than the superfrustum and has an error.
         let dominated: Vec<&Value> = rows.iter().map(|r| &r["dominated"]).collect();
         assert_eq!(dominated, [true, false, true]);
-        // The published saving of frustum tests stands beside ours.
+        // The published saving of frustum tests is next to the measured one.
         assert_eq!(json["published"][0]["published_pct"], "up to 50");
         assert_eq!(json["published"][0]["ours_pct"], 50.0);
         for text in [

@@ -1,11 +1,11 @@
-//! What the subcommands' tests share.
+//! Helpers that the subcommands' tests share.
 
 use crate::stream::MemoryTrace;
 use formats::textrace::TextraceWriter;
 use std::io::Write;
 use tempfile::NamedTempFile;
 
-/// Writes a trace to a file that goes with the handle.
+/// Writes a trace to a file that is deleted with the handle.
 pub fn file_of(trace: &MemoryTrace) -> NamedTempFile {
     let mut writer = TextraceWriter::in_memory(&trace.tables).unwrap();
     for (pass, tiles) in trace.tiles.iter().enumerate() {
@@ -18,7 +18,7 @@ pub fn file_of(trace: &MemoryTrace) -> NamedTempFile {
     file
 }
 
-/// The lines of a text.
+/// Splits a text into lines.
 pub fn lines(text: &[u8]) -> Vec<String> {
     let text = std::str::from_utf8(text).unwrap();
     text.lines().map(str::to_owned).collect()

@@ -1,4 +1,4 @@
-//! The tiles of a trace, in file order, and ranges of them on the command line.
+//! Lists the tiles of a trace in file order, and parses ranges of them.
 
 use formats::raytrace::RaytraceTables;
 use formats::textrace::Pass;
@@ -19,8 +19,7 @@ pub fn ray_tiles(tables: &RaytraceTables) -> impl Iterator<Item = (Eye, u32)> + 
     [Eye::Left, Eye::Right].into_iter().flat_map(of_eye)
 }
 
-/// A range of numbers as given on the command line: `7`, `3..8`, `5..` or `..8`; the end is not
-/// part of it.
+/// A range of numbers on the command line: `7`, `3..8`, `5..` or `..8`; the end is exclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NumberRange {
     first: usize,
@@ -28,12 +27,12 @@ pub struct NumberRange {
 }
 
 impl NumberRange {
-    /// True if `number` is in the range.
+    /// Whether `number` is in the range.
     pub fn contains(self, number: usize) -> bool {
         (self.first..self.end).contains(&number)
     }
 
-    /// First number, for checks against what there is.
+    /// First number, for checks against the number of tiles.
     pub fn first(self) -> usize {
         self.first
     }
@@ -72,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_leave_out_their_end() {
+    fn the_end_of_a_range_is_exclusive() {
         let range = |text: &str| text.parse::<NumberRange>();
         assert_eq!(range("7"), Ok(NumberRange { first: 7, end: 8 }));
         assert!(range("3..8").is_ok_and(|r| r.contains(7) && !r.contains(8)));

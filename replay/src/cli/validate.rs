@@ -1,4 +1,4 @@
-//! `replay validate`: every checksum and invariant of a trace.
+//! `replay validate`: checks every checksum and invariant of a trace.
 
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
@@ -15,7 +15,7 @@ use std::process::ExitCode;
 /// Arguments of `replay validate`.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Exit code: 0 valid, 1 not (the first bad place is on stderr), 2 unreadable.
+    after_help = "Exit code: 0 valid, 1 invalid (stderr names the first invalid place), 2 unreadable.
 
 Example: replay validate c.textrace"
 )]
@@ -30,7 +30,7 @@ pub struct ValidateArgs {
 /// Runs the subcommand.
 ///
 /// # Errors
-/// The file cannot be read at all.
+/// The file cannot be read.
 pub fn run(args: &ValidateArgs) -> Result<ExitCode> {
     args.threads.start()?;
     match validate(&args.trace) {
@@ -46,15 +46,14 @@ pub fn run(args: &ValidateArgs) -> Result<ExitCode> {
     }
 }
 
-/// Opening checks everything but what the tiles hold, and decoding the rest: whoever reads a
-/// trace does both.
+/// Checks a trace by opening it and decoding all tiles, as every reader does.
 fn validate(path: &std::path::Path) -> formats::Result<String> {
     let trace = Trace::open(path)?;
     let container = trace.container();
-    // Tiles are decoded in parallel, but the first bad one is the first in the file.
+    // Tiles are decoded in parallel, but the error names the first bad tile in the file.
     let (counts, what): (Vec<formats::Result<u64>>, _) = match &trace {
         Trace::Texture(trace) => {
-            // What `replay run` refuses before the first tile.
+            // `replay run` refuses these tables before the first tile.
             if let Err(error) = Expander::new(trace.as_ref(), &RunConfig::default()) {
                 let expected = "tables that can be replayed";
                 return Err(container.malformed(TEXTURES, 0, expected, error));

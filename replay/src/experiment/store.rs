@@ -54,7 +54,7 @@ pub enum Absent {
 
 /// Location of a row.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct RowLocation {
     /// Index of the file.
     file: usize,
     /// Line, counted from 1.
@@ -71,7 +71,7 @@ pub struct Store {
     /// First part of new files' names.
     name: String,
     files: Vec<PathBuf>,
-    rows: HashMap<String, Place>,
+    rows: HashMap<String, RowLocation>,
     /// Keys with two different results.
     contradictions: HashMap<String, String>,
     damages: Vec<String>,
@@ -188,7 +188,7 @@ impl Store {
                     "row {number}: expected at most {LARGEST_ROW_BYTES} bytes, found more"
                 )));
             }
-            let place = Place {
+            let place = RowLocation {
                 file,
                 line: number,
                 offset_bytes,
@@ -211,7 +211,7 @@ impl Store {
     }
 
     /// Indexes a row; the same row may be in several files.
-    fn note(&mut self, key: String, place: Place) {
+    fn note(&mut self, key: String, place: RowLocation) {
         let known = *self.rows.entry(key.clone()).or_insert(place);
         if (known.crc32, known.length_bytes) != (place.crc32, place.length_bytes) {
             let [known, other] = [known, place].map(|p| self.name_of(p));
@@ -220,7 +220,7 @@ impl Store {
         }
     }
 
-    fn name_of(&self, place: Place) -> String {
+    fn name_of(&self, place: RowLocation) -> String {
         format!("{}: row {}", self.files[place.file].display(), place.line)
     }
 
@@ -250,7 +250,7 @@ impl Store {
         Ok(point.result)
     }
 
-    fn read_row(&self, place: Place) -> io::Result<Vec<u8>> {
+    fn read_row(&self, place: RowLocation) -> io::Result<Vec<u8>> {
         let mut file = open_regular(&self.files[place.file])?;
         file.seek(SeekFrom::Start(place.offset_bytes))?;
         let mut line = Vec::new();

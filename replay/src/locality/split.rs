@@ -12,8 +12,8 @@ pub struct MissSplit {
     pub capacity: ByOrigin,
     /// Misses that hit in the fully associative cache.
     pub conflict: ByOrigin,
-    /// Hits that miss in the fully associative cache.
-    pub spared: ByOrigin,
+    /// Hits that miss in the fully associative cache: misses that limited associativity avoids.
+    pub avoided: ByOrigin,
     /// Hits in both caches.
     pub hits_of_both: ByOrigin,
 }
@@ -23,7 +23,7 @@ impl MissSplit {
     pub(super) fn count(&mut self, origin: usize, hit: bool, hit_fully_associative: bool) {
         let counts = match (hit, hit_fully_associative) {
             (true, true) => &mut self.hits_of_both,
-            (true, false) => &mut self.spared,
+            (true, false) => &mut self.avoided,
             (false, true) => &mut self.conflict,
             (false, false) => &mut self.capacity,
         };
@@ -34,7 +34,7 @@ impl MissSplit {
     #[must_use]
     pub fn hits(&self) -> ByOrigin {
         let mut hits = self.hits_of_both;
-        add(&mut hits, &self.spared);
+        add(&mut hits, &self.avoided);
         hits
     }
 
@@ -47,7 +47,7 @@ impl MissSplit {
     /// Misses of the fully associative cache.
     #[must_use]
     pub fn fully_associative_misses(&self) -> u64 {
-        self.compulsory + sum(&self.capacity) + sum(&self.spared)
+        self.compulsory + sum(&self.capacity) + sum(&self.avoided)
     }
 
     /// Adds the counts of another cache.
@@ -55,7 +55,7 @@ impl MissSplit {
         self.compulsory += other.compulsory;
         add(&mut self.capacity, &other.capacity);
         add(&mut self.conflict, &other.conflict);
-        add(&mut self.spared, &other.spared);
+        add(&mut self.avoided, &other.avoided);
         add(&mut self.hits_of_both, &other.hits_of_both);
     }
 }

@@ -1,5 +1,5 @@
-//! Run time against error (`replay.accuracy/2`): a table and a chart a study, what to choose, and the
-//! report's table of errors.
+//! Run time against error (`replay.accuracy/2`): a table and a chart per study, the recommended choices,
+//! and the table of errors on reports.
 
 use super::columns::{Column, Record};
 use super::errors::KnownError;
@@ -20,23 +20,23 @@ use serde::Serialize;
 /// Schema of `accuracy.json`.
 pub const ACCURACY_SCHEMA: &str = "replay.accuracy/2";
 
-/// A study with what it measured.
+/// A study with its measurements.
 pub struct Measured {
     /// The study.
     pub study: &'static Study,
-    /// Its choices on each scene; at least one.
+    /// Its choices on each scene; not empty.
     pub choices: Vec<Choice>,
 }
 
-/// All that was measured.
+/// All measurements.
 pub struct AccuracyReport {
     /// The machine.
     pub config: RunConfig,
-    /// Studies that had something to measure.
+    /// Studies that had inputs.
     pub studies: Vec<Measured>,
 }
 
-/// Mean and largest of absolute values; none of none.
+/// Mean and maximum of absolute values; `None` if there are none.
 fn mean_and_largest(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let values: Vec<f64> = values.map(f64::abs).collect();
     let largest = values.iter().copied().reduce(f64::max)?;
@@ -44,7 +44,7 @@ fn mean_and_largest(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 impl Measured {
-    /// Columns of its choices; times only where they are asked for, since they are no result.
+    /// Columns of its choices. Times are optional because they differ from run to run.
     fn columns(&self, times: bool) -> Vec<Column<'static, Choice>> {
         let mut columns = vec![
             Column::text("scene", "on", |c: &Choice| c.scene.clone()),
@@ -73,7 +73,7 @@ impl Measured {
         columns
     }
 
-    /// A row a choice and scene, with times.
+    /// One row per choice and scene, with times.
     #[must_use]
     pub fn table(&self) -> Table {
         Table::new(&self.columns(true), &self.choices)
@@ -81,7 +81,7 @@ impl Measured {
             .without_empty_columns()
     }
 
-    /// The names of its choices, in the order in which they came up.
+    /// Names of its choices, in order of first occurrence.
     fn names(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for choice in &self.choices {
@@ -103,12 +103,12 @@ impl Measured {
         Some((time, error))
     }
 
-    /// Time against error; none where no choice has both.
+    /// Chart of time against error; `None` if no choice has both.
     #[must_use]
     pub fn chart(&self) -> Option<ScatterChart> {
         let names = self.names();
         let mut named: Vec<(&str, (f64, f64))> = Vec::new();
-        // A study may have measured its reference, too.
+        // The choices of a study may include its reference.
         if !names.contains(&self.study.reference) {
             named.push((self.study.reference, (1.0, 0.0)));
         }
@@ -126,8 +126,8 @@ impl Measured {
             x: Axis::linear(format!("time of {}, \u{d7}", self.study.time)),
             y: Axis::linear(format!("{}{unit}{}, mean", error.name, error.unit)),
             kinds: [
-                "no other beats it".to_owned(),
-                "another is as good in both".to_owned(),
+                "not dominated".to_owned(),
+                "dominated: another is as good in both".to_owned(),
             ],
             points: points
                 .map(|((name, at), dominated)| NamedPoint {
@@ -143,27 +143,27 @@ impl Measured {
     }
 }
 
-/// What to choose, a row a study.
+/// A row of the table of recommended choices, one per study.
 struct Advice<'a> {
     study: &'a Study,
-    /// Mean time; the reference's is 1.
+    /// Mean time over the reference's time.
     time: Option<f64>,
-    /// Mean and largest absolute error; none where it is the reference.
+    /// Mean and maximum of the absolute error; `None` for the reference.
     error: Option<(f64, f64)>,
 }
 
-/// The JSON object: nothing of it depends on the machine that ran it.
+/// The JSON object. It has no values that depend on the host machine.
 #[derive(Serialize)]
-struct Document<'a> {
+struct AccuracyJson<'a> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
     config: &'a RunConfig,
-    studies: Vec<StudyDocument<'a>>,
+    studies: Vec<StudyJson<'a>>,
 }
 
 #[derive(Serialize)]
-struct StudyDocument<'a> {
+struct StudyJson<'a> {
     key: &'a str,
     title: &'a str,
     about: &'a str,
@@ -174,7 +174,7 @@ struct StudyDocument<'a> {
 }
 
 impl AccuracyReport {
-    /// What to choose in each study, and what it costs; times only where they are asked for.
+    /// The recommended choice of each study and its error, optionally with its time.
     #[must_use]
     pub fn advice(&self, times: bool) -> Table {
         let advice: Vec<Advice<'_>> = (self.studies.iter())
@@ -220,7 +220,7 @@ impl AccuracyReport {
         Table::new(&columns, &advice)
     }
 
-    /// Every value of every choice, one a line.
+    /// Every value of every choice, one per line.
     #[must_use]
     pub fn choices_csv(&self) -> String {
         type Line<'a> = (&'a Study, &'a Choice, usize);
@@ -242,7 +242,7 @@ impl AccuracyReport {
         Table::new(&columns, &lines).csv()
     }
 
-    /// Times over the reference's, as CSV; they differ from run to run.
+    /// Times over the reference's time, as CSV. They differ from run to run.
     #[must_use]
     pub fn times_csv(&self) -> String {
         type Line<'a> = (&'a Study, &'a Choice);
@@ -275,7 +275,7 @@ impl AccuracyReport {
                     row: choice,
                 })
             });
-            Ok(StudyDocument {
+            Ok(StudyJson {
                 key: measured.study.key,
                 title: measured.study.title,
                 about: measured.study.about,
@@ -285,7 +285,7 @@ impl AccuracyReport {
                 choices: records.collect::<serde_json::Result<_>>()?,
             })
         };
-        serde_json::to_string_pretty(&Document {
+        serde_json::to_string_pretty(&AccuracyJson {
             schema: ACCURACY_SCHEMA,
             tool: TOOL,
             model_version: MODEL_VERSION,
@@ -296,8 +296,8 @@ impl AccuracyReport {
         })
     }
 
-    /// The rows of the report's table of errors: mean and largest of each contribution, and the
-    /// scenes that they were measured on; `size` says how large a scene's pictures are.
+    /// The rows of the table of errors on reports: mean and maximum of each contribution, and the scenes on
+    /// which they were measured. `size` adds the image size to a scene's name.
     #[must_use]
     pub fn errors(&self, command: &str, size: &dyn Fn(&str) -> String) -> Vec<KnownError> {
         let mut errors = Vec::new();
@@ -341,7 +341,7 @@ impl AccuracyReport {
         errors
     }
 
-    /// The page: what to choose, and a section a study.
+    /// The page: the recommended choices, and one section per study.
     ///
     /// # Errors
     /// A chart that cannot be drawn.
@@ -349,8 +349,8 @@ impl AccuracyReport {
         let mut sections = vec![Section::new(
             "What to choose",
             html! {
-                p { "The recommended choice of each study, its time over that of the study's reference, and the error that it brings: mean and largest over the scenes. Times differ from run to run." }
-                // The reasons stand with the studies.
+                p { "The recommended choice of each study, its time over the time of the study's reference, and its error: mean and maximum over the scenes. Times differ from run to run." }
+                // The sections of the studies show the reasons.
                 @let advice = self.advice(true);
                 @let keys = advice.headings.iter().map(|h| h.key.as_ref()).filter(|key| *key != "reason");
                 (advice.picked(keys).markup())
@@ -359,7 +359,7 @@ impl AccuracyReport {
         for measured in &self.studies {
             sections.push(Section::new(measured.study.title, section(measured)?));
         }
-        let lead = html! { p { "What a quicker or another way of counting costs in accuracy (" (TOOL) "), measured one after another on one thread." } };
+        let lead = html! { p { "Run time and error of faster methods (" (TOOL) "), measured one after another on one thread." } };
         Ok(html::page(
             "Parallax: run time against error",
             &lead,
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_means_and_largest_of_absolute_values_with_their_scenes() {
+    fn errors_are_means_and_maxima_of_absolute_values_with_their_scenes() {
         let errors = report().errors("replay accuracy", &|scene| format!("{scene} 1x1"));
         assert_eq!(errors.len(), 2);
         let bytes = &errors[0];
@@ -435,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chart_has_the_reference_and_a_point_a_choice() {
+    fn a_chart_has_the_reference_and_one_point_per_choice() {
         let chart = report().studies[0].chart().unwrap();
         let names: Vec<&str> = chart.points.iter().map(|p| p.style.name.as_str()).collect();
         assert_eq!(names, ["timed", "functional"]);

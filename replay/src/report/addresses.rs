@@ -1,4 +1,4 @@
-//! Plain addresses through caches: a row a configuration.
+//! Results for plain addresses: one row per configuration.
 
 use super::columns::{Column, Records, Show};
 use super::memory_columns;
@@ -29,7 +29,7 @@ type OfLevel = fn(&Point) -> &LevelCounts;
 /// Names of the kinds of access, in the order of the counters.
 const KINDS: [&str; 3] = ["reads", "writes", "fetches"];
 
-/// Look-ups, misses and their rate of a level.
+/// Columns of a level: look-ups, misses and miss rate.
 fn level<'a, 'r>(
     key: &'static str,
     name: &'static str,
@@ -64,7 +64,7 @@ fn count<'a, 'r, V: super::columns::Cell>(
     Column::new(key, name, "", Show::Decimals(0), value)
 }
 
-/// Every column; those of a kind of access have values where there are others than reads.
+/// Every column. Columns by kind of access are empty if all accesses are reads.
 fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
     let kib = |bytes: u64| bytes as f64 / 1024.0;
     let mut columns = vec![
@@ -130,7 +130,7 @@ fn rows(outcome: &Outcome) -> Vec<PointRow<'_>> {
     outcome.points.iter().map(row).collect()
 }
 
-/// What was accessed, as JSON.
+/// Counts of the accesses, as JSON.
 #[derive(Serialize)]
 struct Accesses {
     accesses: u64,
@@ -160,7 +160,7 @@ impl Accesses {
 }
 
 #[derive(Serialize)]
-struct Document<'a, P> {
+struct AddressesJson<'a, P> {
     schema: &'static str,
     tool: &'static str,
     model_version: u32,
@@ -175,7 +175,7 @@ struct Document<'a, P> {
 /// A figure that is not finite.
 pub fn json(input: &str, outcome: &Outcome) -> serde_json::Result<String> {
     let (columns, rows) = (columns(), rows(outcome));
-    serde_json::to_string_pretty(&Document {
+    serde_json::to_string_pretty(&AddressesJson {
         schema: SCHEMA,
         tool: TOOL,
         model_version: MODEL_VERSION,
@@ -188,14 +188,14 @@ pub fn json(input: &str, outcome: &Outcome) -> serde_json::Result<String> {
     })
 }
 
-/// An outcome as CSV, a row a configuration.
+/// An outcome as CSV, one row per configuration.
 #[must_use]
 pub fn csv(outcome: &Outcome) -> String {
     Table::new(&columns(), &rows(outcome)).csv()
 }
 
-/// An outcome as tables: what was accessed; the levels of a single configuration, or a row for each of
-/// several.
+/// An outcome as text: the counts of accesses, then the levels of a single configuration or one row for
+/// each of several.
 #[must_use]
 pub fn text(input: &str, outcome: &Outcome) -> String {
     let of = Accesses::new(&outcome.totals, outcome.unique_lines);
@@ -204,11 +204,11 @@ pub fn text(input: &str, outcome: &Outcome) -> String {
         of.accesses, of.reads, of.writes, of.fetches, of.line_lookups, of.unique_lines
     );
     if of.left_out > 0 {
-        text += &format!("{} accesses of other kinds left out\n", of.left_out);
+        text += &format!("{} accesses of other kinds skipped\n", of.left_out);
     }
     if of.other_packets > 0 {
         text += &format!(
-            "{} packets that are no accesses left out\n",
+            "{} packets skipped that are not accesses\n",
             of.other_packets
         );
     }
@@ -228,7 +228,7 @@ pub fn text(input: &str, outcome: &Outcome) -> String {
     text + "\n" + &part(&SEVERAL)
 }
 
-/// Columns of a level, as its key continues.
+/// Columns of a level: the second half of their keys.
 const LEVEL: [&str; 6] = [
     "kib",
     "ways",
@@ -238,7 +238,7 @@ const LEVEL: [&str; 6] = [
     "miss_pct",
 ];
 
-/// Columns of a row among several.
+/// Columns for several configurations.
 const SEVERAL: [&str; 8] = [
     "line_bytes",
     "l1.kib",

@@ -1,5 +1,5 @@
-//! Settings that were tried, with how they do where they were chosen and where they were not
-//! (`replay.calibration/1`).
+//! Results of a calibration (`replay.calibration/1`): the error of each setting on the scenes it was chosen
+//! on and on the others.
 
 use super::columns::{Column, Row};
 use super::table::Table;
@@ -12,7 +12,7 @@ use serde::Serialize;
 /// Schema of the object that `replay calibrate --json` prints.
 pub const CALIBRATION_SCHEMA: &str = "replay.calibration/1";
 
-/// A calibration: every trial, and which one the scenes that choose would take.
+/// A calibration: every trial, and the index of the chosen one.
 #[derive(Serialize)]
 pub struct CalibrationReport {
     schema: &'static str,
@@ -20,7 +20,7 @@ pub struct CalibrationReport {
     model_version: u32,
     base: RunConfig,
     objective: Objective,
-    /// Index of the trial that does best on the scenes that choose.
+    /// Index of the best trial on the scenes used for choosing.
     chosen: Option<usize>,
     trials: Vec<Trial>,
 }
@@ -61,7 +61,7 @@ impl Row for SceneFit {
 }
 
 impl CalibrationReport {
-    /// Chooses among the trials.
+    /// Chooses the best trial.
     #[must_use]
     pub fn new(base: RunConfig, objective: Objective, trials: Vec<Trial>) -> Self {
         let known = (trials.iter().enumerate()).filter_map(|(i, t)| Some((i, t.chosen_by?)));
@@ -87,7 +87,7 @@ impl CalibrationReport {
         serde_json::to_string_pretty(self)
     }
 
-    /// The trials, best first, and the chosen one scene by scene.
+    /// The trials, best first, and the figures of the chosen one by scene.
     #[must_use]
     pub fn text(&self) -> String {
         let mut trials: Vec<&Trial> = self.trials.iter().collect();
@@ -110,7 +110,7 @@ impl CalibrationReport {
         let chosen = self.chosen.and_then(|index| self.trials[index].held_out);
         if let (Some(chosen), Some(best)) = (chosen, best(|trial| trial.held_out)) {
             text += &format!(
-                "\non the scenes held out: {chosen:.3} with these settings, {best:.3} with the best ones for them\n"
+                "\non the held-out scenes: {chosen:.3} with these settings, {best:.3} with the best settings for those scenes\n"
             );
         }
         text
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_chosen_is_best_where_it_may_choose_and_says_what_it_misses_elsewhere() {
+    fn the_best_trial_on_the_choosing_scenes_is_chosen_and_the_best_on_the_others_is_printed() {
         let trials = vec![trial(20, 2.0, 1.0), trial(24, 1.5, 3.0)];
         let report = CalibrationReport::new(RunConfig::default(), Objective::Surface, trials);
         assert_eq!(report.chosen, Some(1));

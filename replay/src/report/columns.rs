@@ -1,4 +1,4 @@
-//! Columns: what a row's figures are called, how they are written, and how they are got.
+//! Columns: the names, the number format and the values of a row's figures.
 //!
 //! A row type lists its columns once ([`Row`]); the terminal table, the page's table and CSV
 //! ([`Table`](super::table::Table)) and the JSON object ([`Record`]) walk that list.
@@ -14,7 +14,7 @@ pub enum Value {
     None,
     /// Text.
     Text(String),
-    /// A name, and how tables write it.
+    /// A name, and its form in tables.
     Named(&'static str, &'static str),
     /// Yes or no.
     Flag(bool),
@@ -24,7 +24,7 @@ pub enum Value {
     Real(f64),
 }
 
-/// What a column's values are, whether or not a row has one.
+/// The type of a column's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Text.
@@ -37,7 +37,7 @@ pub enum Kind {
     Real,
 }
 
-/// What a column's function may return: its type says the column's.
+/// A type that a column's function can return; it determines the column's kind.
 pub trait Cell: Into<Value> {
     /// The column's kind.
     const KIND: Kind;
@@ -117,12 +117,12 @@ impl Serialize for Value {
     }
 }
 
-/// How a table writes a column's values. CSV and JSON have them in full.
+/// Number format of a column in tables. CSV and JSON have full precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Show {
-    /// As it is, flush left.
+    /// Left-aligned text.
     Text,
-    /// A count, thousands apart.
+    /// A count with groups of three digits.
     Whole,
     /// With this many decimals.
     Decimals(usize),
@@ -135,7 +135,7 @@ impl Show {
     #[must_use]
     pub fn write(self, value: &Value) -> String {
         let fixed = |x: f64, decimals: usize| {
-            // A negative zero, or what rounds to it, prints without a sign.
+            // Values that round to negative zero print without a sign.
             let text = format!("{x:.decimals$}");
             match text.strip_prefix('-') {
                 Some(rest) if rest.bytes().all(|b| matches!(b, b'0' | b'.')) => rest.to_owned(),
@@ -158,30 +158,31 @@ impl Show {
 /// A column without its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heading {
-    /// Name in CSV and JSON. A dot nests in JSON (`paper.l1_miss_pct`) and is `_` in CSV.
+    /// Name in CSV and JSON. In JSON, a dot makes a nested object (`paper.l1_miss_pct`); in CSV it becomes
+    /// `_`.
     pub key: Cow<'static, str>,
     /// Heading of a table.
     pub name: Cow<'static, str>,
-    /// Unit, empty where there is none.
+    /// Unit, or empty.
     pub unit: &'static str,
-    /// What the values are.
+    /// Type of the values.
     pub kind: Kind,
-    /// How a table writes the values.
+    /// Number format in tables.
     pub show: Show,
-    /// What the figure is, for charts and for the page's notes; may be empty.
+    /// Definition of the figure, for charts and for the page's notes; may be empty.
     pub about: &'static str,
-    /// Holds published figures, set in a lighter ink.
+    /// Whether it holds published figures, which tables print in a lighter ink.
     pub published: bool,
 }
 
 impl Heading {
-    /// Name in files of columns.
+    /// Name in CSV and Parquet files.
     #[must_use]
     pub fn flat_key(&self) -> String {
         self.key.replace('.', "_")
     }
 
-    /// What the figure is, with its unit, for the axis of a chart.
+    /// Definition and unit, for the axis of a chart.
     #[must_use]
     pub fn axis_label(&self) -> String {
         format!("{}, {}", self.about, self.unit)
@@ -190,13 +191,13 @@ impl Heading {
 
 /// A column of rows of type `R`.
 pub struct Column<'a, R: ?Sized> {
-    /// What it is called and how it is written.
+    /// Name and format.
     pub heading: Heading,
     value: Box<dyn Fn(&R) -> Value + 'a>,
 }
 
 impl<'a, R: ?Sized> Column<'a, R> {
-    /// A column; `show` and `unit` say how numbers are written.
+    /// A column with this number format and unit.
     pub fn new<V: Cell>(
         key: impl Into<Cow<'static, str>>,
         name: impl Into<Cow<'static, str>>,
@@ -238,7 +239,7 @@ impl<'a, R: ?Sized> Column<'a, R> {
         Self::new(key, name, unit, Show::Decimals(decimals), value)
     }
 
-    /// The same column of what holds such rows.
+    /// The same column for rows that contain such a row.
     pub fn on<S>(self, of: impl Fn(&S) -> &R + 'a) -> Column<'a, S>
     where
         R: 'a,
@@ -249,14 +250,14 @@ impl<'a, R: ?Sized> Column<'a, R> {
         }
     }
 
-    /// Says what the figure is.
+    /// Sets the definition of the figure.
     #[must_use]
     pub fn about(mut self, about: &'static str) -> Self {
         self.heading.about = about;
         self
     }
 
-    /// Says what the values are where their type does not.
+    /// Sets the type of the values where the function's return type does not determine it.
     #[must_use]
     pub fn kind(mut self, kind: Kind) -> Self {
         self.heading.kind = kind;
@@ -276,14 +277,13 @@ impl<'a, R: ?Sized> Column<'a, R> {
     }
 }
 
-/// A row type: its columns are listed once, in the order of CSV and JSON.
+/// A row type. It lists its columns once, in the order of CSV and JSON.
 pub trait Row {
     /// Every column.
     fn columns() -> Vec<Column<'static, Self>>;
 }
 
-/// The columns with these keys, in the order of `keys`. A key that no column has is left out;
-/// debug builds stop at it.
+/// The columns with these keys, in the order of `keys`. Skips a key that no column has; debug builds panic.
 #[must_use]
 pub fn pick<R: Row>(keys: &[&str]) -> Vec<Column<'static, R>> {
     let mut all: Vec<Option<Column<R>>> = R::columns().into_iter().map(Some).collect();
@@ -299,7 +299,7 @@ pub fn pick<R: Row>(keys: &[&str]) -> Vec<Column<'static, R>> {
 
 /// A row as a JSON object of the given columns.
 pub struct Record<'a, 'c, R: ?Sized> {
-    /// Columns, those with the same prefix side by side.
+    /// Columns; those with the same prefix are adjacent.
     pub columns: &'a [Column<'c, R>],
     /// The row.
     pub row: &'a R,
@@ -337,7 +337,7 @@ impl<R: ?Sized> Serialize for Record<'_, '_, R> {
 
 /// Rows as a JSON array of such objects.
 pub struct Records<'a, 'c, R> {
-    /// Columns, those with the same prefix side by side.
+    /// Columns; those with the same prefix are adjacent.
     pub columns: &'a [Column<'c, R>],
     /// The rows.
     pub rows: &'a [R],

@@ -1,4 +1,4 @@
-//! Two captures held against each other (`replay.compare/1`).
+//! Results of comparing two captures (`replay.compare/1`).
 
 use super::columns::{Column, Records, Row, Show, Value};
 use super::table::Table;
@@ -24,25 +24,25 @@ pub struct Side<'a> {
     pub meta: &'a TraceMeta,
 }
 
-/// What both captures yield in one order.
+/// The results of both captures in one order.
 pub struct Replayed<'a> {
     /// The order.
     pub order: Order,
-    /// The first capture's result, then the second one's.
+    /// Results of the first and the second capture.
     pub results: [&'a RunResult; 2],
-    /// The same in Morton order, where that was replayed.
+    /// The same in Morton order, if it was replayed.
     pub morton: Option<[&'a RunResult; 2]>,
 }
 
-/// All that is known of two captures.
+/// A comparison of two captures.
 pub struct CompareReport<'a> {
     /// The captures.
     pub sides: [Side<'a>; 2],
-    /// The machine; its order varies as the rows say.
+    /// The machine; each row has its own order.
     pub config: RunConfig,
-    /// How the captures differ.
+    /// Differences between the captures.
     pub comparison: &'a Comparison,
-    /// What that does to the caches.
+    /// Cache results by order.
     pub replayed: Vec<Replayed<'a>>,
 }
 
@@ -53,7 +53,7 @@ fn saved_pct(row: &Replayed, side: usize) -> Option<f64> {
     (morton > 0 && row.order != Order::MORTON).then_some(100.0 * (1.0 - rest))
 }
 
-/// The second one's over the first one's less one, percent.
+/// Relative difference of the second value to the first, percent.
 fn over_pct(values: [f64; 2]) -> Option<f64> {
     (values[0] > 0.0).then(|| 100.0 * (values[1] / values[0] - 1.0))
 }
@@ -101,7 +101,7 @@ impl Row for Class {
 
 /// The JSON object.
 #[derive(Serialize)]
-struct Document<'a, 'r> {
+struct CompareJson<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
@@ -121,7 +121,7 @@ impl CompareReport<'_> {
     /// A figure that is not finite.
     pub fn json(&self) -> serde_json::Result<String> {
         let [a, b] = &self.sides;
-        serde_json::to_string_pretty(&Document {
+        serde_json::to_string_pretty(&CompareJson {
             schema: COMPARE_SCHEMA,
             tool: TOOL,
             model_version: MODEL_VERSION,
@@ -164,7 +164,7 @@ impl CompareReport<'_> {
             .text()
     }
 
-    /// All fragments, and opaque ones apart from others.
+    /// All fragments, and opaque fragments separately from the others.
     fn classes(&self) -> Table {
         let all = Class {
             name: "all".to_owned(),
@@ -174,7 +174,7 @@ impl CompareReport<'_> {
         Table::new(&Class::columns(), classes)
     }
 
-    /// The materials of which most footprints and fragments differ.
+    /// The materials with the most different footprints and fragments.
     fn materials(&self) -> Table {
         let differing = |tally: &Tally| {
             let apart = tally.fragments_only_in_a + tally.fragments_only_in_b;

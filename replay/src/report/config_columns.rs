@@ -1,5 +1,5 @@
-//! What names a row whatever other traces and points are in its file: trace, picture, and every key of the
-//! configuration. Rows of several files can be joined by them.
+//! Columns that identify a row in any file: trace, image size, and every configuration key. Rows of several
+//! files can be joined by them.
 
 use super::columns::Value;
 use super::figures::Figure;
@@ -8,7 +8,7 @@ use crate::experiment::{ResultRow, plain, scene_label};
 use crate::model_version::MODEL_VERSION;
 use serde::Serialize;
 
-/// The name of an enumeration's value in configuration files.
+/// The name of an enum's value in configuration files.
 fn name(value: &impl Serialize) -> String {
     let value = serde_json::to_value(value).unwrap_or_default();
     value.as_str().unwrap_or_default().to_owned()
@@ -18,7 +18,7 @@ fn name(value: &impl Serialize) -> String {
 pub fn trace<'a>() -> Vec<Figure<'a>> {
     vec![
         Figure::text("label", "scene", |r| r.subject.label.clone())
-            .about("short name in this file, which depends on the other traces in it"),
+            .about("short name in this file; it depends on the other traces in the file"),
         Figure::text("trace", "trace", |r| r.subject.id.name.clone())
             .about("name of the trace's file without folder and extension"),
         Figure::text("checksum", "checksum", |r| r.subject.id.checksum.clone())
@@ -29,17 +29,17 @@ pub fn trace<'a>() -> Vec<Figure<'a>> {
         Figure::text("width_px", "width", |r| {
             u64::from(r.subject.id.eye_size_px[0])
         })
-        .about("width of an eye's picture in pixels"),
+        .about("image width per eye in pixels"),
         Figure::text("height_px", "height", |r| {
             u64::from(r.subject.id.eye_size_px[1])
         })
-        .about("height of an eye's picture in pixels"),
+        .about("image height per eye in pixels"),
         Figure::text("model_version", "model", |_| u64::from(MODEL_VERSION))
             .about("version of the models; counts of different versions cannot be compared"),
     ]
 }
 
-/// Every key of the configuration, as docs/use/configuration.md lists them.
+/// Every configuration key, as listed in docs/use/configuration.md.
 #[rustfmt::skip]
 pub fn config<'a>() -> Vec<Figure<'a>> {
     fn key<'a, V: super::columns::Cell + 'static>(
@@ -130,19 +130,19 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
     columns
 }
 
-/// The value that is tried alone, if any.
+/// The key that this row changes, if any.
 pub fn change<'a>() -> Vec<Figure<'a>> {
     vec![
         Figure::text("change.key", "change", |r| {
             let (key, _) = r.point.change.as_ref()?;
             Some(key.clone())
         })
-        .about("key that this row alone changes"),
+        .about("configuration key that only this row changes"),
         Figure::text("change.value", "to", |r| {
             let (_, value) = r.point.change.as_ref()?;
             Some(plain(value))
         })
-        .about("value that it has there"),
+        .about("value of the changed key"),
     ]
 }
 
@@ -157,7 +157,7 @@ mod tests {
             let key = line.strip_prefix("| `")?;
             Some(key.split_once('`')?.0)
         });
-        // The keys of all levels are columns of the L1 and the L2, and one of the levels below.
+        // All levels' keys are columns of the L1 and the L2; one more column describes the levels below.
         let column = |key: &'static str| {
             if key.starts_with("level.") {
                 "level"

@@ -1,4 +1,4 @@
-//! The figures of a replayed point, a line each: every table, file and chart takes them from here.
+//! The figures of a replayed point, one per line. Every table, file and chart takes them from here.
 
 use super::columns::{Column, Row, Show, pick};
 use super::{config_columns, memory_columns};
@@ -11,7 +11,8 @@ use formats::texture::TexelFormat;
 /// A column of point results.
 pub type Figure<'a> = Column<'static, ResultRow<'a>>;
 
-/// What names a point: the trace, what the Z2 paper's experiment varies, and the whole configuration.
+/// Columns that identify a point: the trace, the axes of the Z2 paper's experiment, and the whole
+/// configuration.
 fn identity<'a>() -> Vec<Figure<'a>> {
     let mut columns = config_columns::trace();
     columns.extend([
@@ -24,7 +25,7 @@ fn identity<'a>() -> Vec<Figure<'a>> {
     columns
 }
 
-/// What is counted, and what follows from it.
+/// Counts and derived figures.
 #[rustfmt::skip]
 pub fn figures<'a>() -> Vec<Figure<'a>> {
     let mut figures = vec![
@@ -33,11 +34,11 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
         Figure::real("l2_miss_pct", "L2 miss", "%", 2, |r| 100.0 * r.result.l2.miss_rate)
             .about("line look-ups of the L2 that miss"),
         Figure::real("tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.result))
-            .about("cycles in which a footprint leaves the texture unit"),
+            .about("percentage of cycles in which a footprint leaves the texture unit"),
         Figure::real("tmu_ratio", "TMU", "\u{d7} Morton", 3, |r| Some(utilization(r.result)? / utilization(r.morton?)?))
-            .about("utilisation over Morton order's"),
+            .about("utilisation over the utilisation in Morton order"),
         Figure::real("reduction_pct", "saved", "% of Morton", 1, |r| r.saved_pct(r.morton))
-            .about("external traffic saved against Morton order, everything else the same"),
+            .about("external traffic saved against Morton order with all other settings equal"),
         Figure::real("external_bytes", "external", "bytes", 0, |r| r.result.external_bytes)
             .about("lines from memory times the line size of the last level, all frames"),
         Figure::real("external_mb_per_frame", "external", "MB/frame", 2, |r| r.mb_per_frame(r.result.external_bytes))
@@ -47,46 +48,46 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
         Figure::real("over_bound", "external", "\u{d7} bound", 2, |r| over(r.result.external_bytes, r.bound_bytes()))
             .about("external traffic over the bound"),
         Figure::real("over_base", "external", "\u{d7} base", 3, |r| over(r.result.external_bytes, r.unchanged?.external_bytes))
-            .about("external traffic over that of the same settings without the change"),
+            .about("external traffic over that of the settings without the change"),
         Figure::real("static_footprints_per_pixel", "static", "footprints/pixel", 2, |r| complexity(r, false))
-            .about("footprints of loaded textures for each covered pixel: static texture complexity (Z2 paper, table 1)"),
+            .about("footprints of loaded textures per covered pixel: static texture complexity (Z2 paper, table 1)"),
         Figure::real("dynamic_footprints_per_pixel", "dynamic", "footprints/pixel", 2, |r| complexity(r, true))
-            .about("footprints of shadow maps for each covered pixel: dynamic texture complexity (Z2 paper, table 1)"),
+            .about("footprints of shadow maps per covered pixel: dynamic texture complexity (Z2 paper, table 1)"),
         Figure::real("first_l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.result))
             .about("footprints whose first look-up found a line absent or in flight"),
         Figure::real("first_l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.result))
-            .about("lines of these look-ups that the L2 had not, merged requests counted"),
+            .about("lines of these look-ups that were absent from the L2, merged requests counted"),
         Figure::real("closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.result))
             .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.result))
-            .about("simulated utilisation less the one that the Z2 paper's table implies for the rates of first look-ups"),
+            .about("simulated utilisation minus the utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.memory.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.misses)?) })
-            .about("useful prefetches over these and the line misses of the L2"),
+            .about("useful prefetches as a share of useful prefetches and L2 line misses"),
         Figure::real("l2_stalled_misses_pct", "stalled", "% of L2 misses", 2, |r| { let stalled = r.result.memory.l2_mshrs?.stalled_misses; Some(100.0 * over(stalled, r.result.l2.misses)?) })
-            .about("misses of the L2 that found all MSHRs in use"),
+            .about("L2 misses that were delayed because all MSHRs were in use"),
     ];
     let memory = memory_columns::columns().into_iter();
     figures.extend(memory.map(|column| column.on(|r: &ResultRow| &r.result.memory)));
     figures.extend(vec![
         Figure::real("frame_read_bytes", "all reads", "bytes", 0, |r| whole(r.result, |c| c.read_bytes))
-            .about("bytes that all clients of memory read, all frames"),
+            .about("bytes that all memory clients read, all frames"),
         Figure::real("frame_write_bytes", "all writes", "bytes", 0, |r| whole(r.result, |c| c.write_bytes))
-            .about("bytes that all clients of memory write, all frames"),
+            .about("bytes that all memory clients write, all frames"),
         Figure::real("frame_mb_per_frame", "all traffic", "MB/frame", 2, |r| Some(r.mb_per_frame(whole(r.result, ClientTraffic::bytes)?)))
-            .about("traffic of all clients of memory"),
+            .about("traffic of all memory clients"),
         Figure::real("frame_energy_mj_per_frame", "all traffic", "mJ/frame", 3, |r| Some(r.per_frame(whole_mj(r.result)?)))
             .about("DRAM energy of the traffic of all clients"),
         Figure::real("texture_share_pct", "texture", "% of all", 1, |r| Some(100.0 * r.result.external_bytes as f64 / whole(r.result, ClientTraffic::bytes)? as f64))
-            .about("texture reads over the traffic of all clients"),
+            .about("texture reads as a share of the traffic of all clients"),
         Figure::real("frame_reduction_pct", "saved of all", "% of Morton", 1, |r| whole_saved_pct(r))
-            .about("traffic of all clients saved against Morton order, everything else the same"),
+            .about("traffic of all clients saved against Morton order with all other settings equal"),
         Figure::real("cycles", "cycles", "", 0, |r| r.result.cycles)
-            .about("cycles until the last core is done"),
+            .about("cycles until the last core finishes"),
     ]);
     figures
 }
 
-/// Footprints of shadow maps, or of all other textures, over covered pixels; none where counts are by draw.
+/// Footprints of shadow maps, or of all other textures, per covered pixel; `None` if counts are by draw.
 fn complexity(row: &ResultRow, of_shadow_maps: bool) -> Option<f64> {
     let parts = &row.result.by_texture;
     let textures = row.subject.source.tables().textures.iter();
@@ -98,7 +99,7 @@ fn complexity(row: &ResultRow, of_shadow_maps: bool) -> Option<f64> {
     is_counted.then(|| footprints as f64 / row.result.lanes as f64)
 }
 
-/// A sum over the clients of memory, where the whole frame was counted.
+/// A sum over the memory clients, if the whole frame was counted.
 fn whole(result: &RunResult, of: impl Fn(&ClientTraffic) -> u64) -> Option<u64> {
     let clients = &result.clients;
     (!clients.is_empty()).then(|| clients.iter().map(of).sum())
@@ -115,7 +116,7 @@ fn whole_saved_pct(row: &ResultRow) -> Option<f64> {
     Some(100.0 * (1.0 - own? as f64 / morton? as f64))
 }
 
-/// The paper's figures for the same point; its saving follows from its two miss rates.
+/// The paper's figures for the same point. Its saving is computed from its two miss rates.
 #[rustfmt::skip]
 fn published<'a>() -> Vec<Figure<'a>> {
     vec![
@@ -138,35 +139,35 @@ fn functional<'a>() -> Vec<Figure<'a>> {
     ]
 }
 
-/// The same point on the machine of `--preset z2-paper`: rates of first look-ups, then what is
-/// counted as everywhere else.
+/// The same point on the machine of `--preset z2-paper`: rates of first look-ups, then counts as for other
+/// machines.
 #[rustfmt::skip]
 fn z2_paper<'a>() -> Vec<Figure<'a>> {
     vec![
         Figure::real("z2_paper.l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.z2_paper?))
             .about("footprints whose first look-up found a line absent or in flight"),
         Figure::real("z2_paper.l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.z2_paper?))
-            .about("lines of these look-ups that the L2 had not, merged requests counted"),
+            .about("lines of these look-ups that were absent from the L2, merged requests counted"),
         Figure::real("z2_paper.tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.z2_paper?))
-            .about("cycles in which a footprint leaves the texture unit"),
+            .about("percentage of cycles in which a footprint leaves the texture unit"),
         Figure::real("z2_paper.tmu_ratio", "TMU", "\u{d7} Morton", 3, |r| Some(utilization(r.z2_paper?)? / utilization(r.z2_paper_morton?)?))
-            .about("utilisation over Morton order's"),
+            .about("utilisation over the utilisation in Morton order"),
         Figure::real("z2_paper.closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.z2_paper?))
             .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("z2_paper.closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.z2_paper?))
-            .about("simulated utilisation less the one that the Z2 paper's table implies for the rates of first look-ups"),
+            .about("simulated utilisation minus the utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("z2_paper.product_reduction_pct", "saved, L1 \u{d7} L2", "% of Morton", 1, |r| product_saved_pct(r))
-            .about("saved by the product of both rates, as the paper's figures give it; merged requests count"),
+            .about("traffic saved according to the product of both rates, as in the paper; merged requests count"),
         Figure::real("z2_paper.primary_l1_miss_pct", "primary L1", "%", 2, |r| Some(100.0 * r.z2_paper?.l1.miss_rate))
             .about("footprints that fetched a line"),
         Figure::real("z2_paper.primary_l2_miss_pct", "primary L2", "%", 2, |r| Some(100.0 * r.z2_paper?.l2.miss_rate))
             .about("fetched lines that came from memory"),
         Figure::real("z2_paper.external_bytes", "external", "bytes", 0, |r| Some(r.z2_paper?.external_bytes))
-            .about("what memory sent"),
+            .about("bytes read from memory"),
         Figure::real("z2_paper.external_mb_per_frame", "external", "MB/frame", 2, |r| Some(r.mb_per_frame(r.z2_paper?.external_bytes)))
-            .about("what memory sent"),
+            .about("bytes read from memory"),
         Figure::real("z2_paper.reduction_pct", "saved", "% of Morton", 1, |r| saved_pct(r.z2_paper?, r.z2_paper_morton?))
-            .about("what memory sent less against Morton order"),
+            .about("bytes read from memory saved against Morton order"),
     ]
 }
 
@@ -223,7 +224,7 @@ fn first_l2_pct(result: &RunResult) -> Option<f64> {
     Some(100.0 * result.first_lookups?.l2_miss_rate)
 }
 
-/// The closed form relates rates that are counted as the paper's are; primary rates are others.
+/// The closed form relates rates counted as in the paper; primary rates are counted differently.
 fn closed_form_pct(result: &RunResult) -> Option<f64> {
     let first = result.first_lookups?;
     Some(100.0 * closed_form(first.l1_miss_rate, first.l2_miss_rate))
@@ -244,7 +245,7 @@ fn saved_pct(result: &RunResult, morton: &RunResult) -> Option<f64> {
     Some(100.0 * (1.0 - rest))
 }
 
-/// `part / whole`, none when the whole is nothing.
+/// `part / whole`, or `None` if the whole is zero.
 pub(super) fn over(part: u64, whole: u64) -> Option<f64> {
     (whole > 0).then(|| part as f64 / whole as f64)
 }
@@ -254,7 +255,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_figure_has_a_key_of_its_own_and_a_place_in_json() {
+    fn every_figure_has_a_unique_key_and_a_place_in_json() {
         let keys: Vec<String> = ResultRow::columns()
             .iter()
             .map(|c| c.heading.key.to_string())
@@ -262,7 +263,7 @@ mod tests {
         for (i, key) in keys.iter().enumerate() {
             assert!(!keys[..i].contains(key), "{key} twice");
         }
-        // Keys with the same prefix must stand together: they are one object in JSON.
+        // Keys with the same prefix must be adjacent, because they form one object in JSON.
         let prefixes: Vec<&str> = keys
             .iter()
             .filter_map(|k| Some(k.split_once('.')?.0))
@@ -288,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_counted_says_what_it_is() {
+    fn every_counted_figure_has_a_definition() {
         assert!(figures().iter().all(|f| !f.heading.about.is_empty()));
     }
 }

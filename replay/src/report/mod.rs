@@ -1,4 +1,4 @@
-//! Prints results: tables, plots, JSON, CSV and pages. What is printed is computed elsewhere.
+//! Prints results as tables, plots, JSON, CSV and pages. Other modules compute them.
 
 pub mod accuracy;
 pub mod addresses;

@@ -1,5 +1,5 @@
-//! Tables as Parquet files: typed columns under the names that CSV has, for DuckDB, Polars, pandas;
-//! null is what is empty in CSV.
+//! Tables as Parquet files: typed columns with the names of the CSV's columns, for DuckDB, Polars and
+//! pandas. Cells that are empty in CSV are null.
 
 use super::columns::{Heading, Kind, Value};
 use super::table::Table;
@@ -15,33 +15,33 @@ use serde_json::{Map, json};
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Key of the file's metadata that holds a JSON object: by column its unit and what it is. Columns
-/// have no metadata of their own that readers show.
+/// Key of the file's metadata with a JSON object: unit and definition by column. Most readers do not show
+/// metadata of columns.
 pub const COLUMNS_KEY: &str = "parallax.columns";
 
-/// A table that cannot be a Parquet file.
+/// Error for a table that cannot be written as Parquet.
 #[derive(Debug, Error)]
 pub enum TableError {
-    /// A cell is of another kind than its column, or too large.
+    /// A cell whose type differs from its column's, or whose value is too large.
     #[error("column {column}, row {row}: expected {expected}, found {found}")]
     Cell {
         /// Name of the column.
         column: String,
-        /// From 0.
+        /// Row number, from 0.
         row: usize,
-        /// What the column holds.
+        /// Type of the column.
         expected: &'static str,
-        /// What the cell holds.
+        /// Value of the cell.
         found: String,
     },
-    /// The encoder's own.
+    /// An error of the encoder.
     #[error("Parquet: {0}")]
     Encoder(#[from] ParquetError),
 }
 
-/// The bytes of a file with one row group, nothing compressed, every column optional: text in UTF-8,
-/// counts as signed 64-bit integers (differences of unsigned ones overflow in many readers), measures
-/// as doubles, flags as booleans. Same table, same bytes.
+/// The bytes of a file with one row group, without compression. Every column is optional: text in UTF-8,
+/// counts as signed 64-bit integers (differences of unsigned ones overflow in many readers), measures as
+/// doubles, flags as booleans. Equal tables have equal bytes.
 ///
 /// # Errors
 /// A cell that its column cannot hold.
@@ -116,7 +116,7 @@ struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    /// Writes the column; `of` is none for what it cannot hold.
+    /// Writes the column. `of` returns `None` for a value that the column cannot hold.
     fn write<T: DataType>(
         &self,
         rows: &mut SerializedRowGroupWriter<'_, Vec<u8>>,
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_come_back_with_their_types_and_what_is_empty_is_null() {
+    fn cells_are_read_with_their_types_and_empty_cells_as_null() {
         let table = table(&[
             ("a, \"b\" \u{e9}", Some(0.1 + 0.2), u64::MAX >> 1, true),
             ("", None, 0, false),

@@ -1,4 +1,4 @@
-//! Rendered pictures that a page carries with it.
+//! Rendered pictures embedded in a page.
 
 use super::plots::data_uri;
 use anyhow::Context;
@@ -24,7 +24,7 @@ const JPEG_QUALITY: u8 = 85;
 /// Reads a PNG or JPEG file.
 ///
 /// # Errors
-/// The file is missing or is no picture; the message names it.
+/// The file is missing or is not a picture; the message names it.
 pub fn read(path: &Path) -> anyhow::Result<RgbImage> {
     let picture = ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
@@ -38,15 +38,15 @@ impl EmbeddedPicture {
     /// Reads a PNG or JPEG file.
     ///
     /// # Errors
-    /// The file is missing or is no picture; the message names it.
+    /// The file is missing or is not a picture; the message names it.
     pub fn open(label: &str, path: &Path) -> anyhow::Result<Self> {
         Self::encode(label, read(path)?).with_context(|| path.display().to_string())
     }
 
-    /// A picture that was computed.
+    /// Encodes a computed picture.
     ///
     /// # Errors
-    /// It is empty.
+    /// The picture is empty.
     pub fn of(label: &str, picture: &Picture) -> anyhow::Result<Self> {
         let [width, height] = picture.size_px;
         let bytes = picture.pixels.iter().flatten().copied().collect();
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_picture_is_named() {
+    fn a_file_that_is_not_a_picture_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.png");
         std::fs::write(&path, "no").unwrap();

@@ -1,4 +1,4 @@
-//! One replay, and one in both modes.
+//! Results of one replay, and of one point in both modes.
 
 use super::columns::{Column, Row, Show, Value};
 use super::errors::{self, KnownError, Of};
@@ -15,20 +15,20 @@ use serde::Serialize;
 /// Schema of the object that `--compare-modes --json` prints.
 const COMPARE_SCHEMA: &str = "replay.compare-modes/1";
 
-/// What `replay run --json` prints.
+/// The JSON object of `replay run --json`.
 #[derive(Debug, Serialize)]
-struct Document<'a> {
+struct RunJson<'a> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
     trace: &'a TraceId,
     config: &'a RunConfig,
     result: &'a RunResult,
-    /// What is known of the figures' errors; last, since it is not about this trace.
+    /// Known errors of the figures. Last, because they are not about this trace.
     errors: Vec<&'static KnownError>,
 }
 
-impl<'a> Document<'a> {
+impl<'a> RunJson<'a> {
     fn new(row: &'a ResultRow) -> Self {
         Self {
             schema: RUN_SCHEMA,
@@ -47,10 +47,10 @@ impl<'a> Document<'a> {
 /// # Errors
 /// A figure that is not finite.
 pub fn json(row: &ResultRow) -> serde_json::Result<String> {
-    serde_json::to_string_pretty(&Document::new(row))
+    serde_json::to_string_pretty(&RunJson::new(row))
 }
 
-/// One result as tables: levels, views, and the figures of the whole.
+/// One result as tables: levels, views, and the figures of the whole replay.
 #[must_use]
 pub fn text(row: &ResultRow) -> String {
     let ResultRow { result, point, .. } = row;
@@ -93,7 +93,7 @@ pub fn text(row: &ResultRow) -> String {
     }
     if let Some(counts) = &result.geometry {
         text += &format!(
-            "{} triangles submitted, {} in any tile's list, {} entries of lists; {} vertices shaded\n",
+            "{} triangles submitted, {} in the list of at least one tile, {} list entries; {} vertices shaded\n",
             counts.triangles_submitted,
             counts.triangles_binned,
             counts.list_entries,
@@ -106,7 +106,7 @@ pub fn text(row: &ResultRow) -> String {
     text + &errors::text(Of::Textures)
 }
 
-/// Traffic by client of memory, and all of it.
+/// Traffic by memory client, and the total.
 fn clients(row: &ResultRow) -> Table {
     type Line = (&'static str, [u64; 2], f64, f64);
     let clients = &row.result.clients;
@@ -151,7 +151,7 @@ fn count<'a>(
     Column::new(name, name, "", Show::Decimals(0), value)
 }
 
-/// Every figure of the point that has a value, one a line.
+/// Every figure of the point that has a value, one per line.
 fn whole(row: &ResultRow) -> Table {
     type Line = (&'static str, String, &'static str);
     let mut lines: Vec<Line> = Vec::new();
@@ -169,7 +169,7 @@ fn whole(row: &ResultRow) -> Table {
     Table::new(&columns, &lines)
 }
 
-/// Timed over functional less one; nothing over nothing is no difference.
+/// Timed over functional, minus one; zero if both are zero.
 fn difference(timed: f64, functional: f64) -> f64 {
     if functional == 0.0 {
         0.0
@@ -178,7 +178,7 @@ fn difference(timed: f64, functional: f64) -> f64 {
     }
 }
 
-/// What the modes are compared by: key in JSON, name, unit, decimals, value.
+/// A figure compared between the modes: key in JSON, name, unit, decimals, value.
 type Measure = (
     &'static str,
     &'static str,
@@ -209,8 +209,8 @@ pub fn modes_json(timed: &ResultRow, functional: &ResultRow) -> serde_json::Resu
         .collect();
     serde_json::to_string_pretty(&serde_json::json!({
         "schema": COMPARE_SCHEMA,
-        "timed": Document::new(timed),
-        "functional": Document::new(functional),
+        "timed": RunJson::new(timed),
+        "functional": RunJson::new(functional),
         "timed_over_functional_less_one": differences,
     }))
 }
@@ -236,7 +236,7 @@ pub fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
     Table::new(&columns, &MEASURES).text()
 }
 
-/// Draws in the table of the busiest ones.
+/// Number of draws in the table of draws with most misses.
 const BUSIEST_DRAWS: usize = 10;
 
 /// The draws with the most line misses of the L2.
@@ -247,7 +247,7 @@ fn busiest_draws(draws: &[Part]) -> String {
     let rows: Vec<Part> = busiest.into_iter().cloned().collect();
     let more = match draws.len() - rows.len() {
         0 => String::new(),
-        more => format!("and {more} more draws (--json has all)\n"),
+        more => format!("and {more} more draws (--json lists all)\n"),
     };
     format!("\n{}{more}", Table::new(&Part::columns(), &rows).text())
 }

@@ -21,7 +21,7 @@ pub const THUMBNAIL_PX: u32 = 560;
 pub struct Entry {
     /// The figures.
     pub report: Report,
-    /// PNG files, where a page is wanted.
+    /// Pictures, if a page is written.
     pub pictures: Option<Thumbnails>,
 }
 
@@ -36,7 +36,7 @@ pub struct Thumbnails {
     pub flip: Vec<u8>,
     /// The same under plain reuse.
     pub plain_bad: Vec<u8>,
-    /// The same under plain reuse.
+    /// Its FLIP map under plain reuse.
     pub plain_flip: Vec<u8>,
 }
 
@@ -47,9 +47,9 @@ pub struct Thumbnails {
 pub fn page(entries: &[Entry]) -> Result<String, PlotError> {
     let lead = html! {
         p {
-            "The left image is traced in full; its hits are reprojected into the right eye and "
-            "reused where error detection lets them stand. Ratios are against the same hardware "
-            "that traces both eyes in full. Paper: Lee et al., \u{201c}Fast Stereoscopic "
+            "The left image is traced in full. Its hits are reprojected into the right eye and "
+            "reused unless error detection rejects them. Ratios compare with the same hardware "
+            "tracing both eyes in full. Paper: Lee et al., \u{201c}Fast Stereoscopic "
             "Rendering on Mobile Ray Tracing GPU for Virtual Reality Applications\u{201d}."
         }
     };
@@ -60,7 +60,7 @@ pub fn page(entries: &[Entry]) -> Result<String, PlotError> {
     ))
 }
 
-/// The sections, for a page that holds more than these.
+/// The sections, for a page with other sections.
 ///
 /// # Errors
 /// A chart that cannot be drawn.
@@ -89,8 +89,8 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
                 format!("Sensitivity: {scene}"),
                 html! {
                     p {
-                        "The paper publishes none of these parameters. Each is halved and doubled "
-                        "alone (of a hit rate, the misses); rows are by effect."
+                        "The paper publishes none of these parameters. Each one is halved and doubled "
+                        "on its own (for a hit rate, the miss rate is); rows are sorted by effect."
                     }
                     (tables::sensitivity(&entry.report).markup())
                 },
@@ -108,18 +108,18 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
     Ok(out)
 }
 
-/// A report as JSON, with what is known of the figures' errors last.
+/// A report as JSON; the known errors of the figures come last.
 ///
 /// # Errors
 /// A figure that is not finite.
 pub fn json(report: &Report, pretty: bool) -> serde_json::Result<String> {
     #[derive(Serialize)]
-    struct Document<'a> {
+    struct ReprojectJson<'a> {
         #[serde(flatten)]
         report: &'a Report,
         errors: Vec<&'static KnownError>,
     }
-    let document = Document {
+    let document = ReprojectJson {
         report,
         errors: errors::known(Of::Rays),
     };
@@ -177,13 +177,13 @@ fn performance(entries: &[Entry]) -> Result<Markup, PlotError> {
         @for note in tables::row_notes(entries) { p { strong { (note) "." } } }
         (tables::performance(entries).markup())
         p {
-            "The paper's average reuse is " (paper::REUSE_PCT) " %, its units' work falls by about "
-            (paper::TNI_REDUCTION_PCT) " % and its cores' work grows by about "
-            (paper::SRP_OVERHEAD_PCT) " %. Its unit counts, latencies, cache sizes and energies "
-            "are not published; ours are parameters, the same for all scenes. "
+            "The paper's average reuse is " (paper::REUSE_PCT) " %. Its units' work falls by about "
+            (paper::TNI_REDUCTION_PCT) " %, and its cores' work grows by about "
+            (paper::SRP_OVERHEAD_PCT) " %. The paper does not publish unit counts, latencies, cache sizes and "
+            "energies; the model's are parameters, the same for all scenes. "
             "\u{201c}Units alone\u{201d} is the ratio of unit cycles. Only primary hits are "
-            "reused, so the share of primary rays in all steps bounds what can be saved: a scene "
-            "with many shadow, reflection and refraction rays gains little however much is reused."
+            "reused, so the share of primary rays in all steps limits the saving: scenes "
+            "with many shadow, reflection and refraction rays save little at any rate of reuse."
         }
     })
 }
@@ -220,7 +220,7 @@ fn picture_row(entry: &Entry, pictures: &Thumbnails) -> Markup {
     };
     let flip = |o: &crate::sgrt::result::Outcome| {
         format!(
-            "FLIP, mean {:.4} at {:.1} ppd (black none, yellow largest)",
+            "FLIP, mean {:.4} at {:.1} ppd (from black to yellow)",
             o.flip_mean, o.pixels_per_degree
         )
     };

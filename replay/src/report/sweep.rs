@@ -24,7 +24,7 @@ pub const SWEEP_SCHEMA: &str = "replay.sweep/2";
 const ORDER: &str = "order";
 const TRAFFIC: &str = "external_mb_per_frame";
 
-/// A sweep: what its file says and what came out, by trace, change, axis values.
+/// The results of a sweep, sorted by trace, change and axis values.
 pub struct SweepReport<'a> {
     file: &'a ExperimentFile,
     outcome: &'a Outcome<'a>,
@@ -33,7 +33,7 @@ pub struct SweepReport<'a> {
 
 /// The JSON object.
 #[derive(Serialize)]
-struct Document<'a, 'r> {
+struct SweepJson<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
@@ -70,7 +70,7 @@ impl<'a> SweepReport<'a> {
     pub fn json(&self) -> serde_json::Result<String> {
         let columns = Self::columns();
         let subjects = self.outcome.subjects.iter();
-        serde_json::to_string(&Document {
+        serde_json::to_string(&SweepJson {
             schema: SWEEP_SCHEMA,
             tool: TOOL,
             model_version: MODEL_VERSION,
@@ -85,7 +85,7 @@ impl<'a> SweepReport<'a> {
         })
     }
 
-    /// The columns of every file: what names a row, then its figures.
+    /// The columns of every file: those that identify a row, then its figures.
     fn columns() -> Vec<Figure<'a>> {
         let mut columns = config_columns::trace();
         columns.extend(config_columns::config());
@@ -100,7 +100,7 @@ impl<'a> SweepReport<'a> {
         columns
     }
 
-    /// Values of an axis as the file has them.
+    /// Values of an axis as written in the experiment file.
     fn written(i: usize, axis: &Axis) -> Figure<'a> {
         Column::text(axis.key.clone(), axis.key.clone(), move |r: &ResultRow| {
             r.point.settings.get(i).map(|(_, value)| plain(value))
@@ -119,7 +119,7 @@ impl<'a> SweepReport<'a> {
         self.rows().csv()
     }
 
-    /// The rows as a table; sets rows of a trace and a change apart.
+    /// The rows as a table, grouped by trace and change.
     #[must_use]
     pub fn table(&self) -> Table {
         let mut columns = vec![Figure::text("label", "scene", |r| r.subject.label.clone())];
@@ -165,7 +165,7 @@ impl<'a> SweepReport<'a> {
         let lead = html! {
             p {
                 (self.rows.len()) " points over " (subjects.len()) @if subjects.len() == 1 { " trace. " } @else { " traces. " }
-                "The same numbers are in the JSON and CSV files next to this page; each point's whole configuration and result is in points/."
+                "The same numbers are in the JSON and CSV files next to this page. The folder points/ has the configuration and result of each point."
             }
         };
         let traces = html! {
@@ -185,12 +185,12 @@ fn value_label() -> String {
     figure(TRAFFIC).map_or_else(String::new, |f| f.heading.axis_label())
 }
 
-/// The charts of one trace: external traffic in MB a frame.
+/// The charts of one trace: external traffic in MB per frame.
 struct Charts<'a> {
     report: &'a SweepReport<'a>,
     scene: &'a str,
     rows: Vec<&'a ResultRow<'a>>,
-    /// Values of the order axis; empty where the order is no axis.
+    /// Values of the order axis; empty if there is none.
     orders: &'a [Value],
 }
 
@@ -206,7 +206,7 @@ impl<'a> Charts<'a> {
         }
     }
 
-    /// One series an order, or a single one.
+    /// One series per order, or a single one.
     fn series(&self) -> Vec<SeriesStyle> {
         if self.orders.is_empty() {
             return vec![SeriesStyle::nth("external traffic", 2)];
@@ -218,7 +218,7 @@ impl<'a> Charts<'a> {
         self.orders.iter().map(style).collect()
     }
 
-    /// One value a series; axes that are not named are at their first value.
+    /// One value per series. Other axes are at their first value.
     fn values(&self, axis: Option<(&str, &Value)>, change: Option<&Setting>) -> Vec<Option<f64>> {
         let with = |order: Option<&Value>| {
             let named = |key: &str| {
@@ -241,7 +241,7 @@ impl<'a> Charts<'a> {
         self.orders.iter().map(|o| with(Some(o))).collect()
     }
 
-    /// A row for the base and one for each single change.
+    /// A chart with one row for the base and one for each single change.
     fn changes(&self) -> HBarChart {
         let axes = self.report.file.one_at_a_time.iter();
         let changes: Vec<Setting> = axes
@@ -260,7 +260,7 @@ impl<'a> Charts<'a> {
         }
     }
 
-    /// A chart for each axis but the order, the other axes at their first value.
+    /// A chart for each axis except the order, with the other axes at their first value.
     fn axes(&self) -> Vec<BarChart> {
         let axes = self.report.file.axes.iter();
         axes.filter(|a| a.key != ORDER && a.values.len() > 1)

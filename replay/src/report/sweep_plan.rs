@@ -1,5 +1,4 @@
-//! What a sweep would do, for schedulers: a line a point with its key, its cost and whether it is
-//! done.
+//! The plan of a sweep, for schedulers: each point with its key, its estimated cost and whether it is done.
 
 use crate::experiment::{Plan, Store, Subject, Task, point_key};
 use crate::model_version::MODEL_VERSION;
@@ -11,7 +10,7 @@ use serde::Serialize;
 pub const PLAN_SCHEMA: &str = "replay.plan/1";
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct PlanJson<'a> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
@@ -25,20 +24,20 @@ struct PlannedPoint<'a> {
     /// Key of its row in a file of `points/`.
     key: String,
     scene: &'a str,
-    /// What is set at the point.
+    /// Settings of the point.
     point: String,
-    /// Points with this number share a pass: they are best replayed together.
+    /// Number of the pass. Points of the same pass are replayed together, so splitting them costs time.
     pass: usize,
-    /// Estimated share of the work, in no unit.
+    /// Estimated cost, without a unit.
     cost: u64,
-    /// Whether its result is there.
+    /// Whether its result exists.
     done: bool,
 }
 
 /// A plan's tasks as one JSON object.
 ///
 /// # Errors
-/// None that a plan can cause.
+/// None for valid plans.
 pub fn json(
     plan: &Plan,
     subjects: &[Subject],
@@ -56,7 +55,7 @@ pub fn json(
             done: store.find(&subject.id, &point.config).is_ok(),
         }
     };
-    serde_json::to_string(&Document {
+    serde_json::to_string(&PlanJson {
         schema: PLAN_SCHEMA,
         tool: TOOL,
         model_version: MODEL_VERSION,

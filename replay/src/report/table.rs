@@ -1,4 +1,4 @@
-//! A table of cells: for a terminal, for the page, and as CSV.
+//! A table: as text for a terminal, as HTML, and as CSV.
 
 use super::columns::{Column, Heading, Show, Value};
 use formats::text::printable;
@@ -9,11 +9,11 @@ use maud::{Markup, html};
 pub struct Table {
     /// Headings.
     pub headings: Vec<Heading>,
-    /// Rows of cells, one a heading.
+    /// Rows with one cell per heading.
     pub rows: Vec<Vec<Value>>,
     /// Text above the table on the page.
     pub caption: &'static str,
-    /// A rule is drawn where any of the first so many cells changes from row to row.
+    /// Rows are separated by a line where one of this many leading cells changes.
     groups: usize,
 }
 
@@ -33,14 +33,14 @@ impl Table {
         }
     }
 
-    /// Sets rows apart where any of the first `cells` cells changes.
+    /// Separates rows where one of the first `cells` cells changes.
     #[must_use]
     pub fn grouped_by(mut self, cells: usize) -> Self {
         self.groups = cells;
         self
     }
 
-    /// The columns with these keys, in the order of `keys`; a key that no column has is left out.
+    /// The columns with these keys, in the order of `keys`. Skips unknown keys.
     #[must_use]
     pub fn picked<'k>(&self, keys: impl IntoIterator<Item = &'k str>) -> Self {
         let at = |key: &str| self.headings.iter().position(|h| h.key == key);
@@ -54,7 +54,7 @@ impl Table {
         }
     }
 
-    /// The rows whose cell under `key` is this text.
+    /// The rows with this text in the cell under `key`.
     #[must_use]
     pub fn only(&self, key: &str, text: &str) -> Self {
         let column = self.headings.iter().position(|h| h.key == key);
@@ -65,7 +65,7 @@ impl Table {
         }
     }
 
-    /// Leaves out the columns that have a value in no row.
+    /// Removes the columns without any value.
     #[must_use]
     pub fn without_empty_columns(mut self) -> Self {
         let used: Vec<bool> = (0..self.headings.len())
@@ -80,7 +80,7 @@ impl Table {
         self
     }
 
-    /// The cells as a table writes them.
+    /// The cells as text.
     #[must_use]
     pub fn cells(&self) -> Vec<Vec<String>> {
         let cell = |(value, heading): (&Value, &Heading)| {
@@ -96,7 +96,7 @@ impl Table {
         row > 0 && self.rows[row - 1][..self.groups] != self.rows[row][..self.groups]
     }
 
-    /// As text for a terminal; never wrapped, so that it can be piped and compared.
+    /// As text for a terminal. Lines are not wrapped, so the output can be piped and compared.
     #[must_use]
     pub fn text(&self) -> String {
         let names = self
@@ -131,7 +131,7 @@ impl Table {
         out
     }
 
-    /// As HTML; scrolls in its own box, with the headings staying in view.
+    /// As HTML in a scrolling box with fixed headings.
     #[must_use]
     pub fn markup(&self) -> Markup {
         let class = |heading: &Heading| match (heading.show == Show::Text, heading.published) {
@@ -166,13 +166,13 @@ impl Table {
         }
     }
 
-    /// As comma-separated values (RFC 4180) in full precision, under the columns' keys.
+    /// As CSV (RFC 4180) in full precision, with the columns' keys as headings.
     #[must_use]
     pub fn csv(&self) -> String {
         let mut csv = csv::Writer::from_writer(Vec::new());
         let keys = self.headings.iter().map(Heading::flat_key);
         let rows = self.rows.iter().map(|row| row.iter().map(Value::exact));
-        // Writing to memory cannot fail, and every row has a cell a heading.
+        // Writing to memory cannot fail, and every row has one cell per heading.
         let _ = csv.write_record(keys);
         for row in rows {
             let _ = csv.write_record(row);
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_that_no_row_fills_can_be_left_out() {
+    fn empty_columns_can_be_left_out() {
         let table = table(&[("a", 1.0, None)]).without_empty_columns();
         assert_eq!(table.cells(), [["a", "1.00"]]);
         assert_eq!(table.headings.len(), 2);
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_cannot_steer_the_terminal() {
+    fn control_characters_in_a_name_do_not_reach_the_terminal() {
         let text = table(&[("\u{1b}[31mred\u{7}", 1.0, None)]).text();
         assert!(text.contains("\\u{1b}[31mred\\u{7}"), "{text}");
         assert!(!text.contains('\u{1b}'));

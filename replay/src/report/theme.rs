@@ -1,4 +1,4 @@
-//! The one look of every plot: colours, type, strokes, and where labels may stand.
+//! The common style of all plots: colours, type, strokes, and placement of labels.
 //!
 //! Inks and grid are sentinel colours that the page's style sheet maps to a dark scheme (see
 //! `html/style.css`), so one SVG serves both.
@@ -6,7 +6,7 @@
 use crate::palette::{self, Rgb};
 use plotters::style::RGBColor;
 
-/// A sequence of series colours; the last is the neutral one.
+/// Series colours; the last one is neutral.
 pub const SERIES: [RGBColor; 8] = [
     color(palette::ORANGE),
     color(palette::SKY_BLUE),
@@ -26,7 +26,7 @@ pub const fn color([red, green, blue]: Rgb) -> RGBColor {
 
 /// Text.
 pub const INK: RGBColor = RGBColor(0x1F, 0x23, 0x28);
-/// The page itself, to lift text off lines.
+/// Background of text that covers lines.
 pub const PAPER: RGBColor = RGBColor(0xFF, 0xFF, 0xFF);
 /// Secondary text: tick labels, notes.
 pub const MUTED: RGBColor = RGBColor(0x5B, 0x63, 0x6C);
@@ -46,9 +46,9 @@ pub const TICK_PX: u32 = 11;
 /// Series strokes, px.
 pub const LINE_PX: u32 = 2;
 
-/// Width in pixels that `text` takes at `size_px`, a little on the safe side.
+/// Upper estimate of the width of `text` at `size_px`, in pixels.
 ///
-/// The viewer's font is not known here; these advance widths bound the common system faces.
+/// The viewer's font is unknown; these advance widths bound those of common system fonts.
 #[must_use]
 pub fn text_width_px(text: &str, size_px: u32) -> f64 {
     let em: f64 = text
@@ -64,16 +64,16 @@ pub fn text_width_px(text: &str, size_px: u32) -> f64 {
     em * f64::from(size_px)
 }
 
-/// Moves label positions apart to at least `gap`, each as near to its wish as the others allow
-/// (least squares), inside `low..=high`. The answer is in the order of `wishes`.
+/// Moves label positions apart to at least `gap`, as close to `wishes` as possible (least squares), inside
+/// `low..=high`. The result is in the order of `wishes`.
 ///
-/// Labels that cannot all fit keep the gap and run past `high`.
+/// Labels that do not all fit keep the gap and exceed `high`.
 #[must_use]
 pub fn spread(wishes: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
     let mut by_position: Vec<usize> = (0..wishes.len()).collect();
     by_position.sort_by(|&a, &b| wishes[a].total_cmp(&wishes[b]).then(a.cmp(&b)));
 
-    // With the gaps taken out, "at least gap apart" is "not descending": pool adjacent violators.
+    // After subtracting the gaps, the constraint is "not descending": pool adjacent violators.
     let mut pools: Vec<(f64, usize)> = Vec::new();
     for (rank, &index) in by_position.iter().enumerate() {
         let mut pool = (wishes[index] - rank as f64 * gap, 1);
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_leaves_labels_alone_that_do_not_collide() {
+    fn spread_does_not_move_labels_that_do_not_collide() {
         assert_eq!(
             spread(&[80.0, 10.0, 40.0], 14.0, 0.0, 100.0),
             [80.0, 10.0, 40.0]

@@ -1,4 +1,5 @@
-//! A replay over time, in the trace event format that Perfetto and Chrome's tracing page open. One nanosecond there is one cycle.
+//! A replay over time, in the trace event format of Perfetto and Chrome's tracing page. One nanosecond
+//! stands for one cycle.
 
 use crate::result::{TileAt, Timeline, TimelineItem};
 use formats::textrace::{Pass, Tables};
@@ -9,7 +10,8 @@ use serde_json::{Value, json};
 const CORES: u32 = 1;
 const MEMORY: u32 = 2;
 
-/// The whole file. A core's item ends when its next one starts: threads of an item may still loop then.
+/// The whole file. A core's item ends when its next one starts, although threads of the item may still be
+/// in flight.
 ///
 /// # Errors
 /// A number that JSON cannot hold.

@@ -1,7 +1,7 @@
 //! Error detection: decides whether each right sample is reused or traced.
 
 use super::frame::{Frame, SKY};
-use super::place::Place;
+use super::place::RightSample;
 use super::reproject::{NONE, Reprojection};
 use super::rules::{Rule, Test};
 use rayon::prelude::*;
@@ -58,7 +58,7 @@ pub fn decide(frame: &Frame, arrived: &Reprojection, rule: &Rule) -> Vec<Decisio
     (0..frame.sample_count())
         .into_par_iter()
         .map(|index| {
-            let at = Place {
+            let at = RightSample {
                 frame,
                 arrived,
                 index,
@@ -87,7 +87,7 @@ pub fn decide(frame: &Frame, arrived: &Reprojection, rule: &Rule) -> Vec<Decisio
 }
 
 /// The decision if no test rejects the arrival.
-fn candidate(at: Place) -> Decision {
+fn candidate(at: RightSample) -> Decision {
     let candidate = at.candidate();
     let (class, primitive) = match candidate.arrivals {
         0 => (PixelClass::Missing, SKY),
@@ -105,7 +105,7 @@ fn candidate(at: Place) -> Decision {
     }
 }
 
-fn rejected(tests: &[Box<dyn Test + '_>], at: Place, source: u32) -> bool {
+fn rejected(tests: &[Box<dyn Test + '_>], at: RightSample, source: u32) -> bool {
     let hit = &at.frame.left().samples[source as usize];
     tests.iter().any(|test| test.rejects(at, hit))
 }

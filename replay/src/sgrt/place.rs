@@ -22,7 +22,7 @@ pub const EIGHT: [Offset; 8] = [
 
 /// A right sample.
 #[derive(Clone, Copy)]
-pub struct Place<'a> {
+pub struct RightSample<'a> {
     /// Both eyes.
     pub frame: &'a Frame,
     /// All arrivals.
@@ -31,7 +31,7 @@ pub struct Place<'a> {
     pub index: usize,
 }
 
-impl<'a> Place<'a> {
+impl<'a> RightSample<'a> {
     /// The arrival here.
     #[must_use]
     pub fn candidate(&self) -> &'a Candidate {

@@ -20,9 +20,10 @@ pub struct Preset {
 /// The reading of the SGRT paper that comes closest to its figure 3 on the scenes that `replay readings` calibrates on.
 static SGRT_PAPER: Preset = Preset {
     name: "sgrt-paper",
-    title: "the reading of the SGRT paper that is closest to its figure 3: every arrival is reused, with its shadow outcomes",
+    title: "the reading of the SGRT paper that is closest to its figure 3: every arrival is reused, with its colour where the material \
+            looks the same from everywhere",
     rule: "none",
-    reuse: Reuse::Shadow,
+    reuse: Reuse::Color,
     parameters: "",
 };
 

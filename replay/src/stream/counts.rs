@@ -25,7 +25,7 @@ pub struct Bins {
 
 /// The bins of a tile: first cell of its view, and tile number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct TileBins {
     pub(super) first_cell: u32,
     pub(super) tile: u32,
 }
@@ -152,8 +152,8 @@ impl Bins {
         }
     }
 
-    pub(super) fn place(&self, at: TileRef) -> Place {
-        Place {
+    pub(super) fn place(&self, at: TileRef) -> TileBins {
+        TileBins {
             first_cell: self.first_cell(at) as u32,
             tile: self.tile(at) as u32,
         }

@@ -1,6 +1,6 @@
 //! The quads of a tile as lines, which every order, cache and clock reads instead of the trace.
 
-use super::counts::Place;
+use super::counts::TileBins;
 use super::distinct::Use;
 use crate::order::Interleave;
 
@@ -75,7 +75,7 @@ pub(super) struct QuadEnd {
 /// before (another lane, same level of the same texture) are counted, not listed.
 #[derive(Clone, Debug, Default)]
 pub struct TileLines {
-    pub(super) place: Place,
+    pub(super) place: TileBins,
     pub(super) runs: Vec<QuadRun>,
     pub(super) quads: Vec<QuadEnd>,
     /// Empty if only distinct lines are requested; the tags likewise.
@@ -88,7 +88,7 @@ pub struct TileLines {
 
 impl TileLines {
     /// Empties the lists but keeps their allocations.
-    pub(super) fn begin(&mut self, place: Place) {
+    pub(super) fn begin(&mut self, place: TileBins) {
         self.place = place;
         self.runs.clear();
         self.quads.clear();
@@ -198,7 +198,7 @@ pub fn interleaved(
 /// A quad's lines.
 #[derive(Clone, Copy, Debug)]
 pub struct QuadLines<'a> {
-    pub(super) place: Place,
+    pub(super) place: TileBins,
     /// Number of footprints, repeats included.
     pub footprints: u32,
     /// Distinct lines of each footprint, as addresses over the line size.
@@ -216,7 +216,7 @@ impl<'a> QuadLines<'a> {
     #[must_use]
     pub fn of_lines(lines: &'a [u32], tags: &'a [Tag]) -> Self {
         Self {
-            place: Place::default(),
+            place: TileBins::default(),
             footprints: lines.len() as u32,
             lines,
             tags,

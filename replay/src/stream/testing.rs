@@ -1,6 +1,6 @@
 //! Small traces for the tests of the engine.
 
-use super::counts::Place;
+use super::counts::TileBins;
 use super::lines::{QuadEnd, Tag, TileLines};
 use formats::textrace::{
     Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta,
@@ -115,7 +115,7 @@ pub fn tile(primitives: &[(u32, u32)]) -> Tile {
 /// Quads with these footprints, all in cell 0 of tile 0.
 pub fn tile_lines(quads: &[&[&[u32]]]) -> TileLines {
     let mut tile = TileLines::default();
-    tile.begin(Place::default());
+    tile.begin(TileBins::default());
     let [first, other] = Tag::of_footprint(0, 0);
     for footprints in quads {
         for lines in *footprints {

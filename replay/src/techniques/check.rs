@@ -1,4 +1,4 @@
-//! What a manifest must keep beyond the types of its keys.
+//! Checks rules of a manifest that the types of its keys do not express.
 
 use super::manifest::{Frame, MANIFEST_SCHEMA, Manifest, ManifestRow, numbers};
 use formats::view::MAX_EYE_SIZE_PX;
@@ -8,11 +8,11 @@ use std::path::{Component, Path};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{key}`: expected {expected}, found {found}")]
 pub struct Fault {
-    /// Key with its place, as `rows[2].frames[0].images`.
+    /// Path of the key, such as `rows[2].frames[0].images`.
     pub key: String,
-    /// What the key may hold.
+    /// Values that the key may have.
     pub expected: String,
-    /// What it holds.
+    /// Value that it has.
     pub found: String,
 }
 
@@ -34,7 +34,7 @@ fn ensure(
     })
 }
 
-/// Checks every rule; the first key that breaks one.
+/// Checks every rule; fails with the first key that breaks one.
 pub fn check(manifest: &Manifest) -> Checked {
     ensure(
         manifest.schema == MANIFEST_SCHEMA,
@@ -94,7 +94,7 @@ fn check_row(manifest: &Manifest, index: usize, row: &ManifestRow) -> Checked {
     ensure(
         !name.is_empty() && !earlier.clone().any(|other| other.technique == *name),
         format!("rows[{index}].technique"),
-        "a name of its own",
+        "a unique name",
         format_args!("`{name}`"),
     )?;
     let numbers: Vec<u32> = row.frames.iter().map(|frame| frame.frame).collect();
@@ -177,7 +177,7 @@ fn positive(key: &str, value: f64) -> Checked {
     ensure(ok, key, "a number above 0", value)
 }
 
-/// A path that names something inside the folder.
+/// Checks that a path is relative and inside the folder.
 fn inside(key: String, path: &str) -> Checked {
     let plain = |part: Component| matches!(part, Component::Normal(_));
     let ok = !path.is_empty() && Path::new(path).components().all(plain) && !path.contains('\\');

@@ -1,4 +1,4 @@
-//! A folder of `tracegen techniques`: its manifest and the files that it names.
+//! A folder written by `tracegen techniques`: its manifest and the files that it names.
 
 use super::check::{Fault, check};
 use super::manifest::Manifest;
@@ -9,10 +9,10 @@ use image_error::{Mask, Picture};
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// More than this is no manifest.
+/// Size limit of a manifest.
 const LONGEST_MANIFEST_BYTES: u64 = 256 << 20;
 
-/// What is wrong with a folder; always names the file.
+/// An error in a folder; always names the file.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct FolderError {
@@ -35,20 +35,20 @@ enum Problem {
     #[error("expected {}x{} pixels, found {}x{}", expected[0], expected[1], found[0], found[1])]
     Size { expected: [u32; 2], found: [u32; 2] },
     #[error(
-        "expected the checksum {expected} of the manifest, found {found}: another file than the study wrote"
+        "expected the checksum {expected} of the manifest, found {found}: not the file that the study wrote"
     )]
     Checksum { expected: String, found: String },
     #[error("expected a file inside {0}, found a link to {1}")]
     Outside(String, String),
 }
 
-/// A folder with its manifest, checked.
+/// A folder with a checked manifest.
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
     /// The manifest.
     pub manifest: Manifest,
-    /// Which pixels the user can see, left and right.
+    /// Visible pixels of the left and the right eye.
     pub masks: [Mask; 2],
 }
 
@@ -56,7 +56,7 @@ impl Folder {
     /// Reads and checks the manifest of a folder.
     ///
     /// # Errors
-    /// No manifest, or one that breaks a rule; the error names the file and the key.
+    /// A missing manifest, or one that breaks a rule; the error names the file and the key.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let file = path.join("manifest.json");
         let manifest = read(&file).map_err(|problem| FolderError {
@@ -83,10 +83,10 @@ impl Folder {
         name.to_string_lossy().into_owned()
     }
 
-    /// Every file that is read of the folder.
+    /// Every file that is read from the folder.
     ///
     /// # Errors
-    /// As [`Self::file`].
+    /// See [`Self::file`].
     pub fn files(&self) -> Result<Vec<PathBuf>, FolderError> {
         let rows = &self.manifest.rows;
         let images = rows.iter().flat_map(|r| &r.frames).flat_map(|f| &f.images);
@@ -99,7 +99,7 @@ impl Folder {
     /// A file that the manifest names.
     ///
     /// # Errors
-    /// It does not exist, is no regular file, or is a link that leads out of the folder.
+    /// The file does not exist, is not a regular file, or is a link to a file outside the folder.
     pub fn file(&self, relative: &str) -> Result<PathBuf, FolderError> {
         let path = self.path.join(relative);
         let resolve = || -> Result<(), Problem> {
@@ -117,10 +117,10 @@ impl Folder {
         }
     }
 
-    /// The bytes of an eye's picture in a frame of a row, both by index.
+    /// The bytes of an eye's picture in a frame of a row; row and frame are indices.
     ///
     /// # Errors
-    /// The file cannot be read, or is another than the study wrote.
+    /// The file cannot be read, or is not the one that the study wrote.
     pub fn picture_file(
         &self,
         row: usize,
@@ -148,7 +148,7 @@ impl Folder {
     /// Checks that a row's trace is the one that the study wrote.
     ///
     /// # Errors
-    /// Another content checksum than the manifest's.
+    /// A content checksum other than the manifest's.
     pub fn check_trace(&self, row: usize, found: &str) -> Result<(), FolderError> {
         let row = &self.manifest.rows[row];
         let expected = row.trace_checksum.as_ref();
@@ -159,16 +159,16 @@ impl Folder {
     }
 }
 
-/// A picture's file, read but not decoded.
+/// A picture file, read but not decoded.
 #[derive(Debug)]
 pub struct PictureFile<'a> {
     folder: &'a Folder,
     path: PathBuf,
-    /// The file as it is.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 
-/// Compares with the manifest's checksum, which folders of earlier versions lack.
+/// Compares with the manifest's checksum, which is missing in folders of earlier versions.
 fn matches_checksum(
     expected: Option<&String>,
     found: impl FnOnce() -> String,
@@ -190,7 +190,7 @@ impl PictureFile<'_> {
     /// Decodes the picture.
     ///
     /// # Errors
-    /// No PNG, or one of another size than the manifest says.
+    /// Not a PNG, or its size differs from the manifest's.
     pub fn decode(&self) -> Result<Picture, FolderError> {
         let expected = self.folder.manifest.size_px;
         decode(&self.bytes, expected).map_err(|problem| FolderError {
@@ -209,7 +209,7 @@ fn decode(bytes: &[u8], expected: [u32; 2]) -> Result<Picture, Problem> {
     }
     let mut reader = reader();
     let mut limits = Limits::default();
-    // Sixteen bits of four channels, and as much again for the decoder.
+    // Sixteen bits in each of four channels, and the same amount for the decoder.
     limits.max_alloc = Some(16 * u64::from(width) * u64::from(height) + (1 << 20));
     reader.limits(limits);
     let picture = reader.decode()?.into_rgb8();

@@ -1,6 +1,6 @@
 //! `manifest.json` of a folder that `tracegen techniques` writes, schema `tracegen.techniques/1`.
 //!
-//! Keys that are not read here are ignored, so that a capturer may say more.
+//! Unknown keys are ignored, so that captures can record more.
 
 use formats::view::{Hmd, Lens};
 use serde::{Deserialize, Serialize};
@@ -14,9 +14,9 @@ pub const MANIFEST_SCHEMA: &str = "tracegen.techniques/1";
 pub struct Manifest {
     /// `tracegen.techniques/1`.
     pub schema: String,
-    /// Program and version that measured.
+    /// Program and version that wrote the manifest.
     pub tool: String,
-    /// Scene as given.
+    /// Scene as given on the command line.
     pub scene: String,
     /// Triangles of the scene, instances counted.
     pub scene_triangles: u64,
@@ -24,57 +24,57 @@ pub struct Manifest {
     pub instances: u64,
     /// Name of the camera.
     pub camera: String,
-    /// Path that the camera takes, if it moves.
+    /// Camera path, if the camera moves.
     #[serde(default)]
     pub path: Option<String>,
     /// Numbers of the frames, ascending.
     pub frames: Vec<u32>,
-    /// Frames a second along the path.
+    /// Frames per second along the path.
     pub fps: f64,
-    /// Width and height of an eye's picture in pixels.
+    /// Width and height of the image of each eye in pixels.
     pub size_px: [u32; 2],
     /// The display.
     pub hmd: Hmd,
-    /// What the lenses show of the left and the right eye's picture.
+    /// Visible area of the left and the right eye's image.
     pub lens: [Lens; 2],
-    /// Pixels per degree at the centre of an eye's picture.
+    /// Pixels per degree at the centre of each eye's image.
     pub pixels_per_degree: f32,
     /// Device that rendered.
     pub adapter: String,
     /// Its driver.
     pub driver: String,
-    /// The device is the processor.
+    /// Whether the device is the processor.
     pub software_driver: bool,
-    /// Technique that the others are held against.
+    /// Technique that the others are compared with.
     pub baseline: String,
-    /// One a technique or combination.
+    /// One row per technique or combination.
     pub rows: Vec<ManifestRow>,
-    /// What the search for the cheapest techniques inside a budget chose.
+    /// Result of the search for the cheapest techniques within a budget.
     #[serde(default)]
     pub auto: Option<Auto>,
-    /// Why the device drew view by view where both were to be drawn at once.
+    /// Defect of the device because of which views were drawn one by one instead of both at once.
     #[serde(default)]
     pub multiview_defect: Option<String>,
 }
 
-/// A technique, or a combination of some.
+/// A technique, or a combination of techniques.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct ManifestRow {
     /// Name, unique in the manifest.
     pub technique: String,
-    /// Name for people.
+    /// Display name.
     pub title: String,
-    /// How the capturer was set.
+    /// Settings of the capture.
     #[serde(default)]
     pub settings: Value,
     /// Techniques that it combines.
     #[serde(default)]
     pub parts: Vec<String>,
-    /// No pixel that the user can see is to change.
+    /// Whether it is meant to leave every visible pixel unchanged.
     pub lossless: bool,
-    /// One a frame of the manifest, in the same order.
+    /// One per frame of the manifest, in the same order.
     pub frames: Vec<Frame>,
-    /// Most memory that the capture held.
+    /// Peak memory of the capture.
     #[serde(default)]
     pub peak_memory_bytes: Option<u64>,
     /// Texels of the scene.
@@ -83,7 +83,7 @@ pub struct ManifestRow {
     /// Texture trace, relative to the folder.
     #[serde(default)]
     pub trace: Option<String>,
-    /// Content checksum of the trace; none in folders of earlier versions.
+    /// Content checksum of the trace; missing in folders of earlier versions.
     #[serde(default)]
     pub trace_checksum: Option<String>,
     /// Frames of the trace.
@@ -98,12 +98,12 @@ pub struct Frame {
     pub frame: u32,
     /// Bounds that were tested against a frustum.
     pub cull_tests: u64,
-    /// Time that culling took.
+    /// Time of culling.
     pub cull_s: f64,
-    /// Draws that can be seen and were left out; none where the device cannot tell.
+    /// Culled draws that are visible; `None` if the device cannot count them.
     #[serde(default)]
     pub false_negatives: Option<u64>,
-    /// Draws that were kept and cannot be seen.
+    /// Draws that were kept but are not visible.
     #[serde(default)]
     pub false_positives: Option<u64>,
     /// Draws of both eyes.
@@ -116,7 +116,7 @@ pub struct Frame {
     pub vertices: u64,
     /// Triangles submitted.
     pub triangles: u64,
-    /// 2x2 quads shaded; none where the device cannot capture.
+    /// Shaded 2x2 quads; `None` if the device cannot capture.
     #[serde(default)]
     pub quads: Option<u64>,
     /// Fragments shaded.
@@ -124,30 +124,30 @@ pub struct Frame {
     pub fragments: Option<u64>,
     /// Bytes sent to the device.
     pub bytes_uploaded: u64,
-    /// Memory traffic by counts.
+    /// Memory traffic, computed from counts.
     #[serde(default)]
     pub memory_bytes: Option<u64>,
     /// Energy of the counted work.
     #[serde(default)]
     pub energy_mj: Option<f64>,
-    /// Bytes of pictures read and written where the frame was made of the one before.
+    /// Bytes of images read and written to compute the frame from the one before.
     #[serde(default)]
     pub bytes_reprojected: u64,
-    /// Bytes of the colour that the frame is rendered into.
+    /// Size of the frame's colour targets in bytes.
     #[serde(default)]
     pub target_color_bytes: Option<u64>,
-    /// Bytes of its depth buffers that have to be there at a time.
+    /// Size in bytes of the depth buffers in use at the same time.
     #[serde(default)]
     pub target_depth_bytes: Option<u64>,
-    /// Times of the frame, one a repeat.
+    /// Times of the frame, one per repeat.
     pub frame_s: Vec<f64>,
-    /// Times of the baseline's same frame, each measured right beside the repeat.
+    /// Times of the same frame with the baseline, each measured next to the repeat.
     #[serde(default)]
     pub baseline_s: Vec<f64>,
-    /// What processors worked for the frame, one a repeat; none where the system did not tell.
+    /// Processor time of the frame, one per repeat; empty if the system did not report it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub processor_s: Vec<f64>,
-    /// What they worked for the baseline's.
+    /// Processor time of the baseline.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub baseline_processor_s: Vec<f64>,
     /// Time by stage.
@@ -155,27 +155,27 @@ pub struct Frame {
     pub stages_s: Map<String, Value>,
     /// Left and right picture, relative to the folder.
     pub images: [String; 2],
-    /// CRC-32 of the pictures' files in 8 hexadecimal digits; none in folders of earlier versions.
+    /// CRC-32 of the image files as 8 hexadecimal digits; missing in folders of earlier versions.
     #[serde(default)]
     pub image_checksums: Option<[String; 2]>,
-    /// What the technique says of itself beforehand.
+    /// Predictions by the technique itself.
     #[serde(default)]
     pub predicted: Map<String, Value>,
 }
 
-/// A search for the cheapest techniques inside a budget.
+/// A search for the cheapest techniques within a budget.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Auto {
-    /// What must hold.
+    /// The budget.
     pub budget: Value,
-    /// Settings that were chosen.
+    /// Chosen settings.
     pub chosen: Value,
-    /// Why.
+    /// Reason of the choice.
     pub reason: String,
-    /// Frames that the search saw.
+    /// Frames used by the search.
     #[serde(default)]
     pub search_frames: Vec<u32>,
-    /// Frames on which the promise was checked.
+    /// Frames used to check the result.
     #[serde(default)]
     pub held_frames: Vec<u32>,
 }
@@ -188,7 +188,7 @@ impl Manifest {
     }
 }
 
-/// The numbers of a map of measures, in its order.
+/// The numeric entries of a map, in its order.
 pub fn numbers(map: &Map<String, Value>) -> impl Iterator<Item = (&str, f64)> {
     map.iter()
         .filter_map(|(key, value)| Some((key.as_str(), value.as_f64()?)))

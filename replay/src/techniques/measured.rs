@@ -1,10 +1,10 @@
-//! All figures of one technique on one scene, and of the orders on its trace.
+//! All figures of one technique on one scene, and the savings of orders on its trace.
 
 use super::manifest::{Frame, Manifest, ManifestRow};
 use super::{PictureFigures, Sharing, Spread, Timing, dominated, dominated_in_time};
 use crate::config::Order;
 
-/// What the caches say of a technique's trace, in one order.
+/// Cache figures of a technique's trace in one order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CacheFigures {
     /// Order of the tiles.
@@ -24,14 +24,14 @@ pub struct CacheFigures {
 }
 
 impl CacheFigures {
-    /// External traffic in MB (10^6 bytes) a frame.
+    /// External traffic in MB (10^6 bytes) per frame.
     #[must_use]
     pub fn external_mb_per_frame(&self) -> f64 {
         self.external_bytes as f64 / 1e6 / f64::from(self.frames.max(1))
     }
 }
 
-/// A count of a frame.
+/// A count per frame.
 pub type Count = fn(&Frame) -> Option<u64>;
 
 /// A technique or combination on a scene.
@@ -48,23 +48,24 @@ pub struct Measured<'a> {
     pub timing: Timing,
     /// Image errors.
     pub pictures: PictureFigures,
-    /// Number of the worst picture's frame.
+    /// Frame number of the worst picture.
     pub worst_frame: u32,
-    /// Caches, one an order; none without a trace.
+    /// Cache figures by order; empty without a trace.
     pub caches: Vec<CacheFigures>,
-    /// What the eyes share; none without a trace.
+    /// Lines that the eyes share; `None` without a trace.
     pub sharing: Option<Sharing>,
-    /// Another row errs no more in the mean and takes less time, with the quartiles apart.
+    /// Whether another row has at most the same mean error and takes less time, with disjoint interquartile
+    /// ranges.
     pub dominated: bool,
-    /// Counts of which another row needs no more, with no more error in the worst picture, and is better at one of
-    /// both: names of [`OBJECTIVES`].
+    /// Counts in which another row is at least as good, with at most the same error in its worst picture,
+    /// and better in one of both: names of [`OBJECTIVES`].
     pub dominated_in: Vec<&'static str>,
 }
 
-/// A cost of a frame; none where it was not counted.
+/// A cost per frame; `None` if it was not counted.
 pub type Cost = fn(&Frame) -> Option<f64>;
 
-/// The counts that techniques are ranked by, which any two runs have in common.
+/// The counts by which techniques are ranked; they are the same in every run.
 pub const OBJECTIVES: [(&str, Cost); 3] = [
     ("fragments", |frame| Some(frame.fragments? as f64)),
     ("bytes", |frame| Some(frame.memory_bytes? as f64)),
@@ -72,33 +73,33 @@ pub const OBJECTIVES: [(&str, Cost); 3] = [
 ];
 
 impl Measured<'_> {
-    /// True for the technique that the others are held against.
+    /// Whether it is the baseline.
     #[must_use]
     pub fn is_baseline(&self) -> bool {
         self.row.technique == self.baseline.technique
     }
 
-    /// A count summed over the frames; none where a frame has none.
+    /// Sum of a count over the frames; `None` if a frame has none.
     #[must_use]
     pub fn total(&self, of: Count) -> Option<u64> {
         self.row.frames.iter().map(of).sum()
     }
 
-    /// The largest of a count over the frames; none where a frame has none.
+    /// Maximum of a count over the frames; `None` if a frame has none.
     #[must_use]
     pub fn most(&self, of: Count) -> Option<u64> {
         let counts: Option<Vec<u64>> = self.row.frames.iter().map(of).collect();
         counts?.into_iter().max()
     }
 
-    /// A count over the baseline's; none where that has none.
+    /// A count over the baseline's; `None` if the baseline has none.
     #[must_use]
     pub fn over_baseline(&self, of: Count) -> Option<f64> {
         let whole: u64 = self.baseline.frames.iter().map(of).sum::<Option<u64>>()?;
         (whole > 0).then_some(self.total(of)? as f64 / whole as f64)
     }
 
-    /// Energy of the counted work over the baseline's; none where that has none.
+    /// Energy of the counted work over the baseline's; `None` if the baseline has none.
     #[must_use]
     pub fn energy_ratio(&self) -> Option<f64> {
         let whole = |row: &ManifestRow| row.frames.iter().map(|f| f.energy_mj).sum::<Option<f64>>();
@@ -106,7 +107,7 @@ impl Measured<'_> {
         (baseline > 0.0).then_some(whole(self.row)? / baseline)
     }
 
-    /// Mean of a figure that the technique predicts of itself.
+    /// Mean of a figure that the technique predicts.
     #[must_use]
     pub fn predicted(&self, key: &str) -> Option<f64> {
         let frames = self.row.frames.iter();
@@ -116,7 +117,7 @@ impl Measured<'_> {
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
 
-    /// The caches in an order.
+    /// The cache figures in an order.
     #[must_use]
     pub fn caches_in(&self, order: Order) -> Option<&CacheFigures> {
         self.caches.iter().find(|c| c.order == order)
@@ -127,12 +128,13 @@ impl Measured<'_> {
 pub struct Measures<'a> {
     /// Short name of the scene.
     pub scene: &'a str,
-    /// One a row of the manifest.
+    /// One entry per row of the manifest.
     pub rows: Vec<Measured<'a>>,
 }
 
 impl Measures<'_> {
-    /// Marks what is dominated in frame time and mean error, and in each count and the worst picture's error.
+    /// Marks dominated techniques: by frame time and mean error, and by each count and the worst picture's
+    /// error.
     pub fn mark_dominated(&mut self) {
         let times: Vec<(Spread, f64)> = (self.rows.iter())
             .map(|m| (m.timing.ratio, m.pictures.flip_mean))
@@ -152,7 +154,7 @@ impl Measures<'_> {
         }
     }
 
-    /// What each technique leaves of the gain of an order over another.
+    /// The saving of an order over another one, with each technique and without.
     #[must_use]
     pub fn order_gains(&self, order: Order, against: Order) -> Vec<OrderGain<'_>> {
         let gain = |m| Gain::of(m, order, against);
@@ -169,14 +171,14 @@ impl Measures<'_> {
     }
 }
 
-/// How much an order saves on a trace, and what there is to save.
+/// The saving of an order on a trace, and its upper bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gain {
     /// External traffic saved, percent of the other order's.
     pub saved_pct: f64,
-    /// The other order's traffic above that of an infinite cache, percent: no order saves more.
+    /// The other order's traffic above that of an infinite cache, percent; an upper bound of the saving.
     pub headroom_pct: f64,
-    /// Lines that both eyes touch, percent of those that either does.
+    /// Lines that both eyes touch, percent of the lines that at least one touches.
     pub shared_pct: f64,
 }
 
@@ -193,22 +195,22 @@ impl Gain {
     }
 }
 
-/// A technique's gain by an order beside the baseline's.
+/// The saving of an order with a technique and with the baseline.
 pub struct OrderGain<'a> {
     /// The technique.
     pub measured: &'a Measured<'a>,
-    /// With it.
+    /// With the technique.
     pub own: Gain,
-    /// Without it.
+    /// With the baseline.
     pub baseline: Gain,
 }
 
 impl OrderGain<'_> {
-    /// Gains that differ by less, in points, count as equal.
+    /// Savings that differ by less, in points, count as equal.
     const EQUAL_POINTS: f64 = 0.5;
 
-    /// Why the gain is what it is beside the baseline's, from the two figures that bound it: what
-    /// the other order fetches above an infinite cache, and what the eyes have in common.
+    /// Explains the change of the saving by the change of its two bounds: the other order's traffic above
+    /// that of an infinite cache, and the lines that the eyes share.
     #[must_use]
     pub fn reason(&self) -> String {
         let Self { own, baseline, .. } = self;
@@ -221,7 +223,7 @@ impl OrderGain<'_> {
         }
         if gain.abs() < Self::EQUAL_POINTS {
             return format!(
-                "gain as without: both eyes touch {:.1} % of the lines (without {:.1} %)",
+                "saving unchanged: both eyes touch {:.1} % of the lines (without {:.1} %)",
                 own.shared_pct, baseline.shared_pct
             );
         }
@@ -238,7 +240,7 @@ impl OrderGain<'_> {
             "{:.1} % of the traffic is above an infinite cache's (without {:.1} %)",
             own.headroom_pct, baseline.headroom_pct
         );
-        // What moved the way that the gain did is the reason, the larger move first.
+        // The bounds that changed in the same direction are the reasons, the larger change first.
         let mut moved = [(shared, sharing), (headroom, room)];
         moved.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
         let reasons: Vec<String> = moved
@@ -248,7 +250,7 @@ impl OrderGain<'_> {
             .collect();
         if reasons.is_empty() {
             return format!(
-                "{:.1} points {verdict}, though neither what the eyes share ({:+.1} points) nor the traffic above an infinite cache's ({:+.1} points) moved that way: the traffic itself changed",
+                "{:.1} points {verdict}, although neither the shared lines ({:+.1} points) nor the traffic above an infinite cache's ({:+.1} points) changed in that direction: the total traffic changed",
                 gain.abs(),
                 shared,
                 headroom

@@ -1,7 +1,7 @@
-//! What a folder of `tracegen techniques` holds, measured: frame times against the baseline's,
-//! image errors where the user can see, and what both eyes share in their traces.
+//! Evaluates a folder of `tracegen techniques`: frame times against the baseline's, image errors inside the
+//! visible area, and cache lines that both eyes share.
 //!
-//! The folder is read alone: its manifest, pictures and traces are all that is known of a capture.
+//! All data about a capture comes from the folder: its manifest, pictures and traces.
 
 mod check;
 mod folder;

@@ -1,22 +1,22 @@
-//! Frame times against the refresh rates of displays, as they were measured: nothing is scaled.
+//! Compares measured frame times, without scaling, with the refresh rates of displays.
 
 /// Refresh rates of headsets.
 pub const RATES_HZ: [u32; 5] = [72, 80, 90, 120, 144];
 
-/// How frames fare on a display of one rate. A frame is shown at the first refresh after it is done, and the
-/// next one begins then, as without anything that interrupts it.
+/// Frame pacing on a display with one refresh rate. A frame is shown at the first refresh after it is
+/// finished, and the next frame starts at that refresh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pacing {
-    /// Refreshes a second.
+    /// Refresh rate.
     pub rate_hz: u32,
-    /// Frames that take longer than a refresh, percent.
+    /// Frames longer than a refresh interval, percent.
     pub missed_pct: f64,
-    /// Refreshes that a frame takes, on average: 1 without a miss.
+    /// Mean number of refresh intervals per frame; 1 if no frame is late.
     pub steps: f64,
 }
 
 impl Pacing {
-    /// Of some frame times in milliseconds; none without one.
+    /// From frame times in milliseconds; `None` if there are none.
     #[must_use]
     pub fn of(rate_hz: u32, times_ms: &[f64]) -> Option<Self> {
         let count = times_ms.len() as f64;
@@ -24,7 +24,7 @@ impl Pacing {
             return None;
         }
         let period_ms = 1e3 / f64::from(rate_hz);
-        // A frame that is done in a millionth of the period after a refresh is on time.
+        // Allow a millionth of the period for rounding.
         let steps = |ms: &f64| (ms / period_ms - 1e-6).ceil().max(1.0);
         let missed = times_ms.iter().filter(|ms| steps(ms) > 1.0).count();
         Some(Self {
@@ -34,7 +34,7 @@ impl Pacing {
         })
     }
 
-    /// Frames a second that are shown.
+    /// Frames shown per second.
     #[must_use]
     pub fn shown_hz(&self) -> f64 {
         f64::from(self.rate_hz) / self.steps
@@ -47,7 +47,7 @@ mod tests {
 
     #[test]
     fn a_frame_takes_as_many_refreshes_as_its_time_covers() {
-        // Periods of 10, 8.33 and 12.5 ms: the middle one is missed by 9 and 10 ms.
+        // Periods of 10, 8.33 and 12.5 ms: frames of 9 and 10 ms miss the middle one.
         let pacing = |hz| Pacing::of(hz, &[9.0, 10.0, 21.0, 4.0]).unwrap();
         let at_100 = pacing(100);
         assert_eq!((at_100.missed_pct, at_100.steps), (25.0, 1.5));
@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_those_of_a_clock_that_ticks() {
+    fn steps_equal_those_of_a_simulated_display() {
         let times_ms: Vec<f64> = (0..200)
             .map(|i| 0.7 + f64::from(i * 37 % 83) * 0.61)
             .collect();

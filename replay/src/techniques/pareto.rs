@@ -1,8 +1,8 @@
-//! Which choices no one should make: another is as cheap and as good, and better at one of both.
+//! Finds dominated choices: another choice is at least as good in both costs and better in one.
 
 use super::Spread;
 
-/// For each point of two costs, whether another is no worse in both and better in one.
+/// For each point of two costs, whether it is dominated.
 #[must_use]
 pub fn dominated(points: &[(f64, f64)]) -> Vec<bool> {
     let beats = |a: &(f64, f64), b: &(f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;
@@ -12,12 +12,13 @@ pub fn dominated(points: &[(f64, f64)]) -> Vec<bool> {
         .collect()
 }
 
-/// Fewest measurements of each of two times for a claim. The quartiles of equal times lie apart in 29 of 100 pairs of two
-/// measurements each, and in 3 of 100 pairs of eight.
+/// Minimum number of measurements of both times. For equal times, the interquartile ranges are disjoint in
+/// 29 of 100 pairs of two measurements each, and in 3 of 100 pairs of eight.
 const LEAST_SAMPLES: usize = 8;
 
-/// For each point of a time and an error, whether another errs no more and takes less time beyond the noise: the
-/// quartiles of its times lie below this one's, with [`LEAST_SAMPLES`] measurements of each.
+/// For each point of a time and an error, whether another one has at most the same error and takes
+/// significantly less time: the interquartile ranges are disjoint, with [`LEAST_SAMPLES`] measurements of
+/// each.
 #[must_use]
 pub fn dominated_in_time(points: &[(Spread, f64)]) -> Vec<bool> {
     let claims = |a: &Spread, b: &Spread| a.samples.min(b.samples) >= LEAST_SAMPLES && a.q3 < b.q1;
@@ -33,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_another_beats_is_dominated() {
+    fn only_points_that_another_one_beats_are_dominated() {
         let points = [
             (1.0, 0.0),
             (0.8, 0.1),

@@ -1,4 +1,4 @@
-//! Image errors of every technique against the baseline's pictures, where the user can see.
+//! Image errors of every technique against the baseline's pictures, inside the visible area.
 
 use super::{Folder, FolderError};
 use formats::view::Eye;
@@ -22,17 +22,18 @@ pub struct PictureFigures {
     pub worst_frame: usize,
     /// Its eye.
     pub worst_eye: Eye,
-    /// Peak signal-to-noise ratio of all pictures together.
+    /// Peak signal-to-noise ratio over all pictures.
     pub psnr_db: f64,
-    /// The lowest of them.
+    /// The lowest of any picture.
     pub psnr_worst_db: f64,
     /// Mean structural similarity.
     pub ssim: f64,
     /// The lowest of any picture.
     pub ssim_worst: f64,
-    /// Mean flicker, along the baseline's motion, over pairs of frames with numbers in a row; none without such a pair.
+    /// Mean flicker along the baseline's motion, over pairs of consecutive frames; `None` without such a
+    /// pair.
     pub flicker: Option<f64>,
-    /// Percent of the pictures that show the user the very same pixels.
+    /// Pictures whose visible pixels equal the baseline's, percent.
     pub identical_pct: f64,
     /// Mean FLIP of both eyes by frame.
     pub by_frame: Vec<f64>,
@@ -47,11 +48,11 @@ struct Compared {
 
 const EYES: [Eye; 2] = [Eye::Left, Eye::Right];
 
-/// Compares every picture of every row with the baseline's; `done` is called with how many pictures are
-/// done with each step. One a row, in the manifest's order.
+/// Compares every picture of every row with the baseline's. Calls `done` with the number of finished
+/// pictures. Returns one entry per row, in the manifest's order.
 ///
 /// # Errors
-/// A picture that cannot be read or has another size than the manifest says.
+/// A picture that cannot be read, or whose size differs from the manifest's.
 pub fn picture_figures(
     folder: &Folder,
     done: &(dyn Fn(u64) + Sync),
@@ -75,7 +76,7 @@ pub fn picture_figures(
     Ok((0..manifest.rows.len()).map(of_row).collect())
 }
 
-/// Every row's picture of one eye in one frame.
+/// Compares every row's picture of one eye in one frame.
 fn compare(folder: &Folder, frame: usize, eye: Eye) -> Result<Vec<Compared>, FolderError> {
     let manifest = &folder.manifest;
     let rows = &manifest.rows;
@@ -91,7 +92,7 @@ fn compare(folder: &Folder, frame: usize, eye: Eye) -> Result<Vec<Compared>, Fol
         .map(|before| folder.picture_file(baseline, before, eye))
         .transpose()?;
     let picture_before = expected_before.as_ref().map(|f| f.decode()).transpose()?;
-    // Found once for all techniques, and only if one differs from the baseline.
+    // Computed once for all techniques, and only if one differs from the baseline.
     let motion = OnceLock::new();
     let one = |row: usize| {
         let file = folder.picture_file(row, frame, eye)?;
@@ -99,7 +100,7 @@ fn compare(folder: &Folder, frame: usize, eye: Eye) -> Result<Vec<Compared>, Fol
         let decoded = (!same).then(|| file.decode()).transpose()?;
         let picture = decoded.as_ref().unwrap_or_else(|| reference.picture());
         let error = match &decoded {
-            // Every picture has the manifest's size, and so has the reference.
+            // Every picture has the manifest's size, so it matches the reference.
             Some(picture) => reference.error(picture).unwrap_or(PictureError::NONE),
             None => PictureError::NONE,
         };
@@ -124,7 +125,7 @@ fn compare(folder: &Folder, frame: usize, eye: Eye) -> Result<Vec<Compared>, Fol
     (0..rows.len()).map(one).collect()
 }
 
-/// The baseline's picture as what the user sees of it is held against.
+/// The baseline's picture as reference, limited to the visible pixels.
 pub(super) fn reference(folder: &Folder, picture: Picture, eye: Eye) -> Reference {
     let mask = folder.masks[eye as usize].clone();
     let ppd = folder.manifest.pixels_per_degree;
@@ -141,7 +142,7 @@ fn figures(views: &[(usize, Eye)], compared: &[Compared]) -> PictureFigures {
             .map(|c| of(&c.error))
             .fold(f64::INFINITY, f64::min)
     };
-    // The first of equals.
+    // The first of equal ones.
     let worst = views.iter().zip(compared).rev();
     let worst = worst.max_by(|a, b| a.1.error.flip_mean.total_cmp(&b.1.error.flip_mean));
     let (worst_frame, worst_eye, flip_worst) = worst.map_or((0, Eye::Left, 0.0), |(view, c)| {

@@ -1,5 +1,5 @@
-//! What both eyes have in common: the lines that either touches, and that both do. It is what an
-//! order that visits the eyes' tiles together can save.
+//! Counts the lines that each eye touches and that both touch. Only shared lines can be saved by an order
+//! that renders the eyes' tiles together.
 
 use crate::config::{Mode, RunConfig};
 use crate::engine::{ReplayError, replay};
@@ -7,17 +7,17 @@ use crate::stream::{StreamError, TileSource};
 use formats::textrace::{Pass, Tables, Tile};
 use formats::view::Eye;
 
-/// Distinct lines of a trace by who touches them; passes of both eyes are left out.
+/// Distinct lines of a trace by eye; passes of both eyes are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sharing {
     /// Lines that the left eye touches, and the right.
     pub eyes: [u64; 2],
-    /// Lines that any of them touches.
+    /// Lines that at least one eye touches.
     pub either: u64,
 }
 
 impl Sharing {
-    /// Lines that both eyes touch, percent of those that either does; none where there are none.
+    /// Lines that both eyes touch, percent of those that at least one touches; `None` if there are none.
     #[must_use]
     pub fn shared_pct(&self) -> Option<f64> {
         let both = (self.eyes[0] + self.eyes[1]).checked_sub(self.either)?;
@@ -25,7 +25,7 @@ impl Sharing {
     }
 }
 
-/// Counts the lines of a trace under a configuration's sampling and layout.
+/// Counts the lines of a trace with a configuration's sampling and layout.
 ///
 /// # Errors
 /// A trace that cannot be replayed.
@@ -48,7 +48,7 @@ pub fn sharing(source: &dyn TileSource, config: &RunConfig) -> Result<Sharing, R
     })
 }
 
-/// A trace of which some passes are empty.
+/// A trace with only some of its passes.
 struct Part<'a> {
     source: &'a dyn TileSource,
     keep: fn(&Pass) -> bool,
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_eyes_lines_are_those_of_traces_that_hold_one_eye() {
+    fn the_eyes_lines_are_those_of_traces_with_one_eye() {
         let trace = Synthetic {
             size_px: [64, 64],
             patch_px: 16,

@@ -1,4 +1,4 @@
-//! What a technique left out and what became of the picture, side by side.
+//! Pictures of the work that a technique skipped, next to its image error.
 
 use super::pictures::reference;
 use super::{Folder, FolderError, PictureFigures};
@@ -7,13 +7,13 @@ use formats::textrace::{PassKind, QuadRecord, Tile};
 use formats::view::{Eye, TILE_SIZE_PX};
 use image_error::Picture;
 
-/// Colour of what was skipped.
+/// Colour of skipped work.
 const TINT: [f64; 3] = [213.0, 94.0, 0.0];
-/// Dimmed where the user cannot see.
+/// Brightness of pixels outside the visible area.
 const UNSEEN: f64 = 0.45;
 const GAP_PX: u32 = 4;
 
-/// The worst picture of a technique: as it is, its FLIP map, and what was skipped tinted.
+/// The worst picture of a technique: the picture, its FLIP map, and the skipped work as a tint.
 #[derive(Clone, Debug)]
 pub struct Difference {
     /// Index of the row in the manifest.
@@ -24,12 +24,12 @@ pub struct Difference {
     pub eye: Eye,
     /// The three pictures.
     pub picture: Picture,
-    /// Fragments shaded over the baseline's, in percent, where both traces show whole pictures;
-    /// the tint is then by tile, and by pixel of the error elsewhere.
+    /// Fragments shaded over the baseline's, in percent, if both traces show whole pictures. The tint is
+    /// then by tile, otherwise by the error of each pixel.
     pub shaded_pct: Option<f64>,
 }
 
-/// Why there is no difference picture.
+/// Reason why a difference picture failed.
 #[derive(Debug, thiserror::Error)]
 pub enum DifferenceError {
     /// A picture.
@@ -40,8 +40,8 @@ pub enum DifferenceError {
     Trace(#[from] StreamError),
 }
 
-/// The difference pictures of a folder, of all rows that show or shade anything else than the
-/// baseline. `figures` and `traces` have one a row; of a row with a trace, the picture is the
+/// The difference pictures of a folder, for all rows whose pictures or fragments differ from the
+/// baseline's. `figures` and `traces` have one entry per row. For a row with a trace, the picture is the
 /// worst of the trace's frames.
 ///
 /// # Errors
@@ -98,8 +98,7 @@ pub fn differences(
     Ok(out)
 }
 
-/// Index of the frame and the eye of a row's worst picture, among the frames of its trace if
-/// `traced`.
+/// Index of the frame and the eye of a row's worst picture; among the frames of its trace if `traced`.
 fn worst(figures: &PictureFigures, folder: &Folder, traced: Option<usize>) -> (usize, Eye) {
     let numbers = &folder.manifest.frames;
     let in_trace: Vec<usize> = traced
@@ -117,8 +116,8 @@ fn worst(figures: &PictureFigures, folder: &Folder, traced: Option<usize>) -> (u
     (frame.unwrap_or(figures.worst_frame), figures.worst_eye)
 }
 
-/// Fragments that an eye's picture of a frame has in each 16x16 tile, row by row; none where a pass
-/// shows a part of the picture whose place the trace does not tell.
+/// Fragments of an eye's picture of a frame in each 16x16 tile, row by row. `None` if a pass shows a part
+/// of the picture at a place that the trace does not record.
 fn shaded_by_tile(
     source: &dyn TileSource,
     frame: u32,
@@ -144,7 +143,7 @@ fn shaded_by_tile(
         for number in 0..pass.tile_count() {
             source.read_tile(index as u32, number, &mut tile)?;
             let at = [number % pass.tiles[0], number / pass.tiles[0]];
-            // A tile of a coarser pass stands for several of the picture's.
+            // A tile of a coarser pass covers several tiles of the picture.
             let share = f64::from(lanes(&tile)) / f64::from(across * down);
             for y in at[1] * down..((at[1] + 1) * down).min(tiles[1]) {
                 for x in at[0] * across..((at[0] + 1) * across).min(tiles[0]) {
@@ -156,7 +155,7 @@ fn shaded_by_tile(
     Ok(Some(out))
 }
 
-/// Covered lanes of a tile; a quad's records for several groups of textures count once.
+/// Covered lanes of a tile; a quad with records for several groups of textures counts once.
 fn lanes(tile: &Tile) -> u32 {
     let runs = tile.runs.iter();
     let of_run = |run: &formats::textrace::PrimitiveRun| -> u32 {
@@ -170,7 +169,7 @@ fn lanes(tile: &Tile) -> u32 {
     runs.map(of_run).sum()
 }
 
-/// Share of the baseline's fragments that was not shaded, by pixel.
+/// Share of the baseline's fragments that was skipped, by pixel.
 fn by_tile(size_px: [u32; 2], expected: &[f64], found: &[f64]) -> Vec<f64> {
     let columns = size_px[0].div_ceil(TILE_SIZE_PX);
     let pixels = (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| (x, y)));

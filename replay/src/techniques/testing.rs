@@ -1,4 +1,4 @@
-//! A small folder of techniques, made up: pictures, traces and a manifest.
+//! A small generated folder of techniques: pictures, traces and a manifest.
 
 use super::manifest::{Frame, ManifestRow};
 use crate::cli::testing::file_of;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// Pixels of an eye's picture.
 pub(crate) const SIZE_PX: [u32; 2] = [64, 48];
 
-/// A row with frames 0, 1, ... that takes a second, as the baseline does.
+/// A row with frames 0, 1, ... that take as long as the baseline's.
 pub(crate) fn row(technique: &str, frames: u32) -> ManifestRow {
     ManifestRow {
         technique: technique.into(),
@@ -81,7 +81,7 @@ pub(crate) fn manifest() -> Value {
     })
 }
 
-/// A picture that the frame's number changes.
+/// A picture that depends on the frame number.
 fn picture(number: u32) -> Picture {
     let mut picture = Picture::filled(SIZE_PX, [0; 3]);
     for (i, pixel) in picture.pixels.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! Folders of techniques: what is refused, and what is measured.
+//! Tests of folders of techniques: refusals and measurements.
 
 use super::testing::{folder, manifest, write};
 use super::*;
@@ -54,7 +54,7 @@ fn a_manifest_that_breaks_a_rule_is_refused_with_its_key() {
         (
             "/rows/1/technique",
             json!("per-eye"),
-            "`rows[1].technique`: expected a name of its own, found `per-eye`",
+            "`rows[1].technique`: expected a unique name, found `per-eye`",
         ),
         (
             "/rows/2/frames/1/frame",
@@ -89,7 +89,7 @@ fn a_manifest_that_breaks_a_rule_is_refused_with_its_key() {
 }
 
 #[test]
-fn paths_that_lead_out_of_the_folder_are_refused() {
+fn paths_outside_the_folder_are_refused() {
     for path in [
         "../secret.png",
         "/etc/passwd",
@@ -111,7 +111,7 @@ fn paths_that_lead_out_of_the_folder_are_refused() {
 
 #[cfg(unix)]
 #[test]
-fn a_link_that_leads_out_of_the_folder_is_refused() {
+fn a_link_to_a_file_outside_the_folder_is_refused() {
     let root = tempfile::tempdir().unwrap();
     let inside = root.path().join("inside");
     folder(&inside);
@@ -257,7 +257,7 @@ fn errors_count_where_pictures_differ_and_nowhere_else() {
         assert_eq!((lossless.psnr_db, lossless.ssim), (100.0, 1.0));
     }
     let grey = &figures[2];
-    // Only the second of three frames errs, in both eyes.
+    // Only the second of three frames has an error, in both eyes.
     assert_eq!((grey.worst_frame, grey.worst_eye), (1, Eye::Left));
     assert!((grey.flip_worst - 3.0 * grey.flip_mean).abs() < 1e-12);
     assert!((grey.identical_pct - 200.0 / 3.0).abs() < 1e-9);
@@ -268,7 +268,7 @@ fn errors_count_where_pictures_differ_and_nowhere_else() {
         grey.by_frame[1] > 0.01 && grey.ssim_worst < 0.99,
         "{grey:?}"
     );
-    // It comes and goes: both pairs of frames flicker.
+    // The error appears and disappears, so both pairs of frames flicker.
     assert!(grey.flicker.unwrap() > 0.01);
 }
 

@@ -1,12 +1,12 @@
-//! Frame times, held against the baseline's that were measured right beside them.
+//! Frame times, compared with those of the baseline measured next to them.
 
 use super::manifest::{ManifestRow, numbers};
 use super::pacing::{Pacing, RATES_HZ};
 
-/// Refresh rates of displays: frames are due every 11.1 and every 13.9 ms.
+/// Refresh rates of displays, with periods of 11.1 and 13.9 ms.
 pub const REFRESH_HZ: [f64; 2] = [90.0, 72.0];
 
-/// How measurements are spread.
+/// Distribution of measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// 1st percentile.
@@ -24,7 +24,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of these values, linear between ranks; none of none.
+    /// The distribution of these values, with linear interpolation between ranks; `None` without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         sorted.sort_by(f64::total_cmp);
@@ -48,36 +48,36 @@ impl Spread {
 /// Frame times of a technique.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Timing {
-    /// Time over the baseline's that was measured beside it, over all frames and repeats.
+    /// Time over that of the baseline measured next to it, over all frames and repeats.
     pub ratio: Spread,
-    /// What processors worked over what they worked for the baseline: of each frame the least of the repeats,
-    /// which nothing disturbs, all frames together. None where the system did not tell.
+    /// Processor time over the baseline's, summed over frames. Each frame counts with its fastest repeat,
+    /// which was disturbed least. `None` if the system did not report it.
     pub processor_ratio: Option<f64>,
-    /// The same by frame, spread over the frames.
+    /// The same ratio by frame, as a distribution over the frames.
     pub processor_ratios: Option<Spread>,
     /// Time in ms over all frames and repeats.
     pub frame_ms: Spread,
-    /// Percent of all measurements beyond the period of each of [`REFRESH_HZ`], where times are
-    /// scaled so that the median of the baseline beside them takes the first period.
+    /// Percent of all measurements longer than the period of each of [`REFRESH_HZ`], with times scaled so
+    /// that the baseline's median equals the first period.
     pub beyond_pct: [f64; 2],
-    /// Every measurement against each of [`RATES_HZ`], as it is.
+    /// Every measurement, unscaled, against each of [`RATES_HZ`].
     pub pacing: Vec<Pacing>,
     /// Median of each frame's repeats in ms.
     pub frames_ms: Vec<f64>,
     /// Median of each stage over the frames in ms, in the manifest's order.
     pub stages_ms: Vec<(String, f64)>,
-    /// Median time of culling a frame in ms.
+    /// Median culling time per frame in ms.
     pub cull_ms: f64,
 }
 
 impl Timing {
-    /// The times of a row whose frames have a time each, and as many of the baseline or none.
+    /// The times of a row. Every frame needs a time; baseline times must be as many or none.
     #[must_use]
     pub fn of(row: &ManifestRow) -> Option<Self> {
         let times = || row.frames.iter().flat_map(|f| f.frame_s.iter().copied());
         let beside = || {
             let own = |f: &super::manifest::Frame| {
-                // The baseline's own row may name its times once.
+                // The baseline's own row may omit the baseline times.
                 if f.baseline_s.is_empty() {
                     f.frame_s.clone()
                 } else {
@@ -141,8 +141,8 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_that_slows_down_under_both_leaves_the_ratio_alone() {
-        // Every repeat takes four fifths of the baseline's, which takes ever longer.
+    fn a_machine_that_slows_down_leaves_the_ratio_unchanged() {
+        // Every repeat takes four fifths of the baseline's time, which grows.
         let mut row = row("a", 1);
         row.frames[0].baseline_s = (1..=9).map(|i| 0.1 * f64::from(i)).collect();
         row.frames[0].frame_s = row.frames[0].baseline_s.iter().map(|s| 0.8 * s).collect();
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn of_the_processors_work_the_least_of_each_frames_repeats_counts() {
+    fn processor_time_counts_each_frames_fastest_repeat() {
         let mut row = row("a", 2);
         assert_eq!(Timing::of(&row).unwrap().processor_ratio, None);
         for (frame, [own, base]) in row.frames.iter_mut().zip([[1.0, 2.0], [3.0, 4.0]]) {
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn pacing_counts_frames_beyond_the_baselines_median_and_a_quarter_more() {
-        // Scaled, the baseline takes 11.1 ms: 1.0 is on time, 1.1 late for 90 Hz, 1.3 for 72 Hz, too.
+        // Scaled, the baseline takes 11.1 ms: 1.0 is on time, 1.1 is late for 90 Hz, 1.3 also for 72 Hz.
         let mut row = row("a", 4);
         for (frame, time) in row.frames.iter_mut().zip([1.0, 1.1, 1.3, 0.5]) {
             (frame.frame_s, frame.baseline_s) = (vec![time], vec![1.0]);
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_baseline_without_times_beside_it_is_its_own() {
+    fn a_baseline_without_baseline_times_is_compared_with_itself() {
         let mut row = row("a", 2);
         for frame in &mut row.frames {
             frame.baseline_s.clear();

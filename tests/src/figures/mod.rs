@@ -1,8 +1,8 @@
-//! Tables of documents, made from results files.
+//! Tables in documents, generated from results files.
 //!
-//! A results file is `results/NAME.csv`: comment lines that begin with `# command:` say how it was made, then come
-//! a header and rows. A table in a document stands between `<!-- figures: NAME -->` and `<!-- end -->`. It is the
-//! results file as it stands, or what a row of [`VIEWS`] makes of it.
+//! A results file is `results/NAME.csv`: comment lines starting with `# command:` name the commands that
+//! made it; a header and rows follow. A table in a document is between `<!-- figures: NAME -->` and
+//! `<!-- end -->`. It shows the results file as it is, or as converted by a row of [`VIEWS`].
 
 mod paper_comparison;
 mod reprojection;
@@ -13,10 +13,10 @@ pub use view::{Results, Row, markdown};
 
 use std::path::{Path, PathBuf};
 
-/// Makes a table from a results file.
+/// Generates a table from a results file.
 type View = fn(&Results) -> String;
 
-/// Tables that show another form than their results file.
+/// Tables whose form differs from their results file.
 const VIEWS: &[(&str, &str, View)] = &[
     (
         "calibration-ipd-bias",
@@ -35,15 +35,17 @@ const VIEWS: &[(&str, &str, View)] = &[
         paper_comparison::shadow_maps,
     ),
     ("sweep-shards", "sweep-shards", shards::table),
+    ("z2-table2", "paper-savings", paper_comparison::table_2),
 ];
 
 const BEGIN: &str = "<!-- figures: ";
 const END: &str = "<!-- end -->\n";
 
-/// The document with every marked table made anew from the results in `folder`, and the names of those tables.
+/// The document with every marked table generated again from the results in `folder`, and the names of
+/// those tables.
 ///
 /// # Errors
-/// A mark without its end, and a results file that cannot be read or lacks what the table shows.
+/// A mark without its end, or a results file that is unreadable or lacks something that the table shows.
 pub fn with_tables(document: &str, folder: &Path) -> Result<(String, Vec<String>), String> {
     let (mut text, mut names, mut rest) = (String::new(), Vec::new(), document);
     while let Some((before, after)) = rest.split_once(BEGIN) {
@@ -63,10 +65,10 @@ pub fn with_tables(document: &str, folder: &Path) -> Result<(String, Vec<String>
     Ok((text + rest, names))
 }
 
-/// Every Markdown file of the project's documents.
+/// All Markdown files of the documentation.
 ///
 /// # Panics
-/// When a folder cannot be read.
+/// A folder is unreadable.
 #[must_use]
 pub fn documents() -> Vec<PathBuf> {
     let root = crate::root();
@@ -88,13 +90,13 @@ pub fn documents() -> Vec<PathBuf> {
     files
 }
 
-/// Tables that are typed though most of their cells are numbers: file's name and start of the heading.
+/// Tables that may be typed although most of their cells are numbers: file name and start of the heading.
 const TYPED: [(&str, &str); 1] = [
     // Published tangents, each with its source.
     ("displays.md", "| `--hmd` |"),
 ];
 
-/// Headings of tables outside of marks in which more than 12 cells are numbers.
+/// Headings of tables outside marks with more than 12 numeric cells.
 #[must_use]
 pub fn typed_tables(name: &str, document: &str) -> Vec<String> {
     let (mut found, mut marked) = (Vec::new(), false);
@@ -116,7 +118,7 @@ pub fn typed_tables(name: &str, document: &str) -> Vec<String> {
     found
 }
 
-/// A cell that begins with a decimal fraction or a count, whatever follows it.
+/// Whether a cell starts with a decimal fraction or a count.
 fn is_measured(cell: &str) -> bool {
     let number: String = (cell.trim().chars())
         .take_while(|c| c.is_ascii_digit() || matches!(c, '.' | ',' | '+' | '-'))

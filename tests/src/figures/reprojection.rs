@@ -2,7 +2,7 @@
 
 use super::view::{Results, markdown, rounded};
 
-/// What reprojection saves and costs, by scene and rule.
+/// Savings and errors of reprojection, by scene and rule.
 pub fn table(results: &Results) -> String {
     let columns = [
         ("reuse_pct", "reuse %", 2),

@@ -1,4 +1,4 @@
-//! A results file, and tables in Markdown.
+//! Reads results files and writes Markdown tables.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,7 +20,8 @@ impl Results {
     /// Reads a file of [`super`]'s form.
     ///
     /// # Errors
-    /// It cannot be read, has no command, two columns of one name, or rows of different lengths.
+    /// The file is unreadable, has no command, two columns with the same name, or rows of different
+    /// lengths.
     pub fn read(file: &Path) -> Result<Self, String> {
         let name = file.display();
         let text = std::fs::read_to_string(file).map_err(|e| format!("{name}: {e}"))?;
@@ -41,7 +42,7 @@ impl Results {
             .headers()
             .map(|h| h.iter().map(str::to_owned).collect());
         let columns: Vec<String> = columns.map_err(|e| format!("{name}: {e}"))?;
-        // Rows go by column name: of two columns with one name, the table would show the last one twice.
+        // Rows are indexed by column name, so duplicate names would show the last column twice.
         if let Some(twice) = (1..columns.len()).find(|&i| columns[..i].contains(&columns[i])) {
             return Err(format!(
                 "{name}: expected column names that differ, found '{}' twice",
@@ -63,7 +64,7 @@ impl Results {
         markdown(&headings, self.rows.iter().map(cells))
     }
 
-    /// The number in a column of the row with these keys, with so many decimals.
+    /// The number in a column of the row with these keys, with `decimals` decimals.
     ///
     /// # Panics
     /// There is no such row or number.
@@ -75,7 +76,7 @@ impl Results {
         rounded(&row[column], decimals)
     }
 
-    /// The values of a column, each once, in their order.
+    /// The distinct values of a column, in order.
     #[must_use]
     pub fn values(&self, column: &str) -> Vec<String> {
         let mut values: Vec<String> = Vec::new();
@@ -88,10 +89,10 @@ impl Results {
     }
 }
 
-/// A number with so many decimals.
+/// A number with `decimals` decimals.
 ///
 /// # Panics
-/// It is no number.
+/// The text is not a number.
 #[must_use]
 pub fn rounded(text: &str, decimals: usize) -> String {
     let number: f64 = text
@@ -100,7 +101,7 @@ pub fn rounded(text: &str, decimals: usize) -> String {
     format!("{number:.decimals$}")
 }
 
-/// A table of these headings and rows.
+/// A table with these headings and rows.
 #[must_use]
 pub fn markdown(headings: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));

@@ -5,14 +5,14 @@
 use super::{AccessKind, PlainAccess};
 use std::io::{self, Write};
 
-/// An address of zero means that there is none, so addresses begin here: far above any that a
-/// texture layout gives, and the same to the sets of every cache.
+/// Offset of all addresses, because an address of zero means no access. It exceeds the addresses of every
+/// texture layout and does not change cache sets.
 pub const CHAMPSIM_BASE: u64 = 1 << 40;
 
-/// The instruction that makes all accesses.
+/// Instruction pointer of all accesses.
 const INSTRUCTION_POINTER: u64 = 0x40_0000;
 
-/// Writes an instruction that makes one access.
+/// Writes an instruction with one access.
 pub(super) fn write(out: &mut impl Write, access: &PlainAccess) -> io::Result<()> {
     let Some(address) = access.address.checked_add(CHAMPSIM_BASE) else {
         let found = access.address;

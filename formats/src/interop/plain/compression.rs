@@ -1,4 +1,4 @@
-//! gzip and Zstandard, by the first bytes of what is read and the names of what is written.
+//! gzip and Zstandard, detected by the first bytes when reading and by the file name when writing.
 
 use flate2::GzBuilder;
 use flate2::read::MultiGzDecoder;
@@ -9,7 +9,7 @@ use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::encoding::{CompressionLevel, compress_to_vec};
 use std::io::{self, BufRead, Read, Write};
 
-/// How bytes are compressed.
+/// Compression methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Compression {
     /// gzip (RFC 1952).
@@ -19,7 +19,7 @@ pub enum Compression {
 }
 
 impl Compression {
-    /// Both.
+    /// All methods.
     pub const ALL: [Self; 2] = [Self::Gzip, Self::Zstd];
 
     /// Name in flags and messages.
@@ -31,7 +31,7 @@ impl Compression {
         }
     }
 
-    /// What names of compressed files end with.
+    /// File name extension.
     #[must_use]
     pub const fn extension(self) -> &'static str {
         match self {
@@ -40,24 +40,24 @@ impl Compression {
         }
     }
 
-    /// The compression that a file's name asks for, if any.
+    /// The compression of a file name's extension, if any.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         let ends = |compression: &Self| name.ends_with(compression.extension());
         Self::ALL.into_iter().find(ends)
     }
 
-    /// The compression that a file's first bytes show, if any.
+    /// The compression detected from a file's first bytes, if any.
     pub(super) fn of_content(head: &[u8]) -> Option<Self> {
         match head {
             [0x1f, 0x8b, ..] => Some(Self::Gzip),
-            // A frame, or one of the sixteen kinds that are skipped.
+            // A frame, or one of the sixteen kinds of skippable frames.
             [0x28, 0xb5, 0x2f, 0xfd, ..] | [0x50..=0x5f, 0x2a, 0x4d, 0x18, ..] => Some(Self::Zstd),
             _ => None,
         }
     }
 
-    /// What `input` holds, decompressed; all of its members or frames, one after another.
+    /// The decompressed content of `input`, with all its members or frames concatenated.
     pub(super) fn reader<'a>(self, input: impl BufRead + 'a) -> Box<dyn Read + 'a> {
         match self {
             Self::Gzip => Box::new(MultiGzDecoder::new(input)),
@@ -70,7 +70,7 @@ impl Compression {
     }
 }
 
-/// Decompresses frames one after another and compares their checksums.
+/// Decompresses consecutive frames and checks their checksums.
 struct ZstdReader<R> {
     input: R,
     frame: FrameDecoder,
@@ -100,7 +100,7 @@ impl<R: BufRead> Read for ZstdReader<R> {
                     self.frame.get_calculated_checksum(),
                 );
                 if told.is_some() && told != counted {
-                    return Err(invalid("a frame's checksum is wrong"));
+                    return Err(invalid("the checksum of a frame is wrong"));
                 }
                 continue;
             }
@@ -112,7 +112,7 @@ impl<R: BufRead> Read for ZstdReader<R> {
 }
 
 impl<R: BufRead> ZstdReader<R> {
-    /// Reads the header of a frame, or all of one that is to be skipped.
+    /// Reads the header of a frame, or skips a skippable frame.
     fn begin(&mut self) -> io::Result<()> {
         match self.frame.reset(&mut self.input) {
             Ok(()) => self.in_frame = true,
@@ -135,7 +135,7 @@ impl<R: BufRead> ZstdReader<R> {
 }
 
 fn wrong_frame(error: FrameDecoderError) -> io::Error {
-    // What happened lies deep inside; what is around it repeats it in the words of a debugger.
+    // Only the innermost error is useful; the outer ones repeat it in debug form.
     let mut cause: &(dyn std::error::Error + 'static) = &error;
     while let Some(inner) = cause.source() {
         cause = inner;
@@ -152,25 +152,25 @@ fn invalid(why: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, why.to_owned())
 }
 
-/// Bytes that one frame holds: frames are compressed whole.
+/// Uncompressed size of a frame.
 const FRAME_BYTES: usize = 4 << 20;
 
-/// Compresses what is written to it, or hands it on.
+/// Writes with optional compression.
 pub enum CompressedWriter<W: Write> {
-    /// As it is.
+    /// Without compression.
     Plain(W),
     /// gzip.
     Gzip(GzEncoder<W>),
-    /// Zstandard: the writer, and what is not yet a frame.
+    /// Zstandard: the writer, and the bytes of the next frame.
     Zstd(W, Vec<u8>),
 }
 
 impl<W: Write> CompressedWriter<W> {
-    /// Compresses into `out`; the same bytes for the same input.
+    /// Compresses into `out`. Equal input gives equal bytes.
     pub fn new(compression: Option<Compression>, out: W) -> Self {
         match compression {
             None => Self::Plain(out),
-            // No name and no time.
+            // Neither name nor time, so that equal input gives equal bytes.
             Some(Compression::Gzip) => {
                 Self::Gzip(GzBuilder::new().write(out, flate2::Compression::new(6)))
             }
@@ -178,10 +178,10 @@ impl<W: Write> CompressedWriter<W> {
         }
     }
 
-    /// Writes what is left, and gives back the writer below.
+    /// Writes the remaining bytes and returns the underlying writer.
     ///
     /// # Errors
-    /// Those of the writer below.
+    /// Errors of the underlying writer.
     pub fn finish(self) -> io::Result<W> {
         match self {
             Self::Plain(out) => Ok(out),

@@ -1,14 +1,14 @@
-//! Dinero's text: `LABEL HEXADDR` a line, and Dinero IV's extended form `LABEL HEXADDR HEXSIZE`.
+//! Text of Dinero: `LABEL HEXADDR` per line, or Dinero IV's extended form `LABEL HEXADDR HEXSIZE`.
 //!
-//! The traditional form has labels 0 (read), 1 (write) and 2 (instruction fetch) and no sizes; Dinero
-//! takes it as four aligned bytes, which lie in one line as a single byte does. The extended one has
-//! labels r, w and i. Whatever follows on a line is ignored.
+//! The traditional form has labels 0 (read), 1 (write) and 2 (instruction fetch) and no sizes. Dinero
+//! assumes four aligned bytes, which are in the same line as their first byte. The extended form has labels
+//! r, w and i. The rest of each line is ignored.
 
 use super::{AccessKind, BLOCK, Decoder, Fault, PlainAccess, shown};
 use crate::error::Place;
 use std::io::{self, Write};
 
-/// More is no line of accesses.
+/// Maximum length of a line.
 const MOST_LINE_BYTES: usize = 64 << 10;
 
 /// Writes a line of the traditional form.
@@ -65,7 +65,7 @@ impl Decoder for Din {
     }
 }
 
-/// What nearly every line is, `L HEXADDR` and a line feed, without a search for its end first.
+/// Parses the common line `L HEXADDR` without searching its end first.
 #[inline]
 fn quick_line(bytes: &[u8]) -> Option<(PlainAccess, usize)> {
     let (&[label, b' '], digits) = bytes.split_first_chunk()? else {
@@ -102,7 +102,7 @@ fn hex_digit(byte: u8) -> Option<u8> {
     }
 }
 
-/// Any line, and how many bytes it takes; nothing if it is wrong or not complete.
+/// Parses any line and returns its length; `None` if it is wrong or incomplete.
 fn line(bytes: &[u8], ended: bool) -> Option<(PlainAccess, usize)> {
     let end = bytes.iter().position(|&byte| byte == b'\n');
     if end.is_none() && !ended {

@@ -1,4 +1,4 @@
-//! A file, a pipe or standard input that holds plain accesses.
+//! Reads plain accesses from a file, a pipe or standard input.
 
 use super::{AddressForm, Compression, Decoder, MOST_RECORD_BYTES, PlainAccess, din, gem5};
 use crate::error::{FormatError, Place};
@@ -7,10 +7,10 @@ use std::fs::File;
 use std::io::{self, BufReader, Cursor, IsTerminal, Read};
 use std::path::Path;
 
-/// Bytes that a form is recognised by.
+/// Number of bytes used to detect the form.
 const HEAD_BYTES: usize = 4096;
 
-/// Bytes that are read at once.
+/// Size of the read buffer.
 const BUFFER_BYTES: usize = 2 * MOST_RECORD_BYTES;
 
 enum Bytes<'a> {
@@ -18,7 +18,7 @@ enum Bytes<'a> {
     Stream(Box<dyn Read + 'a>),
 }
 
-/// Plain accesses that can be read once.
+/// A source of plain accesses that can be read once.
 pub struct AddressFile<'a> {
     name: String,
     form: AddressForm,
@@ -26,33 +26,33 @@ pub struct AddressFile<'a> {
     bytes: Bytes<'a>,
 }
 
-/// Accesses that follow one another.
+/// Consecutive accesses.
 #[derive(Clone, Copy, Debug)]
 pub enum Block<'a> {
-    /// Addresses of reads, of 4 bytes each.
+    /// Read addresses of 4 bytes each.
     U32(&'a [[u8; 4]]),
-    /// Of 8 bytes each.
+    /// Read addresses of 8 bytes each.
     U64(&'a [[u8; 8]]),
     /// Accesses with kind and size.
     Accesses(&'a [PlainAccess]),
 }
 
-/// What a file held.
+/// Counts of a file's content.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Found {
-    /// Accesses, at least one.
+    /// Number of accesses, at least one.
     pub accesses: u64,
-    /// Packets that were read over, since they neither read nor write data that caches keep.
+    /// Packets skipped because they neither read nor write cacheable data.
     pub other_packets: u64,
 }
 
 impl AddressFile<'static> {
-    /// Opens a file, a pipe, or standard input if the path is `-`; what is compressed is known by its
-    /// first bytes. Without a `form` it is the one that the name ends with (before .gz or .zst), or
-    /// else the one that the first bytes show.
+    /// Opens a file, a pipe, or standard input if the path is `-`. Compression is detected by the first
+    /// bytes. Without a `form`, it is taken from the name's extension (before .gz or .zst), or else
+    /// detected by the first bytes.
     ///
     /// # Errors
-    /// What cannot be read (a folder, a device, a terminal), what is empty, what has no form.
+    /// Unreadable input (a folder, a device, a terminal), empty input, or an unknown form.
     pub fn open(path: &Path, form: Option<AddressForm>) -> Result<Self, FormatError> {
         let name = path.display().to_string();
         let io = |action| {
@@ -85,8 +85,8 @@ impl AddressFile<'static> {
         if Compression::of_content(&magic).is_some() {
             return Self::of_stream(name, form, Cursor::new(magic).chain(file));
         }
-        // SAFETY: the map is read only, and programs that write traces do not change them while others
-        // read; this one writes under another name and renames.
+        // SAFETY: the map is read-only, and programs that write traces do not change them while others
+        // read. This program writes under a temporary name and renames.
         let map = unsafe { Mmap::map(&file) }.map_err(io("map"))?;
         let head = map.get(..HEAD_BYTES).unwrap_or(&map);
         let form = told(&name, form, head, map.len() <= HEAD_BYTES)?;
@@ -100,10 +100,10 @@ impl AddressFile<'static> {
 }
 
 impl<'a> AddressFile<'a> {
-    /// Reads a stream as [`Self::open`] does a pipe; `name` stands for it in errors.
+    /// Reads a stream like a pipe in [`Self::open`]; `name` identifies it in errors.
     ///
     /// # Errors
-    /// As those of [`Self::open`].
+    /// See [`Self::open`].
     pub fn of_stream(
         name: String,
         form: Option<AddressForm>,
@@ -127,29 +127,28 @@ impl<'a> AddressFile<'a> {
         })
     }
 
-    /// How errors call it.
+    /// Name in errors.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Its form.
+    /// Form of the accesses.
     #[must_use]
     pub fn form(&self) -> AddressForm {
         self.form
     }
 
-    /// Its compression.
+    /// Compression of the file.
     #[must_use]
     pub fn compression(&self) -> Option<Compression> {
         self.compression
     }
 
-    /// Hands all accesses to `visit`, in their order, until it fails.
+    /// Calls `visit` with all accesses in order, until it fails.
     ///
     /// # Errors
-    /// Input that cannot be read or is not of the form, with the place; no access at all; those of
-    /// `visit`.
+    /// Unreadable or malformed input, with the place; a file without accesses; errors of `visit`.
     pub fn for_blocks<E: From<FormatError>>(
         self,
         mut visit: impl FnMut(Block<'_>) -> Result<(), E>,
@@ -221,8 +220,8 @@ impl<'a> AddressFile<'a> {
         Ok(found)
     }
 
-    /// Hands over piece after piece with its offset and whether it is the last; `take` says how many
-    /// bytes it used, and gets the others again.
+    /// Calls `take` with consecutive pieces, their offset and whether the piece is the last. `take` returns
+    /// the number of bytes used; the others are passed again.
     fn pieces<E: From<FormatError>>(
         self,
         mut take: impl FnMut(&[u8], u64, bool) -> Result<usize, E>,
@@ -251,7 +250,8 @@ impl<'a> AddressFile<'a> {
     }
 }
 
-/// Up to `count` first bytes of a stream, and the stream with them; or what went wrong behind how many bytes.
+/// The first bytes of a stream (at most `count`) and the stream including them, or an error and the number
+/// of bytes before it.
 fn head_of<R: Read>(mut stream: R, count: usize) -> Result<(Vec<u8>, impl Read), (io::Error, u64)> {
     let mut head = Vec::new();
     let read = stream.by_ref().take(count as u64).read_to_end(&mut head);
@@ -259,7 +259,7 @@ fn head_of<R: Read>(mut stream: R, count: usize) -> Result<(Vec<u8>, impl Read),
     Ok((head.clone(), Cursor::new(head).chain(stream)))
 }
 
-/// The form: the one given, or else that of the name, or else that of the first bytes.
+/// The form: the given one, or that of the name, or that of the first bytes.
 fn told(
     name: &str,
     given: Option<AddressForm>,
@@ -297,7 +297,7 @@ fn wanted(name: &str, expected: &str, found: &str) -> FormatError {
     FormatError::io(name, "read", io::Error::other(message))
 }
 
-/// `at` is how many bytes of content came before.
+/// An error after `at` bytes of content.
 fn unreadable(
     name: &str,
     compression: Option<Compression>,

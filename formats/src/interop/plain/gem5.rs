@@ -1,10 +1,10 @@
-//! gem5's packet traces: `gem5`, then protocol-buffer messages, each behind its length: a header,
-//! and a packet an access (`src/proto/packet.proto` and `src/proto/protoio.hh` of gem5).
+//! Packet traces of gem5: `gem5`, then protocol-buffer messages, each after its length. The first is a
+//! header; the others are packets, one per access (`src/proto/packet.proto` and `src/proto/protoio.hh` of
+//! gem5).
 //!
-//! Commands are numbers of `MemCmd::Command` as gem5 has had them since version 22; before, those of
-//! atomic swaps were others. Requests that read or write data are accesses, write-backs of a
-//! cache above among them; responses, fences, upgrades and what else moves no data are not, and
-//! neither are requests that bypass caches.
+//! Commands are the numbers of `MemCmd::Command` since gem5 version 22; earlier versions numbered atomic
+//! swaps differently. Requests that read or write data are accesses, including write-backs of a cache
+//! above. Responses, fences, upgrades, other packets without data, and requests that bypass caches are not.
 
 use super::{AccessKind, BLOCK, Decoder, Fault, MOST_RECORD_BYTES, PlainAccess};
 use crate::error::Place;
@@ -13,21 +13,21 @@ use std::io::{self, Write};
 /// First bytes of every trace.
 pub(super) const MAGIC: &[u8] = b"gem5";
 
-/// `MemCmd::ReadReq` and `MemCmd::WriteReq`, which no version moved.
+/// `MemCmd::ReadReq` and `MemCmd::WriteReq`, which are the same in all versions.
 const READ: u64 = 1;
 const WRITE: u64 = 4;
 
-/// Bits of a request's flags.
+/// Flag bits of a request.
 const FETCH_FLAG: u64 = 0x100;
 const UNCACHEABLE_FLAG: u64 = 0x400;
 
-/// Kind of the data that a command's request moves.
+/// Kind of the data transfer of a command's request.
 fn kind_of(command: u64, flags: u64) -> Option<AccessKind> {
     if flags & UNCACHEABLE_FLAG != 0 {
         return None;
     }
     match command {
-        // Reads, prefetches, reads for ownership or of a cache, load-linked, locked reads.
+        // Reads, prefetches, reads for ownership or by a cache, load-linked, locked reads.
         READ | 11..=13 | 20 | 22 | 24..=26 | 30 if flags & FETCH_FLAG != 0 => {
             Some(AccessKind::Fetch)
         }
@@ -40,7 +40,7 @@ fn kind_of(command: u64, flags: u64) -> Option<AccessKind> {
 
 /// Writes the magic number and the header.
 pub(super) fn write_header(out: &mut impl Write) -> io::Result<()> {
-    // Time is the number of the access: a tick each, and the usual 10^12 of them a second.
+    // The tick is the number of the access, with the usual 10^12 ticks per second.
     let mut header = Vec::new();
     put_field(&mut header, 1, 2);
     put_varint(&mut header, 8);
@@ -96,7 +96,7 @@ fn put_varint(out: &mut Vec<u8>, mut value: u64) {
 pub(super) struct Gem5 {
     has_magic: bool,
     has_header: bool,
-    /// Packets read, accesses or not.
+    /// Number of packets read, including those that are not accesses.
     packets: u64,
     other_packets: u64,
 }
@@ -110,8 +110,8 @@ impl Gem5 {
         }
     }
 
-    /// Takes the next message from the front of `rest`: its bytes, and how many it took with its
-    /// length; nothing if it is not all there.
+    /// Takes the next message from the front of `rest`. Returns its bytes and its size including the length
+    /// prefix; `None` if it is incomplete.
     fn message<'a>(&self, rest: &'a [u8], ended: bool) -> Result<Option<(&'a [u8], usize)>, Fault> {
         let fault = |expected: String, found: String| Fault {
             place: self.place(),
@@ -238,13 +238,13 @@ impl Decoder for Gem5 {
     }
 }
 
-/// The fields of a packet that count: command, address and size; flags, none where not given.
+/// The relevant fields of a packet: command, address and size; flags, 0 if absent.
 struct Fields {
     needed: [Option<u64>; 3],
     flags: u64,
 }
 
-/// Nothing if the message is not well-formed.
+/// Parses the fields; `None` if the message is malformed.
 fn fields(mut message: &[u8]) -> Option<Fields> {
     let mut found = Fields {
         needed: [None; 3],
@@ -283,7 +283,7 @@ fn skip(bytes: &mut &[u8], count: u64) -> Option<()> {
     Some(())
 }
 
-/// Takes a number of seven bits a byte; nothing if it does not end or does not fit 64 bits.
+/// Takes a number with seven bits per byte; `None` if it does not end or exceeds 64 bits.
 fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut value = 0_u64;
     for index in 0..10 {

@@ -1,7 +1,7 @@
-//! Plain accesses, an address each: the forms of other simulators, read and written.
+//! Plain accesses, one address each: reads and writes the forms of other simulators.
 //!
-//! Bytes become accesses in a decoder a form, which takes any piece of the input; where the bytes
-//! come from, and how they are compressed, is [`AddressFile`]'s.
+//! Each form has a decoder, which accepts the input in pieces of any size. [`AddressFile`] reads and
+//! decompresses the input.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 mod champsim;
@@ -21,7 +21,7 @@ pub use compression::{CompressedWriter, Compression};
 pub use file::{AddressFile, Block, Found};
 pub use writer::{PlainForm, PlainWriter};
 
-/// What an access does.
+/// Kinds of accesses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AccessKind {
     /// Reads data.
@@ -33,19 +33,19 @@ pub enum AccessKind {
     Fetch,
 }
 
-/// An access without what it was made for.
+/// An access, without its texture or ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PlainAccess {
     /// Address of the first byte.
     pub address: u64,
-    /// Bytes from there on, at least one; one where the form does not say. They end below 2^64.
+    /// Number of bytes, at least one; one if the form has no sizes. They end below 2^64.
     pub bytes: u32,
-    /// What it does.
+    /// Kind of the access.
     pub kind: AccessKind,
 }
 
 impl PlainAccess {
-    /// More bytes than any access of a real trace has; bounds the work that an access can ask for.
+    /// Size limit of an access, which bounds the work per access.
     pub const MOST_BYTES: u32 = 1 << 20;
 
     /// A read.
@@ -58,8 +58,7 @@ impl PlainAccess {
         }
     }
 
-    /// The access if its bytes are not too many and do not leave the address space; no bytes count
-    /// as one.
+    /// The access, if it is not too large and stays in the address space. A size of zero counts as one.
     fn checked(address: u64, bytes: u64, kind: AccessKind) -> Option<Self> {
         let bytes = u32::try_from(bytes.max(1)).ok()?;
         let last = address.checked_add(u64::from(bytes) - 1);
@@ -71,24 +70,24 @@ impl PlainAccess {
     }
 }
 
-/// Form of a file of addresses that can be read.
+/// Forms of address files that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AddressForm {
-    /// 32-bit little-endian addresses of reads.
+    /// Read addresses, 32 bits, little-endian.
     U32,
-    /// 64-bit ones.
+    /// Read addresses, 64 bits, little-endian.
     U64,
-    /// Dinero's text.
+    /// Text of Dinero.
     Din,
-    /// gem5's packets.
+    /// Packets of gem5.
     Gem5,
 }
 
 impl AddressForm {
-    /// All, in the order in which they are listed.
+    /// All forms, in the order of help texts.
     pub const ALL: [Self; 4] = [Self::U32, Self::U64, Self::Din, Self::Gem5];
 
-    /// Name in flags and at the end of file names.
+    /// Name in flags, and file name extension.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -99,13 +98,13 @@ impl AddressForm {
         }
     }
 
-    /// The form that a file's name ends with, if any.
+    /// The form of a file name's extension, if any.
     fn of_name(name: &str) -> Option<Self> {
         let (_, end) = name.rsplit_once('.')?;
         Self::ALL.into_iter().find(|form| form.name() == end)
     }
 
-    /// The form that the first bytes of a file show, if any; `whole` where there are no more.
+    /// The form detected from the first bytes of a file, if any; `whole` if these are all bytes.
     fn of_content(head: &[u8], whole: bool) -> Option<Self> {
         if head.starts_with(gem5::MAGIC) {
             return Some(Self::Gem5);
@@ -116,10 +115,10 @@ impl AddressForm {
     }
 }
 
-/// Turns bytes into accesses, piece by piece.
+/// Decodes bytes to accesses, piece by piece.
 trait Decoder {
-    /// Appends the accesses at the front of `bytes` until these end or [`BLOCK`] are there, and says
-    /// how many bytes that took; none if the first access is not complete, which is a fault where
+    /// Appends accesses from the front of `bytes` until they end or there are [`BLOCK`] accesses, and
+    /// returns the number of bytes used. Returns 0 if the first access is incomplete, which is an error if
     /// the input `ended`.
     fn decode(
         &mut self,
@@ -128,29 +127,29 @@ trait Decoder {
         out: &mut Vec<PlainAccess>,
     ) -> Result<usize, Fault>;
 
-    /// What was read over but is no access.
+    /// Number of packets skipped because they are not accesses.
     fn other_packets(&self) -> u64 {
         0
     }
 }
 
-/// Accesses that are decoded at once.
+/// Number of accesses decoded per call.
 const BLOCK: usize = 4096;
 
-/// No record of any form is longer, so a buffer of this size always holds a whole one.
+/// Longest record of any form, so a buffer of this size always holds a complete one.
 const MOST_RECORD_BYTES: usize = 1 << 20;
 
-/// Why bytes are not what a form asks for.
+/// An error in the form of bytes.
 #[derive(Debug)]
 struct Fault {
     place: crate::error::Place,
-    /// Offset from the start of the bytes that were given.
+    /// Offset from the start of the given bytes.
     at: usize,
     expected: String,
     found: String,
 }
 
-/// Bytes as an error shows them, not too many.
+/// The first bytes, formatted for an error.
 fn shown(bytes: &[u8]) -> String {
     const MOST: usize = 60;
     let text = String::from_utf8_lossy(bytes.get(..MOST).unwrap_or(bytes));

@@ -1,8 +1,8 @@
-//! Ramulator 2's text: `LD 0xADDR` or `ST 0xADDR` a line (its `LoadStoreTrace`), and
-//! `BUBBLES LOAD [STORE]` a line in decimal (its `SimpleO3`, which has a cache of its own).
+//! Text for Ramulator 2: `LD 0xADDR` or `ST 0xADDR` per line (`LoadStoreTrace`), and `BUBBLES LOAD [STORE]`
+//! per line in decimal (`SimpleO3`, which has its own cache).
 //!
-//! Its third form, `ReadWriteTrace`, lists channel, rank, bank, row and column, which only a DRAM's
-//! organisation and mapping give.
+//! The third form, `ReadWriteTrace`, lists channel, rank, bank, row and column, which depend on the DRAM's
+//! organisation and mapping. It is not supported.
 
 use super::{AccessKind, PlainAccess};
 use std::io::{self, Write};
@@ -16,7 +16,8 @@ pub(super) fn write(out: &mut impl Write, access: &PlainAccess) -> io::Result<()
     writeln!(out, "{operation} {:#x}", access.address)
 }
 
-/// Writes a line for `SimpleO3`: no instruction between, and a load; a store's line is loaded first.
+/// Writes a line for `SimpleO3`: a load without instructions before it. For a store, the line is loaded
+/// first.
 pub(super) fn write_o3(out: &mut impl Write, access: &PlainAccess) -> io::Result<()> {
     let address = access.address;
     match access.kind {

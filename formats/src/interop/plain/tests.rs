@@ -18,7 +18,7 @@ fn compressed(compression: Compression, bytes: &[u8]) -> Vec<u8> {
     writer.finish().unwrap()
 }
 
-/// Hands out a byte more at every read, so that every border falls somewhere.
+/// Returns one more byte at every read, so that reads end at many different positions.
 struct Trickle<'a>(&'a [u8], usize);
 
 impl Read for Trickle<'_> {
@@ -73,7 +73,7 @@ fn accesses() -> Vec<PlainAccess> {
 }
 
 #[test]
-fn every_form_reads_back_what_it_can_hold() {
+fn every_form_is_read_as_written() {
     let all = accesses();
     let fits = |a: &&PlainAccess| a.address < 1 << 32;
     let words32: Vec<_> = all
@@ -107,7 +107,7 @@ fn every_form_reads_back_what_it_can_hold() {
                 read(&packed, Some(form)).unwrap().0 == *held,
                 "{form:?} {compression:?}"
             );
-            // As tools write several members or frames one after another.
+            // Some tools write several consecutive members or frames.
             let (first, second) = (
                 written(written_as, &source[..7]),
                 written(written_as, &source),
@@ -136,7 +136,7 @@ fn many_frames_hold_what_was_written() {
 }
 
 #[test]
-fn forms_are_told_by_name_and_content() {
+fn forms_are_detected_by_name_and_content() {
     let told = |name: &str, bytes: &[u8]| {
         AddressFile::of_stream(name.to_owned(), None, bytes).map(|file| file.form())
     };
@@ -209,7 +209,7 @@ fn wrong_din_lines_are_named() {
 }
 
 #[test]
-fn words_that_are_cut_are_named() {
+fn incomplete_words_are_refused_with_their_place() {
     let error = refused(&[0; 11], Some(AddressForm::U32));
     assert_eq!(error, "x: access 3 at byte 8: expected 4 bytes, found 3");
     let error = refused(&[0; 9], Some(AddressForm::U64));
@@ -221,7 +221,7 @@ fn words_that_are_cut_are_named() {
     );
 }
 
-/// A gem5 trace of these messages behind a header.
+/// A gem5 trace with a header and these messages.
 fn gem5_of(messages: &[&[u8]]) -> Vec<u8> {
     let mut bytes = b"gem5\x04\x0a\x00\x18\x01".to_vec();
     for message in messages {
@@ -232,11 +232,11 @@ fn gem5_of(messages: &[&[u8]]) -> Vec<u8> {
 }
 
 #[test]
-fn gem5_commands_and_flags_say_what_an_access_is() {
+fn gem5_commands_and_flags_determine_the_kind() {
     let kind = |command: u8, flags: &[u8]| {
         let mut message = vec![0x08, 5, 0x10, command, 0x18, 0x80, 0x01, 0x20, 64];
         message.extend_from_slice(flags);
-        // A read first, so that something is found.
+        // Start with a read, because a file without accesses is an error.
         let read_first = [0x08, 1, 0x10, 1, 0x18, 0, 0x20, 4];
         let (all, found) = read(&gem5_of(&[&read_first, &message]), None).unwrap();
         assert_eq!(found.accesses + found.other_packets, 2);
@@ -256,7 +256,7 @@ fn gem5_commands_and_flags_say_what_an_access_is() {
     for command in [0, 2, 5, 10, 17, 38] {
         assert_eq!(kind(command, &[]), None, "command {command}");
     }
-    // Unknown fields of every wire type are read over.
+    // Unknown fields of every wire type are skipped.
     let others = [
         &[0x31, 0, 0, 0, 0, 0, 0, 0, 0][..],
         &[0x3a, 2, 9, 9],
@@ -303,7 +303,7 @@ fn damaged_gem5_traces_are_refused_without_large_buffers() {
     let last = [&[0x18][..], &[0xff; 9], &[1]].concat();
     let over = [&[0x08, 1, 0x10, 1, 0x20, 2], last.as_slice()].concat();
     refused_packet(&over, "below 2^64");
-    // A length of 2^63, and one that never ends.
+    // A length of 2^63, and one without an end.
     for length in [
         [0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 1],
         [0xff; 10],
@@ -372,7 +372,7 @@ fn addresses_that_a_form_cannot_hold_are_refused() {
 }
 
 #[test]
-fn other_simulators_forms_are_as_they_document() {
+fn forms_of_other_simulators_match_their_documentation() {
     let access = PlainAccess::read(0x1f40, 16);
     let write = PlainAccess {
         kind: AccessKind::Write,

@@ -1,4 +1,4 @@
-//! 32- and 64-bit little-endian addresses, one after another.
+//! Consecutive little-endian addresses of 32 or 64 bits.
 
 use super::PlainAccess;
 use std::io::{self, Write};

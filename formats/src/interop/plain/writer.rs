@@ -1,30 +1,30 @@
-//! Writing plain accesses in any form.
+//! Writes plain accesses in any form.
 
 use super::{PlainAccess, champsim, din, gem5, ramulator, words};
 use crate::interop::{Access, AccessSink};
 use std::io::{self, Write};
 
-/// A form that can be written.
+/// Forms that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PlainForm {
-    /// 32-bit little-endian addresses.
+    /// Addresses, 32 bits, little-endian.
     U32,
-    /// 64-bit ones.
+    /// Addresses, 64 bits, little-endian.
     U64,
-    /// Dinero's text.
+    /// Text of Dinero.
     Din,
-    /// gem5's packets.
+    /// Packets of gem5.
     Gem5,
-    /// Text for Ramulator 2's `LoadStoreTrace`.
+    /// Text for `LoadStoreTrace` of Ramulator 2.
     Ramulator,
-    /// Text for Ramulator 2's `SimpleO3`.
+    /// Text for `SimpleO3` of Ramulator 2.
     RamulatorO3,
-    /// ChampSim's instruction records.
+    /// Instruction records of ChampSim.
     Champsim,
 }
 
 impl PlainForm {
-    /// True if it can go to a terminal.
+    /// Whether it is text, which may be printed on a terminal.
     #[must_use]
     pub const fn is_text(self) -> bool {
         matches!(self, Self::Din | Self::Ramulator | Self::RamulatorO3)
@@ -40,10 +40,10 @@ pub struct PlainWriter<W> {
 }
 
 impl<W: Write> PlainWriter<W> {
-    /// Writes what comes before the first access.
+    /// Writes the header of the form.
     ///
     /// # Errors
-    /// Those of the writer below.
+    /// Errors of the underlying writer.
     pub fn new(form: PlainForm, mut out: W) -> io::Result<Self> {
         if form == PlainForm::Gem5 {
             gem5::write_header(&mut out)?;
@@ -55,7 +55,7 @@ impl<W: Write> PlainWriter<W> {
         })
     }
 
-    /// The writer below.
+    /// The underlying writer.
     pub fn into_inner(self) -> W {
         self.out
     }
@@ -63,7 +63,7 @@ impl<W: Write> PlainWriter<W> {
     /// Writes an access.
     ///
     /// # Errors
-    /// An address that the form cannot hold; those of the writer below.
+    /// An address that the form cannot hold, or errors of the underlying writer.
     pub fn access(&mut self, access: &PlainAccess) -> io::Result<()> {
         let out = &mut self.out;
         let number = self.accesses;

@@ -1,9 +1,9 @@
-//! Encoding 1: what a linear prediction leaves over, bit-packed.
+//! Encoding 1: bit-packed residuals of a linear prediction.
 //!
-//! Texture coordinates over a primitive are a plane seen in perspective, so a quad's derivatives
-//! follow from the previous quad's, and its coordinates from both by the trapezoid rule. Small
-//! primitives of one draw continue each other, so the first quad of a run is predicted from the
-//! run before. All arithmetic wraps, so the encoding is lossless whatever the numbers are.
+//! Texture coordinates over a primitive are a plane in perspective. A quad's derivatives are predicted from
+//! the previous quad's, and its coordinates from both by the trapezoid rule. Small primitives of one draw
+//! continue each other, so the first quad of a run is predicted from the run before. All arithmetic wraps,
+//! so the encoding is lossless for all numbers.
 //!
 //! Layout: the runs as bytes, then the records as bits, then [`PADDING_BYTES`] zero bytes.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
@@ -16,7 +16,7 @@ use super::Tile;
 use super::bits::{BitReader, BitWriter, PADDING_BYTES};
 use crate::parse::{Fault, Parsed, ensure};
 
-/// Fewest bits that a record takes, which bounds the records that a tile's bytes can hold.
+/// Minimum bits per record, which bounds the number of records in a tile's bytes.
 pub const MIN_RECORD_BITS: u32 = records::CONTROL_BITS;
 
 pub(super) fn encode(tile: &Tile) -> Vec<u8> {

@@ -1,9 +1,9 @@
-//! Prediction of a record from the one before it in the same uv group.
+//! Predicts a record from the one before it in the same uv group.
 
 use crate::textrace::QuadRecord;
 use std::num::Wrapping;
 
-/// u and v; all arithmetic wraps, so that prediction is total and lossless.
+/// A pair (u, v). All arithmetic wraps, so that prediction is total and lossless.
 pub(super) type Pair = [Wrapping<i32>; 2];
 
 /// dx, dy and cross of a quad.
@@ -14,7 +14,7 @@ pub(super) struct Derivatives {
     pub cross: Pair,
 }
 
-/// What is known of a uv group: its last record and how its derivatives change.
+/// State of a uv group: its last record and the change of its derivatives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Context {
     x: i32,
@@ -27,7 +27,7 @@ pub(super) struct Context {
     dy_step: Pair,
 }
 
-/// `f` of the two components of several pairs at once.
+/// Applies `f` to the components of several pairs.
 macro_rules! zip {
     ($($name:ident = $pair:expr),+ => $body:expr) => {{
         let u = { $(let [$name, _] = $pair;)+ $body };
@@ -54,8 +54,8 @@ impl Context {
         }
     }
 
-    /// Predicts the coordinates of the quad whose derivatives are known: first along the row,
-    /// then down the column, each by the trapezoid rule over one-pixel differences.
+    /// Predicts the coordinates of a quad with known derivatives: first along the row, then down the
+    /// column, each by the trapezoid rule over one-pixel differences.
     #[inline(always)]
     pub(super) fn uv(&self, x: i32, y: i32, now: &Derivatives) -> Pair {
         let (right, down) = (Wrapping(x - self.x), Wrapping(y - self.y));
@@ -73,7 +73,7 @@ impl Context {
         })
     }
 
-    /// Takes in a record of the same primitive as the last one (`same_run`) or of another.
+    /// Updates the state with a record of the same primitive as the last one (`same_run`) or of another.
     #[inline(always)]
     pub(super) fn learn(&mut self, x: i32, y: i32, uv: Pair, now: Derivatives, same_run: bool) {
         if same_run {
@@ -96,15 +96,14 @@ impl Context {
     }
 }
 
-/// Change over `quads` quads (two pixels each) where the one-pixel difference goes from `from`
-/// to `to`.
+/// Change over `quads` quads (two pixels each) if the one-pixel difference changes from `from` to `to`.
 #[inline(always)]
 fn along(quads: Wrapping<i32>, from: Wrapping<i32>, to: Wrapping<i32>) -> Wrapping<i32> {
     let bend = if quads.0 == 0 { 0 } else { (to - from).0 >> 1 };
     quads * (from + to) - Wrapping(bend)
 }
 
-/// Numbers of a record as the predictor sees them.
+/// Splits a record into the predictor's numbers.
 pub(super) fn split(record: &QuadRecord) -> (Pair, Derivatives) {
     let wrapping = |pair: [i32; 2]| pair.map(Wrapping);
     let derivatives = Derivatives {

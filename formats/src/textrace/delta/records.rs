@@ -1,4 +1,4 @@
-//! Records as bits: a control word, then four pairs of residuals.
+//! Encodes records as bits: a control word, then four pairs of residuals.
 //!
 //! Control word, lowest bit first:
 //!
@@ -9,8 +9,8 @@
 //! | 4 | coverage mask |
 //! | 1 | 1: the group is the one that followed the last record's group before; 0: four more bits |
 //!
-//! Then the escapes in that order, then dx, dy, cross and uv, each u before v, in the width that
-//! the larger of the two needs.
+//! Then the escapes in that order, then dx, dy, cross and uv, each u before v, in the width of the larger
+//! of the two.
 
 use super::predict::{Context, Derivatives, Pair, split};
 use crate::textrace::bits::{BitReader, BitWriter, PEEK_BITS};
@@ -19,27 +19,27 @@ use crate::textrace::{PrimitiveRun, QuadRecord, Tile, quad_morton};
 use crate::varint::{low_u32, unzigzag, zigzag};
 use std::num::Wrapping;
 
-/// Bits of the control word.
+/// Number of bits of the control word.
 pub(super) const CONTROL_BITS: u32 = 24;
-/// Bits of the control word and of both escapes.
+/// Number of bits of the control word with both escapes.
 const LONGEST_CONTROL_BITS: u32 = CONTROL_BITS + 6 + 4;
 const _: () = assert!(LONGEST_CONTROL_BITS <= PEEK_BITS);
 
-/// Width in bits that each width code stands for.
+/// Width in bits of each width code.
 const WIDTHS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 18, 24, 32];
 
 /// Number of groups that a record can name.
 const GROUPS: usize = 16;
 
-/// What is remembered from record to record of a tile.
+/// State carried from record to record of a tile.
 pub(super) struct State {
     contexts: [Context; GROUPS],
-    /// Group that came after each group the last time.
+    /// Group that followed each group the last time.
     follows: [u8; GROUPS],
     /// Group of the last record.
     group: u8,
     draw: u32,
-    /// Groups that this run has had, a bit each.
+    /// Groups that occurred in this run, one bit each.
     seen: u16,
     /// Position of the run's last record on the Morton curve.
     morton: u32,
@@ -62,7 +62,7 @@ impl State {
     }
 
     fn start_run(&mut self, run: &PrimitiveRun) {
-        // Another draw has other textures: its coordinates do not continue these.
+        // Another draw has other textures, so its coordinates do not continue these.
         if run.draw != self.draw {
             *self = Self::new();
             self.draw = run.draw;
@@ -71,14 +71,14 @@ impl State {
         self.morton = 0;
     }
 
-    /// The group that is expected next.
+    /// The predicted next group.
     #[inline(always)]
     fn expected_group(&self) -> u8 {
         let group = usize::from(self.group) % GROUPS;
         self.follows.get(group).copied().unwrap_or_default()
     }
 
-    /// Notes the next record's group.
+    /// Updates the state with the next record's group.
     #[inline(always)]
     fn note_group(&mut self, group: u8) {
         if let Some(follow) = self.follows.get_mut(usize::from(self.group) % GROUPS) {
@@ -149,7 +149,7 @@ fn encode_record(record: &QuadRecord, state: &mut State, bits: &mut BitWriter) {
     state.note_group(record.group);
 }
 
-/// Reads the records of one run; `None` where the bits end early or a position is off the tile.
+/// Reads the records of one run; `None` if the bits end early or a position is outside the tile.
 #[inline]
 pub(super) fn decode_run(
     run: &PrimitiveRun,
@@ -231,7 +231,7 @@ fn take(bits: &mut BitReader<'_>, width: u32, guess: Pair) -> Option<Pair> {
     Some([guess_u + unfold(low_u32(u)), guess_v + unfold(low_u32(v))])
 }
 
-/// What the prediction leaves over, as it is stored.
+/// The difference of a pair from its prediction, as stored.
 fn residual(actual: Pair, guess: Pair) -> [u32; 2] {
     let fold = |number: Wrapping<i32>| low_u32(zigzag(number.0.into()));
     let ([a, b], [c, d]) = (actual, guess);
@@ -243,14 +243,14 @@ fn unfold(value: u32) -> Wrapping<i32> {
     Wrapping(low_u32(unzigzag(value.into()).cast_unsigned()).cast_signed())
 }
 
-/// The smallest width code that holds `value`.
+/// The smallest width code for `value`.
 #[inline(always)]
 fn width_code(value: u32) -> u32 {
     let needed = 32 - value.leading_zeros();
     CODES.get(needed as usize).copied().map_or(15, u32::from)
 }
 
-/// The smallest width code of each number of bits.
+/// The smallest width code for each number of bits.
 const CODES: [u8; 33] = {
     let mut codes = [0; 33];
     let (mut bits, mut code) = (0, 0);

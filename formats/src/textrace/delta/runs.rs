@@ -1,11 +1,11 @@
-//! The runs of a tile as numbers of variable length.
+//! Encodes the runs of a tile as variable-length numbers.
 
 use crate::parse::{Cursor, Parsed, ensure};
 use crate::textrace::PrimitiveRun;
 use crate::varint::put;
 
-/// Writes each run: `(primitive - previous primitive - 1) * 2 + draw changed`, the draw if it
-/// changed, and the number of records less one.
+/// Writes each run: `(primitive - previous primitive - 1) * 2 + draw changed`, the draw if it changed, and
+/// the number of records minus one.
 pub(super) fn encode(runs: &[PrimitiveRun], bytes: &mut Vec<u8>) {
     let mut next_primitive = 0u64;
     let mut draw = 0;
@@ -22,7 +22,7 @@ pub(super) fn encode(runs: &[PrimitiveRun], bytes: &mut Vec<u8>) {
     }
 }
 
-/// Reads runs that must hold `record_count` records together.
+/// Reads runs that must have `record_count` records in total.
 pub(super) fn decode<'a>(
     run_count: u32,
     record_count: u32,

@@ -8,8 +8,8 @@ use super::*;
 use crate::textrace::{PrimitiveRun, QuadRecord};
 use proptest::prelude::*;
 
-/// A tile wholly covered by one plane in perspective, sampled as a GPU does: exact coordinates
-/// of the four lanes, rounded, and their differences.
+/// A tile covered by one plane in perspective, sampled as a GPU does: exact coordinates of the four lanes,
+/// rounded, and their differences.
 fn perspective_tile() -> Tile {
     let at = |x: f64, y: f64| {
         let w = 1.0 + 0.004 * x - 0.009 * y;
@@ -52,7 +52,7 @@ fn perspective_tile() -> Tile {
 }
 
 #[test]
-fn a_plane_in_perspective_takes_a_few_bytes_a_quad() {
+fn a_plane_in_perspective_takes_a_few_bytes_per_quad() {
     let tile = perspective_tile();
     let bytes = encode(&tile);
     let bytes_per_quad = (bytes.len() - PADDING_BYTES) as f64 / 64.0;
@@ -77,7 +77,7 @@ fn padding_that_is_not_zero_is_refused() {
 }
 
 proptest! {
-    /// The checksum guards against damage; against malice only care in the decoder does.
+    /// The checksum detects damage; the decoder must also tolerate malicious bytes.
     #[test]
     fn arbitrary_bytes_never_panic(
         bytes in prop::collection::vec(any::<u8>(), 0..400), runs in 0..40u32, records in 0..200u32,

@@ -1,4 +1,4 @@
-//! The primitives that enter each tile of a view.
+//! The primitives in each tile of a view.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use crate::error::{Broken, ensure};
@@ -6,19 +6,20 @@ use crate::parse::{Cursor, Parsed};
 use crate::textrace::Draw;
 use crate::varint::put;
 
-/// The draws of a view, and for each tile the primitives that enter it, before any depth test.
+/// The draws of a view, and the primitives in each tile before any depth test.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TileLists {
     /// Draws that the view submits, ascending.
     pub draws: Vec<u32>,
-    /// Primitives of tile `t`: `primitives[starts[t]..starts[t + 1]]`; one entry more than there are tiles.
+    /// Primitives of tile `t`: `primitives[starts[t]..starts[t + 1]]`; has one entry more than there are
+    /// tiles.
     pub starts: Vec<u32>,
     /// Primitive numbers, ascending in each tile.
     pub primitives: Vec<u32>,
 }
 
 impl TileLists {
-    /// The primitives of a tile; none where there is no such tile.
+    /// The primitives of a tile; empty if there is no such tile.
     #[must_use]
     pub fn tile(&self, tile: usize) -> &[u32] {
         let range = self.starts.get(tile).zip(self.starts.get(tile + 1));
@@ -78,7 +79,7 @@ impl TileLists {
         Ok(())
     }
 
-    /// Appends the lists as they are stored.
+    /// Appends the lists in their stored form.
     pub(super) fn encode(&self, bytes: &mut Vec<u8>) {
         let ascending = |list: &[u32], bytes: &mut Vec<u8>| {
             put(list.len() as u64, bytes);
@@ -94,7 +95,7 @@ impl TileLists {
         }
     }
 
-    /// Reads the lists of so many tiles.
+    /// Reads the lists of `tiles` tiles.
     pub(super) fn decode(tiles: usize, input: &[u8]) -> Parsed<'_, Self> {
         fn ascending<'a>(
             input: &mut Cursor<'a>,

@@ -1,6 +1,7 @@
-//! What a trace says of geometry: the vertices that draws read, and the primitives that enter each tile before any depth test.
+//! Geometry in a trace: the vertices that draws read, and the primitives in each tile before any depth
+//! test.
 //!
-//! Optional: a trace without it serves every replay of texture accesses.
+//! Geometry is optional: replays of texture accesses do not need it.
 
 mod lists;
 mod read;
@@ -22,9 +23,9 @@ use crate::view::TILE_SIZE_PX;
 pub const GEOMETRY: ChunkTag = ChunkTag(*b"GEOM");
 /// The primitive lists of all views.
 pub const PRIMITIVE_LISTS: ChunkTag = ChunkTag(*b"PLST");
-/// Where the lists of each view are.
+/// Position of the lists of each view.
 pub const LIST_INDEX: ChunkTag = ChunkTag(*b"PLIX");
-/// Minor version from which on a trace may have geometry.
+/// Minor version that introduced geometry.
 pub const GEOMETRY_MINOR: u16 = 2;
 /// Bytes of a mesh without its indices.
 pub const MESH_BYTES: usize = 12;
@@ -33,7 +34,7 @@ pub const LIST_INDEX_ENTRY_BYTES: usize = 36;
 /// Largest width and height of a view in pixels.
 const MOST_PIXELS: u32 = 16384;
 
-/// The triangles of a mesh as a driver reads them.
+/// The triangles of a mesh, in the form a driver reads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MeshGeometry {
     /// Vertices in the vertex buffer.
@@ -46,7 +47,7 @@ pub struct MeshGeometry {
     pub indices: Vec<u32>,
 }
 
-/// What a view renders.
+/// Target of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ViewTarget {
     /// A pass of the trace.
@@ -55,12 +56,12 @@ pub enum ViewTarget {
     ShadowMap(u32),
 }
 
-/// A view of a frame, for which there are primitive lists.
+/// A view of a frame that has primitive lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GeometryView {
     /// Number of the frame.
     pub frame: u32,
-    /// What it renders.
+    /// Render target.
     pub target: ViewTarget,
     /// Width and height in pixels.
     pub size_px: [u32; 2],
@@ -104,16 +105,16 @@ impl GeometryView {
     }
 }
 
-/// Meshes, the mesh of each draw, and the views for which there are primitive lists.
+/// Meshes, the mesh of each draw, and the views that have primitive lists.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Geometry {
     /// The meshes.
     pub meshes: Vec<MeshGeometry>,
     /// Mesh of each draw of the draw table.
     pub draw_meshes: Vec<u32>,
-    /// The views, in the order in which they are rendered.
+    /// The views, in rendering order.
     pub views: Vec<GeometryView>,
-    /// Where the lists of each view lie.
+    /// Position of the lists of each view.
     pub(super) spans: Vec<TileSpan>,
 }
 

@@ -1,4 +1,4 @@
-//! Reading geometry.
+//! Reads geometry.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{

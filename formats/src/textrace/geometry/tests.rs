@@ -50,7 +50,7 @@ fn written(views: &[(GeometryView, TileLists)]) -> Vec<u8> {
 }
 
 #[test]
-fn geometry_comes_back_as_it_was_written() {
+fn geometry_is_read_as_written() {
     let shadow_map = GeometryView {
         target: ViewTarget::ShadowMap(1),
         size_px: [16, 1],
@@ -94,7 +94,7 @@ fn a_trace_without_geometry_has_none_and_an_older_version() {
 }
 
 #[test]
-fn lists_that_break_a_rule_are_not_written() {
+fn lists_that_violate_a_rule_are_not_written() {
     let changed = |change: &dyn Fn(&mut TileLists)| {
         let mut changed = lists();
         change(&mut changed);
@@ -154,7 +154,8 @@ fn lists_that_break_a_rule_are_not_written() {
     }
 }
 
-/// Every byte of the three chunks, changed with all checksums made right again, is refused or read without a panic.
+/// Every byte of the three chunks is changed with correct checksums, which must be refused or read without
+/// a panic.
 #[test]
 fn changed_bytes_with_right_checksums_are_read_or_refused() {
     let bytes = written(&[(view(), lists())]);
@@ -176,7 +177,7 @@ fn changed_bytes_with_right_checksums_are_read_or_refused() {
     assert!(refused > 300, "{refused}");
 }
 
-/// Puts the checksums right of a file in which bytes of one chunk were changed.
+/// Corrects the checksums of a file in which bytes of one chunk were changed.
 fn repaired(mut bytes: Vec<u8>, whole: &Textrace, changed: ChunkTag) -> Vec<u8> {
     let directory = u64::from_le_bytes(bytes[16..24].try_into().unwrap()) as usize;
     for (number, entry) in whole.container().directory().iter().enumerate() {

@@ -1,4 +1,5 @@
-//! Writing geometry: lists go to a spool as views are captured, for no two chunks can be written at once.
+//! Writes geometry. Lists are spooled while views are captured, because only one chunk can be written at a
+//! time.
 
 use super::{
     GEOMETRY, GEOMETRY_MINOR, Geometry, GeometryView, LIST_INDEX, LIST_INDEX_ENTRY_BYTES,
@@ -12,10 +13,10 @@ use crate::varint::{put, zigzag};
 use std::io::{Read, Seek, SeekFrom, Write};
 use tempfile::SpooledTempFile;
 
-/// Lists that are kept in memory before they go to a temporary file.
+/// Size of the lists in memory before they are moved to a temporary file.
 const IN_MEMORY_BYTES: usize = 64 << 20;
 
-/// Geometry that waits to be written behind the tiles.
+/// Geometry that will be written after the tiles.
 #[derive(Debug)]
 pub(in crate::textrace) struct Spool {
     geometry: Geometry,
@@ -25,7 +26,7 @@ pub(in crate::textrace) struct Spool {
 }
 
 impl Spool {
-    /// Starts with the meshes and draws of `geometry`, whose views are left out.
+    /// Starts with the meshes and draws of `geometry`; its views are ignored.
     pub fn new(geometry: Geometry, tables: &Tables) -> Result<Self> {
         geometry.check_meshes(tables).map_err(Broken::unwritable)?;
         Ok(Self {

@@ -1,4 +1,4 @@
-//! Prefix codes: canonical, from the lengths in [`super::lengths`].
+//! Canonical prefix codes, built from the lengths in [`super::lengths`].
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::lengths::LENGTHS;
@@ -8,22 +8,22 @@ use super::widths::{CORRECTION, Choices, DX_AND_UV, DY_AND_CROSS};
 use crate::varint::low_u32;
 use std::sync::{LazyLock, OnceLock};
 
-/// Longest code.
+/// Maximum length of a code.
 pub(super) const MOST_BITS: u32 = 10;
 const ENTRIES: usize = 1 << MOST_BITS;
 /// A prefix code, for both directions.
 pub(super) struct Code {
-    /// Its place in [`LENGTHS`].
+    /// Its index in [`LENGTHS`].
     #[cfg_attr(not(test), expect(dead_code, reason = "training counts by it"))]
     pub number: usize,
     /// By the next [`MOST_BITS`] bits: symbol * 16 + length.
     by_bits: [u16; ENTRIES],
-    /// By symbol: bits as they are written, lowest first, and their number (0: not in the code).
+    /// By symbol: the bits in writing order, lowest first, and their number (0: not in the code).
     by_symbol: Vec<(u32, u32)>,
 }
 
 impl Code {
-    /// From the length of each symbol's code, a hexadecimal digit each, 0 for none.
+    /// Builds a code from the length of each symbol, one hexadecimal digit each, 0 for none.
     pub fn new(number: usize, lengths: &str) -> Self {
         let lengths: Vec<u32> = lengths.chars().filter_map(|c| c.to_digit(16)).collect();
         let mut by_bits = [0; ENTRIES];
@@ -53,7 +53,7 @@ impl Code {
         }
     }
 
-    /// Symbol and length of the code that the bits start with.
+    /// Decodes the code at the start of the bits: symbol and length.
     #[inline(always)]
     pub fn decode(&self, bits: u64) -> (u32, u32) {
         let low = bits & (ENTRIES as u64 - 1);
@@ -62,27 +62,27 @@ impl Code {
         (u32::from(entry >> 4), u32::from(entry & 15))
     }
 
-    /// Bits and their number; `None` for a symbol that is not in the code.
+    /// The bits of a symbol and their number; `None` for a symbol that is not in the code.
     #[inline]
     pub fn encode(&self, symbol: u32) -> Option<(u32, u32)> {
         let found = self.by_symbol.get(symbol as usize).copied();
         found.filter(|(_, length)| *length > 0)
     }
 
-    /// Bits that a symbol takes, `otherwise` if it is not in the code.
+    /// Number of bits of a symbol, `otherwise` if it is not in the code.
     #[inline]
     pub fn length(&self, symbol: u32, otherwise: u32) -> u32 {
         self.encode(symbol).map_or(otherwise, |(_, length)| length)
     }
 }
 
-/// Most codes of a family.
+/// Maximum number of codes in a family.
 const MOST_CONTEXTS: usize = 32;
 
-/// Codes of which a context chooses one.
+/// Codes that are selected by a context.
 pub(super) struct Family {
     pub codes: Vec<Code>,
-    /// [`Code::by_bits`] of each, one after the other.
+    /// [`Code::by_bits`] of all codes, concatenated.
     by_bits: Box<[u16; MOST_CONTEXTS << MOST_BITS]>,
 }
 
@@ -97,12 +97,12 @@ impl Family {
         }
     }
 
-    /// Symbol and length of the code that the bits start with; (0, 0) where the context has no code.
+    /// Decodes the code at the start of the bits: symbol and length; (0, 0) if the context has no code.
     #[inline(always)]
     pub fn decode(&self, context: usize, bits: u64) -> (u32, u32) {
         let low = low_u32(bits) as usize & (ENTRIES - 1);
         let at = (context % MOST_CONTEXTS) << MOST_BITS | low;
-        // Never beyond the end, which the compiler sees.
+        // The index is always in range, which lets the compiler remove the check.
         let entry = self.by_bits.get(at).copied().unwrap_or_default();
         (u32::from(entry >> 4), u32::from(entry & 15))
     }
@@ -118,24 +118,24 @@ pub(super) struct Codes {
     pub first: Code,
     /// Widths of its dy and cross, by [`rest_context`].
     pub rest: Family,
-    /// Widths of what no class holds.
+    /// Widths of pairs that are in no class.
     pub later: Code,
     /// Widths of a correction's start, slopes to the right, slopes down, and tilt.
     pub correction: Code,
-    /// Mode and level, by [`super::parents::level_context`]; nothing tells them in its first one.
+    /// Mode and level, by [`super::parents::level_context`]; not coded in its first context.
     pub level: Family,
-    /// Highest bit of the step to a run's primitive; and whether the draw is another.
+    /// Highest bit of the step to a run's primitive, and whether the draw changes.
     pub header: Code,
-    /// Highest bit of a run's records.
+    /// Highest bit of a run's number of records.
     pub count: Code,
-    /// Highest bit of how far back a first quad's parent is.
+    /// Highest bit of the distance to a first quad's parent.
     pub parent: Code,
-    /// Where a run starts, against where the last one did.
+    /// Start of a run, XOR the start of the run before.
     pub start: Code,
     choices: OnceLock<WidthChoices>,
 }
 
-/// Which symbols the encoder chooses to tell widths.
+/// The encoder's choice of symbols for widths.
 pub(super) struct WidthChoices {
     pub first: Choices<2>,
     /// By [`rest_context`].
@@ -143,27 +143,27 @@ pub(super) struct WidthChoices {
     pub correction: Choices<4>,
 }
 
-/// Codes of step and mask.
+/// Number of codes for step and mask.
 const PLACES: usize = 17;
-/// Codes of classes.
+/// Number of codes for classes.
 const SIZES: usize = NOISES * Mode::ALL.len();
-/// Codes of a first quad's dy and cross; wider dx than the last one's are few, and have that one.
+/// Number of codes for a first quad's dy and cross. Wider dx are rare and use the last code.
 const RESTS: usize = 6;
-/// Codes of mode and level.
+/// Number of codes for mode and level.
 const LEVELS: usize = 4;
-/// Number of codes.
+/// Total number of codes.
 pub(super) const CODES: usize = PLACES + SIZES + 1 + RESTS + 1 + 1 + LEVELS + 4;
 
-/// Which code tells the classes of a quad's residuals.
+/// Index of the code for the classes of a quad's residuals.
 #[inline(always)]
 pub(super) fn sizes_context(mode: Mode, noise: usize) -> usize {
     mode as usize * NOISES + noise
 }
 
-/// Contexts that [`rest_context`] gives.
+/// Number of contexts of [`rest_context`].
 const REST_CONTEXTS: usize = 8;
 
-/// Which code tells the widths of a first quad's dy and cross, by the symbol of the other two.
+/// Index of the code for the widths of a first quad's dy and cross, by the symbol of dx and uv.
 #[inline(always)]
 pub(super) fn rest_context(first: u32) -> usize {
     (first >> 2 & 7) as usize
@@ -205,7 +205,7 @@ impl Codes {
         }
     }
 
-    /// For the encoder alone.
+    /// Used only by the encoder.
     pub fn choices(&self) -> &WidthChoices {
         self.choices.get_or_init(|| WidthChoices {
             first: Choices::new(&self.first, DX_AND_UV),

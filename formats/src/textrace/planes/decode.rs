@@ -1,13 +1,13 @@
-//! From bits to records, run by run: runs and places from the front, planes and departures from the back.
-//! The two readers do not wait for each other, nor does either wait for what the planes say.
+//! Decodes records, run by run: runs and places from the front, planes and deviations from the back. The
+//! two readers are independent of each other, and neither depends on the predictions of the planes.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::codes::{Codes, rest_context, sizes_context};
-use super::mode::{Departure, Mode};
+use super::mode::{Deviation, Mode};
 use super::parents::{
-    Expected, Lineage, MOST_PARENT_BITS, first_noise, level_context, tilt_of_run,
+    Expected, MOST_PARENT_BITS, PlaneHistory, first_noise, level_context, tilt_of_run,
 };
-use super::places::{Last, Place, Places};
+use super::places::{Last, Places, QuadPlace};
 use super::plane::{Plane, Quad};
 use super::residual::{CLASS_NUMBER_BITS, Classes, Pair, WIDE, sum, symbol, unfold};
 use super::widths::{CROSS, EACH, MOST_WIDTH, SLOPE, START, TILT, of_level};
@@ -16,14 +16,14 @@ use crate::textrace::bits::BitReader;
 use crate::textrace::{PrimitiveRun, QuadRecord, Tile};
 use crate::varint::low_u32;
 
-/// What was expected where the bits went wrong.
+/// Result of decoding; the error is what was expected.
 pub(super) type Outcome<T> = Result<T, &'static str>;
 
-/// A group of a run.
+/// State of a group in the current run.
 #[derive(Clone, Copy, Default)]
-struct Told {
+struct GroupState {
     plane: Plane,
-    departure: Departure,
+    deviation: Deviation,
     noise: usize,
 }
 
@@ -31,20 +31,20 @@ pub(super) struct Decoder<'a> {
     pub front: BitReader<'a>,
     pub back: BitReader<'a>,
     codes: &'static Codes,
-    lineage: Lineage,
-    /// By group, of those of the run.
-    told: [Told; GROUPS],
+    history: PlaneHistory,
+    /// By group, for the groups of the current run.
+    groups: [GroupState; GROUPS],
 }
 
 impl<'a> Decoder<'a> {
-    /// Bytes from the front and bytes from the back, both with padding, and how many runs they tell.
+    /// Starts with the bytes from the front and from the back, both with padding, and the number of runs.
     pub fn new(front: &'a [u8], back: &'a [u8], runs: u32) -> Self {
         Self {
             front: BitReader::new(front),
             back: BitReader::new(back),
             codes: Codes::get(),
-            lineage: Lineage::new(runs),
-            told: [Told::default(); GROUPS],
+            history: PlaneHistory::new(runs),
+            groups: [GroupState::default(); GROUPS],
         }
     }
 
@@ -56,7 +56,7 @@ impl<'a> Decoder<'a> {
         let mut draw = 0;
         let mut first = 0u32;
         for _ in 0..runs {
-            // Two codes and 32 bits at most.
+            // At most two codes and 32 bits.
             let bits = self.front.peek().ok_or(SHORT)?;
             let (header, header_bits) = self.codes.header.decode(bits);
             let (power, count_bits) = self.codes.count.decode(bits >> header_bits);
@@ -70,7 +70,7 @@ impl<'a> Decoder<'a> {
             let bits = self.front.peek().ok_or(SHORT)?;
             let count = u32::try_from(from_one(power, bits)).unwrap_or(u32::MAX);
             if count > records - first {
-                return Err("a run of no more records than the index tells");
+                return Err("a run of no more records than in the index");
             }
             tile.runs.push(PrimitiveRun {
                 primitive,
@@ -87,12 +87,12 @@ impl<'a> Decoder<'a> {
             next_primitive = u64::from(primitive) + 1;
         }
         if first != records {
-            return Err("runs of as many records as the index tells");
+            return Err("runs of as many records as in the index");
         }
         Ok(())
     }
 
-    /// A draw, by Elias's gamma code.
+    /// A draw number in Elias's gamma code.
     fn draw(&mut self) -> Outcome<u32> {
         let zeros = self.front.peek().ok_or(SHORT)?.trailing_zeros();
         if zeros > 32 {
@@ -104,7 +104,7 @@ impl<'a> Decoder<'a> {
         u32::try_from(number - 1).map_err(|_| "a draw below 2^32")
     }
 
-    /// The records of a run.
+    /// Decodes the records of a run.
     #[inline(always)]
     fn run(
         &mut self,
@@ -113,7 +113,7 @@ impl<'a> Decoder<'a> {
         count: u32,
         records: &mut Vec<QuadRecord>,
     ) -> Outcome<Last> {
-        // Groups whose planes were told, a bit each.
+        // Groups whose planes were decoded, one bit each.
         let mut known = 0u32;
         let mut tilt_from = None;
         let mut left = count;
@@ -129,11 +129,11 @@ impl<'a> Decoder<'a> {
                 records.push(self.first(place, tilt_from, share)?);
                 tilt_from = Some(group);
             } else {
-                let told = self.told.get_mut(group).ok_or(SHORT)?;
-                if told.departure.mode == Mode::Plain {
-                    later::<true>(&mut self.back, self.codes, place, told, records)?;
+                let state = self.groups.get_mut(group).ok_or(SHORT)?;
+                if state.deviation.mode == Mode::Plain {
+                    later::<true>(&mut self.back, self.codes, place, state, records)?;
                 } else {
-                    later::<false>(&mut self.back, self.codes, place, told, records)?;
+                    later::<false>(&mut self.back, self.codes, place, state, records)?;
                 }
             }
             if let Some(starts) = places.starts_next_quad(&last) {
@@ -149,8 +149,8 @@ impl<'a> Decoder<'a> {
         Ok(last)
     }
 
-    /// Quads of a group that follows itself, for as long as no other comes. Gives back how many records of the
-    /// run are left, and what comes last now.
+    /// Decodes quads of a group that follows itself, until another group comes. Returns the number of
+    /// remaining records of the run and the new last record.
     #[inline(always)]
     fn quads_of_one(
         &mut self,
@@ -159,17 +159,17 @@ impl<'a> Decoder<'a> {
         left: u32,
         records: &mut Vec<QuadRecord>,
     ) -> Outcome<(u32, Last)> {
-        let told = self.told.get_mut(usize::from(last.place.group));
-        let told = told.ok_or(SHORT)?;
+        let state = self.groups.get_mut(usize::from(last.place.group));
+        let state = state.ok_or(SHORT)?;
         let readers = (&mut self.front, &mut self.back);
-        if told.departure.mode == Mode::Plain {
-            one::<true>(readers, self.codes, places, last, told, left, records)
+        if state.deviation.mode == Mode::Plain {
+            one::<true>(readers, self.codes, places, last, state, left, records)
         } else {
-            one::<false>(readers, self.codes, places, last, told, left, records)
+            one::<false>(readers, self.codes, places, last, state, left, records)
         }
     }
 
-    /// The same of two groups in the same quads, in their order.
+    /// Decodes quads of two alternating groups, in their order.
     #[inline(always)]
     fn quads_of_two(
         &mut self,
@@ -179,27 +179,28 @@ impl<'a> Decoder<'a> {
         left: u32,
         records: &mut Vec<QuadRecord>,
     ) -> Outcome<(u32, Last)> {
-        let told = self.told.get_disjoint_mut(groups).map_err(|_| SHORT)?;
+        let state = self.groups.get_disjoint_mut(groups).map_err(|_| SHORT)?;
         let readers = (&mut self.front, &mut self.back);
         let codes = self.codes;
-        match told
+        match state
             .each_ref()
-            .map(|told| told.departure.mode == Mode::Plain)
+            .map(|state| state.deviation.mode == Mode::Plain)
         {
-            [true, true] => two::<true, true>(readers, codes, places, last, told, left, records),
-            [true, false] => two::<true, false>(readers, codes, places, last, told, left, records),
-            [false, true] => two::<false, true>(readers, codes, places, last, told, left, records),
+            [true, true] => two::<true, true>(readers, codes, places, last, state, left, records),
+            [true, false] => two::<true, false>(readers, codes, places, last, state, left, records),
+            [false, true] => two::<false, true>(readers, codes, places, last, state, left, records),
             [false, false] => {
-                two::<false, false>(readers, codes, places, last, told, left, records)
+                two::<false, false>(readers, codes, places, last, state, left, records)
             }
         }
     }
 
-    /// The first quad of a group in a run, and its plane; `tilt_from` is the group of the run's plane before.
+    /// Decodes the first quad of a group in a run, and its plane. `tilt_from` is the group of the run's
+    /// previous plane.
     #[inline(always)]
     fn first(
         &mut self,
-        place: Place,
+        place: QuadPlace,
         tilt_from: Option<usize>,
         likely_others: u32,
     ) -> Outcome<QuadRecord> {
@@ -207,7 +208,7 @@ impl<'a> Decoder<'a> {
         let QuadRecord { x, y, group, .. } = record;
         let codes = self.codes;
         let mut back = self.back;
-        // Five codes of 10 bits at most, and the 6 bits of the parent's number.
+        // At most five codes of 10 bits, and the 6 bits of the parent's number.
         let bits = back.peek().ok_or(SHORT)?;
         let (power, mut used) = codes.parent.decode(bits);
         let (first, length) = codes.first.decode(bits >> used);
@@ -229,11 +230,11 @@ impl<'a> Decoder<'a> {
             return Err("an earlier run of the group");
         }
         back.skip(used + power);
-        // Widths and levels are the same but for the widest.
+        // Widths and levels are the same except for the widest.
         let [dx, uv, dy] = [first & 31, first >> 5 & 31, rest & 31];
         let cross = of_level(&CROSS, rest >> 5);
-        let told;
-        (told, back) = if [dx, uv, dy, cross].iter().all(|width| *width <= MOST_WIDTH) {
+        let pairs;
+        (pairs, back) = if [dx, uv, dy, cross].iter().all(|width| *width <= MOST_WIDTH) {
             let dx = pair(&mut back, dx)?;
             let dy = pair(&mut back, dy)?;
             let cross = pair(&mut back, cross)?;
@@ -242,7 +243,7 @@ impl<'a> Decoder<'a> {
             let [dx, uv, dy] = [dx, uv, dy].map(|level| of_level(&EACH, level));
             long_pairs(back, [dx, dy, cross, uv])?
         };
-        let [dx, dy, cross, uv] = told;
+        let [dx, dy, cross, uv] = pairs;
         let mut by = Quad::default();
         if level > 0 {
             // At most 46 bits, then 32.
@@ -260,9 +261,9 @@ impl<'a> Decoder<'a> {
         }
         self.back = back;
 
-        let parent = self.lineage.parent(group, low_u32(parent));
+        let parent = self.history.parent(group, low_u32(parent));
         let parent = parent.ok_or("an earlier run of the group")?;
-        let of_run = tilt_from.and_then(|group| self.lineage.last(group));
+        let of_run = tilt_from.and_then(|group| self.history.last(group));
         let expected = Expected::new(&parent, of_run, place.morton);
         let [of_dx, of_dy] = expected.slopes();
         let (dx, dy) = (sum(of_dx, dx), sum(of_dy, dy));
@@ -276,12 +277,12 @@ impl<'a> Decoder<'a> {
         } else {
             Plane::through(place.morton, &quad, tilt)
         };
-        self.lineage.note(group, plane);
+        self.history.note(group, plane);
         let mode = Mode::of(mode_and_level >> 3).ok_or("one of the modes")?;
-        let told = self.told.get_mut(usize::from(group) % GROUPS);
-        *told.ok_or(SHORT)? = Told {
+        let state = self.groups.get_mut(usize::from(group) % GROUPS);
+        *state.ok_or(SHORT)? = GroupState {
             plane,
-            departure: Departure::start(mode, x, y),
+            deviation: Deviation::start(mode, x, y),
             noise: first_noise(level),
         };
         Ok(record)
@@ -290,17 +291,17 @@ impl<'a> Decoder<'a> {
 
 type Readers<'r, 'a> = (&'r mut BitReader<'a>, &'r mut BitReader<'a>);
 
-/// See [`Decoder::quads_of_one`]; `PLAIN`: the group's mode is the plain one.
+/// See [`Decoder::quads_of_one`]. `PLAIN`: the group has the plain mode.
 fn one<const PLAIN: bool>(
     readers: Readers<'_, '_>,
     codes: &Codes,
     places: &mut Places,
     mut last: Last,
-    told: &mut Told,
+    state: &mut GroupState,
     mut left: u32,
     records: &mut Vec<QuadRecord>,
 ) -> Outcome<(u32, Last)> {
-    // In registers, not in memory.
+    // Copies that stay in registers.
     let (mut front, mut back) = (*readers.0, *readers.1);
     while left > 0 {
         let word = front.peek().ok_or(SHORT)?;
@@ -308,20 +309,20 @@ fn one<const PLAIN: bool>(
             break;
         };
         front.skip(used);
-        later::<PLAIN>(&mut back, codes, place, told, records)?;
+        later::<PLAIN>(&mut back, codes, place, state, records)?;
         left -= 1;
     }
     (*readers.0, *readers.1) = (front, back);
     Ok((left, last))
 }
 
-/// See [`Decoder::quads_of_two`]; `FIRST`, `SECOND`: their mode is the plain one.
+/// See [`Decoder::quads_of_two`]. `FIRST`, `SECOND`: the group has the plain mode.
 fn two<const FIRST: bool, const SECOND: bool>(
     readers: Readers<'_, '_>,
     codes: &Codes,
     places: &mut Places,
     mut last: Last,
-    [first, second]: [&mut Told; 2],
+    [first, second]: [&mut GroupState; 2],
     mut left: u32,
     records: &mut Vec<QuadRecord>,
 ) -> Outcome<(u32, Last)> {
@@ -333,7 +334,7 @@ fn two<const FIRST: bool, const SECOND: bool>(
             break;
         };
         front.skip(used);
-        let place_of_first = Place { group, ..place };
+        let place_of_first = QuadPlace { group, ..place };
         later::<FIRST>(&mut back, codes, place_of_first, first, records)?;
         later::<SECOND>(&mut back, codes, place, second, records)?;
         left -= 2;
@@ -342,21 +343,21 @@ fn two<const FIRST: bool, const SECOND: bool>(
     Ok((left, last))
 }
 
-/// A record after the first one of its group in its run; `PLAIN`: its mode is the plain one.
+/// Decodes a record after the first one of its group in its run. `PLAIN`: the group has the plain mode.
 #[inline(always)]
 fn later<const PLAIN: bool>(
     back: &mut BitReader<'_>,
     codes: &Codes,
-    place: Place,
-    told: &mut Told,
+    place: QuadPlace,
+    state: &mut GroupState,
     records: &mut Vec<QuadRecord>,
 ) -> Outcome<()> {
     let mode = if PLAIN {
         Mode::Plain
     } else {
-        told.departure.mode
+        state.deviation.mode
     };
-    let context = sizes_context(mode, told.noise);
+    let context = sizes_context(mode, state.noise);
     let bits = back.peek().ok_or(SHORT)?;
     let (symbol, code_bits) = codes.sizes.decode(context, bits);
     let mut classes = Classes::of_symbol(symbol);
@@ -364,14 +365,14 @@ fn later<const PLAIN: bool>(
     back.skip(code_bits + classes.bits());
     let mut record = place.record();
     let QuadRecord { x, y, .. } = record;
-    let expected = told.plane.predict(place.morton);
+    let expected = state.plane.predict(place.morton);
     if PLAIN {
         add(&mut record, &expected, &residual);
         records.push(record);
         if classes.is_special() {
             let (after, instead, [uv, dx, dy, cross]) = special(*back, codes, classes)?;
             (*back, classes) = (after, instead);
-            // What was pushed, as what is common does not wait for this.
+            // Corrects the record that was pushed, so that the common case need not wait.
             if let Some(record) = records.last_mut() {
                 record.uv = sum(record.uv, uv);
                 record.dx = sum(record.dx, dx);
@@ -387,26 +388,26 @@ fn later<const PLAIN: bool>(
                 *to = sum(*to, rest);
             }
         }
-        let departure = told.departure.read(x, y, &residual);
-        add(&mut record, &expected, &departure);
+        let deviation = state.deviation.read(x, y, &residual);
+        add(&mut record, &expected, &deviation);
         records.push(record);
     }
-    told.noise = classes.noise();
+    state.noise = classes.noise();
     Ok(())
 }
 
 #[inline(always)]
-fn add(record: &mut QuadRecord, expected: &Quad, departure: &Quad) {
+fn add(record: &mut QuadRecord, expected: &Quad, deviation: &Quad) {
     let [uv, dx, dy, cross] = *expected;
-    let [by_uv, by_dx, by_dy, by_cross] = *departure;
+    let [by_uv, by_dx, by_dy, by_cross] = *deviation;
     record.uv = sum(uv, by_uv);
     record.dx = sum(dx, by_dx);
     record.dy = sum(dy, by_dy);
     record.cross = sum(cross, by_cross);
 }
 
-/// What is to be added where residuals are wide, or where their classes are coded as numbers; the classes; and
-/// the reader after it.
+/// Handles wide residuals, and classes coded as numbers. Returns the numbers to add, the classes, and the
+/// reader after them.
 #[inline(never)]
 fn special<'a>(
     mut back: BitReader<'a>,
@@ -416,11 +417,11 @@ fn special<'a>(
     let mut residual = Quad::default();
     if classes.is_escape() {
         let bits = back.peek().ok_or(SHORT)?;
-        let told = [0, 3, 6, 9].map(|from| low_u32(bits >> from & 7));
-        if told.iter().any(|class| *class > WIDE) {
+        let numbers = [0, 3, 6, 9].map(|from| low_u32(bits >> from & 7));
+        if numbers.iter().any(|class| *class > WIDE) {
             return Err("one of the classes");
         }
-        classes = Classes::of_symbol(symbol(told));
+        classes = Classes::of_symbol(symbol(numbers));
         residual = classes.small_pairs(bits >> (4 * CLASS_NUMBER_BITS));
         back.skip(4 * CLASS_NUMBER_BITS + classes.bits());
     }
@@ -446,7 +447,7 @@ fn special<'a>(
     Ok((back, classes, residual))
 }
 
-/// A pair of numbers of at most 28 bits.
+/// Reads a pair of numbers of at most 28 bits.
 #[inline(always)]
 fn pair(bits: &mut BitReader<'_>, width: u32) -> Outcome<Pair> {
     let word = bits.peek().ok_or(SHORT)?;
@@ -461,7 +462,7 @@ fn numbers(bits: u64, width: u32) -> Pair {
     [unfold(bits & low), unfold(bits >> width & low)]
 }
 
-/// Pairs of numbers of at most 32 bits.
+/// Reads pairs of numbers of at most 32 bits.
 #[cold]
 fn long_pairs(mut bits: BitReader<'_>, widths: [u32; 4]) -> Outcome<([Pair; 4], BitReader<'_>)> {
     let mut pairs = [[0; 2]; 4];
@@ -474,7 +475,7 @@ fn long_pairs(mut bits: BitReader<'_>, widths: [u32; 4]) -> Outcome<([Pair; 4], 
     Ok((pairs, bits))
 }
 
-/// A number from 1 on of which the highest bit is known, and `bits` hold the ones below.
+/// A number, at least 1, from its highest bit and the `bits` below.
 #[inline(always)]
 fn from_one(power: u32, bits: u64) -> u64 {
     let highest = 1 << power;

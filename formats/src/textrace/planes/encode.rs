@@ -1,11 +1,11 @@
-//! From records to bits, pass by pass as they are read.
+//! Encodes records, run by run in the order of decoding.
 
 use super::GROUPS;
 use super::codes::{Code, Codes, rest_context, sizes_context};
 use super::fit::{Fitted, fit};
-use super::mode::{Departure, Mode};
-use super::parents::{Expected, Lineage, first_noise, level_context, tilt_of_run};
-use super::places::{Last, Place, Places};
+use super::mode::{Deviation, Mode};
+use super::parents::{Expected, PlaneHistory, first_noise, level_context, tilt_of_run};
+use super::places::{Last, Places, QuadPlace};
 use super::plane::{Plane, Quad, Units, quad_of};
 use super::residual::{
     CLASS_NUMBER_BITS, Classes, ESCAPE_SIZES, Pair, WIDE, class_bits, classify, difference, fold,
@@ -15,12 +15,13 @@ use super::widths::{Chosen, SLOPE, START, TILT};
 use crate::textrace::bits::BitWriter;
 use crate::textrace::{QuadRecord, Tile, quad_morton};
 
-/// What takes the encoder's output: bits, or counts of symbols.
+/// Receives the encoder's output: writes bits, or counts symbols.
 pub(super) trait Sink {
-    /// The lowest `count` bits of `value`, at most 32.
+    /// Writes the lowest `count` bits of `value`, at most 32.
     fn bits(&mut self, value: u32, count: u32);
 
-    /// A symbol of a code; where it is not in the code, `escape` instead. Tells which it was.
+    /// Writes a symbol of a code, or `escape` if it is not in the code. Returns whether the symbol was
+    /// written.
     fn symbol(&mut self, code: &Code, symbol: u32, escape: u32) -> bool;
 }
 
@@ -38,7 +39,7 @@ impl Sink for BitWriter {
     }
 }
 
-/// A plane, and how its quads are coded.
+/// A plane, and the coding of its quads.
 #[derive(Clone, Copy)]
 struct Choice {
     mode: Mode,
@@ -47,15 +48,15 @@ struct Choice {
     plane: Plane,
 }
 
-/// A group of a run.
+/// State of a group in the current run.
 struct Group {
-    departure: Departure,
+    deviation: Deviation,
     plane: Plane,
-    /// Which code tells the classes of its next record.
+    /// Index of the code for the classes of its next record.
     noise: usize,
 }
 
-/// Writes a tile: runs and places to `front`, planes and departures to `back`.
+/// Writes a tile: runs and places to `front`, planes and deviations to `back`.
 pub(super) fn tile<S: Sink>(tile: &Tile, codes: &Codes, front: &mut S, back: &mut S) {
     let mut encoder = Encoder { front, back, codes };
     encoder.tile(tile);
@@ -68,7 +69,7 @@ struct Encoder<'a, S> {
 }
 
 impl<'a, S: Sink> Encoder<'a, S> {
-    /// A number from 1 on in Elias's gamma code.
+    /// Writes a number, at least 1, in Elias's gamma code.
     fn gamma(&mut self, number: u64) {
         self.front.bits(0, number.ilog2());
         self.front.bits(1, 1);
@@ -78,7 +79,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
     fn tile(&mut self, tile: &Tile) {
         let mut places = Places::new();
         let mut last = Last::new();
-        let mut lineage = Lineage::new(tile.runs.len() as u32);
+        let mut history = PlaneHistory::new(tile.runs.len() as u32);
         let mut next_primitive = 0;
         let mut draw = 0;
         for run in &tile.runs {
@@ -102,17 +103,17 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 self.front.bits(regular.into(), 1);
                 last.regular = regular;
             }
-            last = self.run(records, &mut places, last, &mut lineage);
+            last = self.run(records, &mut places, last, &mut history);
         }
     }
 
-    /// The records of a run.
+    /// Writes the records of a run.
     fn run(
         &mut self,
         records: &[QuadRecord],
         places: &mut Places,
         mut last: Last,
-        lineage: &mut Lineage,
+        history: &mut PlaneHistory,
     ) -> Last {
         let mut groups: [Option<Group>; GROUPS] = [const { None }; GROUPS];
         let mut of_run = None;
@@ -125,12 +126,12 @@ impl<'a, S: Sink> Encoder<'a, S> {
             }
             let after = &records[at + 1..];
             let likely_others = last.share(after.len() as u32);
-            let choice = self.first(record, lineage, of_run, likely_others, after);
+            let choice = self.first(record, history, of_run, likely_others, after);
             let plane = choice.plane;
-            lineage.note(record.group, plane);
+            history.note(record.group, plane);
             of_run = Some(plane);
             *group = Some(Group {
-                departure: Departure::start(choice.mode, record.x, record.y),
+                deviation: Deviation::start(choice.mode, record.x, record.y),
                 plane,
                 noise: first_noise(choice.level),
             });
@@ -138,13 +139,13 @@ impl<'a, S: Sink> Encoder<'a, S> {
         last
     }
 
-    /// A departure.
+    /// Writes a deviation.
     fn later(&mut self, record: &QuadRecord, group: &mut Group) {
         let QuadRecord { x, y, .. } = *record;
         let left = difference(&quad_of(record), &group.plane.predict(quad_morton(x, y)));
-        let residual = group.departure.write(x, y, &left);
+        let residual = group.deviation.write(x, y, &left);
         let (classes, pairs) = classes(&residual);
-        let code = self.sizes(group.departure.mode, group.noise);
+        let code = self.sizes(group.deviation.mode, group.noise);
         if !self.back.symbol(code, symbol(classes), ESCAPE_SIZES) {
             for class in classes {
                 self.back.bits(class, CLASS_NUMBER_BITS);
@@ -162,11 +163,11 @@ impl<'a, S: Sink> Encoder<'a, S> {
         group.noise = Classes::new(classes).noise();
     }
 
-    /// The first quad of a run in a group, and the plane for the others.
+    /// Writes the first quad of a group in a run, and the plane for its other quads.
     fn first(
         &mut self,
         record: &QuadRecord,
-        lineage: &Lineage,
+        history: &PlaneHistory,
         of_run: Option<Plane>,
         likely_others: u32,
         after: &[QuadRecord],
@@ -174,9 +175,9 @@ impl<'a, S: Sink> Encoder<'a, S> {
         let group = record.group;
         let morton = quad_morton(record.x, record.y);
         let quad = quad_of(record);
-        let known = lineage.count(group);
+        let known = history.count(group);
         let parents = (0..=known as u32).filter_map(|back| {
-            let parent = lineage.parent(group, back)?;
+            let parent = history.parent(group, back)?;
             let expected = Expected::new(&parent, of_run.as_ref(), morton);
             let pairs = first_pairs(&quad, &expected);
             let power = (back + 1).ilog2();
@@ -222,7 +223,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
         choice
     }
 
-    /// Level, correction, mode and plane with which a group's other records take fewest bits.
+    /// Level, correction, mode and plane for which a group's other records take the fewest bits.
     fn best_plane(
         &self,
         first: &QuadRecord,
@@ -246,8 +247,8 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 if level > 0 {
                     bits += self.correction_widths(&correction).bits;
                 }
-                let departure = Departure::start(mode, first.x, first.y);
-                bits += self.run_bits(&plane, departure, others, first_noise(level));
+                let deviation = Deviation::start(mode, first.x, first.y);
+                bits += self.run_bits(&plane, deviation, others, first_noise(level));
                 if bits < least {
                     least = bits;
                     best = choice;
@@ -255,7 +256,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
             }
             least
         };
-        // A correction takes some 20 bits.
+        // A correction takes about 20 bits.
         if try_plane(0, Quad::default(), plain) < 24 {
             return best;
         }
@@ -274,7 +275,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
         best
     }
 
-    /// The code of mode and level; `None` where nothing tells them.
+    /// The code of mode and level; `None` if they are not coded.
     fn level(&self, context: usize) -> Option<&'a Code> {
         self.codes.level.codes.get(context.checked_sub(1)?)
     }
@@ -283,11 +284,11 @@ impl<'a, S: Sink> Encoder<'a, S> {
         &self.codes.sizes.codes[sizes_context(mode, noise)]
     }
 
-    /// Bits of some records' residuals.
+    /// Number of bits of some records' residuals.
     fn run_bits(
         &self,
         plane: &Plane,
-        mut departure: Departure,
+        mut deviation: Deviation,
         records: &[QuadRecord],
         mut at: usize,
     ) -> u32 {
@@ -297,9 +298,9 @@ impl<'a, S: Sink> Encoder<'a, S> {
                 &quad_of(record),
                 &plane.predict(quad_morton(record.x, record.y)),
             );
-            let left = departure.write(record.x, record.y, &left);
+            let left = deviation.write(record.x, record.y, &left);
             let (classes, pairs) = classes(&left);
-            let code = self.sizes(departure.mode, at);
+            let code = self.sizes(deviation.mode, at);
             bits += code.length(
                 symbol(classes),
                 code.length(ESCAPE_SIZES, 0) + 4 * CLASS_NUMBER_BITS,
@@ -317,7 +318,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
         bits
     }
 
-    /// How the widths of a first quad's pairs are coded: those of dx and uv, then those of dy and cross.
+    /// Coding of the widths of a first quad's pairs: of dx and uv, then of dy and cross.
     fn first_widths(&self, pairs: &[Pair; 4]) -> (Chosen<2>, Chosen<2>) {
         let [dx, dy, cross, uv] = *pairs;
         let first = self.codes.choices().first.choose(&[dx, uv]);
@@ -325,7 +326,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
         (first, rest.choose(&[dy, cross]))
     }
 
-    /// The same of a correction.
+    /// Coding of the widths of a correction.
     fn correction_widths(&self, correction: &Quad) -> Chosen<4> {
         self.codes.choices().correction.choose(correction)
     }
@@ -347,15 +348,15 @@ impl Choice {
     }
 }
 
-fn place_of(record: &QuadRecord) -> Place {
-    Place {
+fn place_of(record: &QuadRecord) -> QuadPlace {
+    QuadPlace {
         morton: quad_morton(record.x, record.y),
         mask: record.mask,
         group: record.group,
     }
 }
 
-/// The bits of a number below its highest one.
+/// Writes the bits of a number below its highest bit.
 fn below_power(sink: &mut impl Sink, number: u64) {
     let power = number.ilog2();
     sink.bits((number - (1 << power)) as u32, power);
@@ -367,7 +368,7 @@ fn put_numbers(sink: &mut impl Sink, pair: [i32; 2], width: u32) {
     }
 }
 
-/// What is coded of a first quad: dx, dy, cross and uv less their predictions.
+/// The coded pairs of a first quad: dx, dy, cross and uv minus their predictions.
 fn first_pairs(quad: &Quad, expected: &Expected) -> [Pair; 4] {
     let [uv, dx, dy, cross] = *quad;
     let [of_dx, of_dy] = expected.slopes();
@@ -380,14 +381,14 @@ fn first_pairs(quad: &Quad, expected: &Expected) -> [Pair; 4] {
     ]
 }
 
-/// A pair, its class and the bits that name it in the class.
+/// A pair, its class and the bits that identify it in the class.
 type Classified = ([i32; 2], (u32, u32));
 
 fn is_wide((_, (class, _)): &&Classified) -> bool {
     *class == WIDE
 }
 
-/// Bits that the largest number of the wide pairs needs; `None` where no pair is wide.
+/// Number of bits of the largest number in the wide pairs; `None` if no pair is wide.
 fn wide_width(pairs: &[Classified; 4]) -> Option<u32> {
     pairs
         .iter()
@@ -396,13 +397,13 @@ fn wide_width(pairs: &[Classified; 4]) -> Option<u32> {
         .max()
 }
 
-/// Classes of residuals; and residuals with their classes.
+/// Classes of residuals, and the classified residuals.
 fn classes(left: &Quad) -> ([u32; 4], [Classified; 4]) {
     let pairs = left.map(|pair| (pair, classify(pair)));
     (pairs.map(|(_, (class, _))| class), pairs)
 }
 
-/// The correction in the units of `level` that leads from the plane through a record nearest to another one.
+/// The correction, in the units of `level`, that brings the plane through a record closest to another one.
 fn correction(record: &QuadRecord, tilt: [f32; 2], to: &Fitted, level: u32) -> Quad {
     let quad = quad_of(record);
     let units = Units::new(level, &quad);

@@ -1,7 +1,6 @@
-//! The plane that comes nearest to a primitive's quads: least squares by Gauss and Newton.
+//! Fits a plane to a primitive's quads: least squares by Gauss-Newton.
 //!
-//! Only the encoder needs it, and whatever it finds is only a matter of size: the residuals make
-//! the records exact.
+//! Only the encoder uses it. The fit affects only the size, because the residuals make the records exact.
 
 use super::plane::{Quad, quad_of};
 use crate::textrace::QuadRecord;
@@ -20,7 +19,7 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// The plane through a record's own numbers, with a slope of w.
+    /// The plane through a record's own numbers, with the given tilt.
     pub fn through(record: &QuadRecord, tilt: [f32; 2]) -> Self {
         let [p, q] = tilt.map(f64::from);
         Self {
@@ -35,13 +34,13 @@ impl Fitted {
     }
 }
 
-/// Unknowns: start, slope to the right and slope down of u and of v, then the tilt.
+/// Number of unknowns: start, slope to the right and slope down of u and of v, then the tilt.
 const UNKNOWNS: usize = 8;
-/// Steps of the iteration, which starts near the solution.
+/// Number of iterations, which start near the solution.
 const STEPS: usize = 3;
 
-/// The plane of a quad and `others`, from one through it with a slope of w; `None` where the equations have
-/// no solution.
+/// Fits a plane to a quad and `others`, starting from one through the quad with the given tilt; `None` if
+/// the equations have no solution.
 pub(super) fn fit(quad: &QuadRecord, tilt: [f32; 2], others: &[QuadRecord]) -> Option<Fitted> {
     let mut plane = Fitted::through(quad, tilt);
     let quad = quad_of(quad);
@@ -71,12 +70,12 @@ pub(super) fn fit(quad: &QuadRecord, tilt: [f32; 2], others: &[QuadRecord]) -> O
     Some(plane)
 }
 
-/// Normal equations, the right-hand side in the last column.
+/// Normal equations, with the right-hand side in the last column.
 #[derive(Default)]
 struct Equations([[f64; UNKNOWNS + 1]; UNKNOWNS]);
 
 impl Equations {
-    /// Adds the eight numbers of a quad, `at` pixels from the origin.
+    /// Adds the eight numbers of a quad at `at` pixels from the origin.
     #[allow(
         clippy::needless_range_loop,
         reason = "several arrays have the same index"
@@ -119,7 +118,7 @@ impl Equations {
         }
     }
 
-    /// Solves by elimination, with a little weight on no change at all.
+    /// Solves by elimination, with a small weight on no change.
     fn solve(mut self, plane: &Fitted) -> Option<[f64; UNKNOWNS]> {
         let slopes = plane.slopes.as_flattened();
         let steepest = slopes.iter().fold(1.0f64, |most, s| most.max(s.abs()));
@@ -156,7 +155,7 @@ impl Equations {
     }
 }
 
-/// Of the four lanes: top left, dx, dy and cross.
+/// Differences of the four lanes: top left, dx, dy and cross.
 fn differences([a, b, c, d]: [f64; 4]) -> [f64; 4] {
     [a, b - a, c - a, d - c - (b - a)]
 }

@@ -1,15 +1,15 @@
-//! Encoding 3: a plane for each primitive, and what quads leave over.
+//! Encoding 3: a plane for each primitive, and the residuals of its quads.
 //!
-//! A primitive's texture coordinates are a plane seen in perspective ([`plane`]). Its first quad
-//! is coded exactly, as a difference from what an earlier primitive's plane says there ([`parents`]);
-//! then how finely the plane through that quad is corrected, and the correction. Every other quad is
-//! what the plane says and a residual, mostly 0 or 1 of a fixed-point step ([`mode`], [`residual`]).
-//! Sizes of residuals and of a first quad's numbers ([`widths`]), and steps and masks ([`places`]), are coded by
-//! prefix codes with fixed lengths ([`lengths`]).
+//! A primitive's texture coordinates are a plane in perspective ([`plane`]). Its first quad is coded
+//! exactly, as a difference from the prediction of an earlier primitive's plane ([`parents`]). Then follow
+//! the resolution of the correction of the plane through that quad, and the correction. Every other quad is
+//! the plane's prediction and a residual, mostly 0 or 1 fixed-point steps ([`mode`], [`residual`]). Sizes
+//! of residuals and of a first quad's numbers ([`widths`]), and steps and masks ([`places`]), have prefix
+//! codes with fixed lengths ([`lengths`]).
 //!
-//! A tile is written run by run, from both ends: runs and places from the front, planes and residuals from
-//! the back. So a decoder has two chains of codes that do not wait for each other. The encoder fits the
-//! planes to the exact records ([`fit`]); a decoder does not need to know how.
+//! A tile is written run by run from both ends: runs and places from the front, planes and residuals from
+//! the back. A decoder thus has two independent chains of codes. The encoder fits the planes to the exact
+//! records ([`fit`]); decoding does not depend on the method of fitting.
 
 mod codes;
 mod decode;
@@ -29,13 +29,13 @@ use crate::parse::{Fault, Parsed, ensure};
 use codes::Codes;
 use decode::Decoder;
 
-/// Fewest bits that a record takes, which bounds the records that a tile's bytes can hold.
+/// Minimum bits per record, which bounds the number of records in a tile's bytes.
 pub(super) const MIN_RECORD_BITS: u32 = 1;
 
 /// Number of groups that a record can name.
 const GROUPS: usize = 16;
 
-/// What is expected where the bits end.
+/// The error for missing bits.
 const SHORT: &str = "more bits";
 
 pub(super) fn encode(tile: &Tile) -> Vec<u8> {
@@ -53,7 +53,7 @@ pub(super) fn decode<'a>(
     input: &'a [u8],
     tile: &mut Tile,
 ) -> Parsed<'a, ()> {
-    // The bytes in both directions, each with padding of its own, so that both are read in words.
+    // The bytes in both directions, each with its own padding, so that both can be read in words.
     let padding = [0; PADDING_BYTES];
     let mut both = [input, &padding, input, &padding].concat();
     let (ahead, back) = both.split_at_mut(input.len() + PADDING_BYTES);

@@ -1,36 +1,35 @@
-//! What a residual stands for: how far a quad departs from its plane, told in one of several ways.
+//! Modes: the ways in which a residual encodes the deviation of a quad from its plane.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::plane::Quad;
 use super::residual::{Pair, sum};
 
-/// How a run's residuals are coded, whichever is smallest.
+/// Meaning of a run's residuals; the encoder uses the smallest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// Departures of uv, dx, dy and cross.
+    /// Deviations of uv, dx, dy and cross.
     #[default]
     Plain,
-    /// Departures of the four lanes: smaller where each lane was rounded for itself, coarsely.
+    /// Deviations of the four lanes: smaller if each lane was rounded separately and coarsely.
     Lanes,
-    /// What encoding 1's prediction from the last quad's departure leaves: smaller where the surface
-    /// is curved.
+    /// Residuals of encoding 1's prediction from the last quad's deviation: smaller for curved surfaces.
     Bending,
-    /// The same where the last quad's slopes are expected to stay.
+    /// As `Bending`, but the last quad's slopes are predicted to stay.
     Following,
 }
 
 impl Mode {
     pub const ALL: [Self; 4] = [Self::Plain, Self::Lanes, Self::Bending, Self::Following];
 
-    /// By number.
+    /// The mode with a number.
     pub fn of(number: u32) -> Option<Self> {
         Self::ALL.get(number as usize).copied()
     }
 }
 
-/// The departure of a group's last quad, from which that of the next follows as encoding 1's records do.
+/// The deviation of a group's last quad. The next one is predicted from it as encoding 1 predicts records.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Departure {
+pub(super) struct Deviation {
     pub mode: Mode,
     at: [i32; 2],
     uv: Pair,
@@ -41,11 +40,11 @@ pub(super) struct Departure {
     steps: Four,
 }
 
-/// Two pairs, of which one instruction takes all.
+/// Two pairs, for one vector instruction.
 type Four = [i32; 4];
 
-impl Departure {
-    /// That of a run's first quad: none.
+impl Deviation {
+    /// The deviation of a run's first quad, which is zero.
     #[inline(always)]
     pub fn start(mode: Mode, x: u8, y: u8) -> Self {
         Self {
@@ -55,7 +54,7 @@ impl Departure {
         }
     }
 
-    /// The departure that a residual stands for.
+    /// The deviation encoded by a residual.
     #[inline(always)]
     pub fn read(&mut self, x: u8, y: u8, residual: &Quad) -> Quad {
         let [uv, dx, dy, cross] = *residual;
@@ -76,7 +75,7 @@ impl Departure {
         }
     }
 
-    /// The residual that stands for a departure.
+    /// The residual that encodes a deviation.
     pub fn write(&mut self, x: u8, y: u8, quad: &Quad) -> Quad {
         let [uv, dx, dy, cross] = *quad;
         match self.mode {
@@ -98,7 +97,7 @@ impl Departure {
         }
     }
 
-    /// The way from the last quad to another one.
+    /// The offset from the last quad to another one.
     #[inline(always)]
     fn way(&self, x: u8, y: u8) -> Way {
         let [right, down] = minus([x.into(), y.into()], self.at);
@@ -110,7 +109,7 @@ impl Departure {
         }
     }
 
-    /// What is expected of dx and dy.
+    /// Predicts dx and dy.
     #[inline(always)]
     fn guess(&self, way: &Way) -> Four {
         if self.mode != Mode::Bending {
@@ -124,8 +123,8 @@ impl Departure {
         )
     }
 
-    /// What is expected of uv, once dx and dy are known; notes how they change. First along the row, then down
-    /// the column, each by the trapezoid rule over one-pixel differences.
+    /// Predicts uv from known dx and dy, and updates their change. First along the row, then down the
+    /// column, each by the trapezoid rule over one-pixel differences.
     #[inline(always)]
     fn expected_uv(&mut self, way: &Way, slopes: Four) -> Pair {
         let [right_u, right_v, down_u, down_v] = way.turn;
@@ -161,11 +160,11 @@ impl Departure {
     }
 }
 
-/// From one quad to another.
+/// Offset from one quad to another.
 struct Way {
     /// Quads to the right (twice, for u and v), then down.
     quads: Four,
-    /// Change of dx by going down, then of dy by going right.
+    /// Change of dx over the rows, then of dy over the columns.
     turn: Four,
 }
 

@@ -1,5 +1,5 @@
-//! Where records lie, the lanes that they cover, and their groups: what is remembered from record
-//! to record, in both directions alike.
+//! Positions of records, their covered lanes and their groups, with the state from record to record, for
+//! encoder and decoder.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::GROUPS;
@@ -9,24 +9,24 @@ use crate::textrace::QuadRecord;
 use crate::textrace::invariant::QUAD_POSITIONS;
 use crate::varint::low_u32;
 
-/// Steps along the curve that have symbols, 1 to this; the last one stands for all from here on,
-/// and the step follows. Symbols are `16 * (step - 1) + mask`.
+/// Largest step along the curve with its own symbol. The last symbol stands for this step and all larger
+/// ones, and the step follows. Symbols are `16 * (step - 1) + mask`.
 const STEPS: u32 = 7;
-/// The symbol after which step, mask and group follow as numbers: no step has a mask of 0.
+/// The symbol after which step, mask and group follow as numbers. It is free because no mask is 0.
 pub(super) const ESCAPE_PLACE: u32 = 0;
 
 const OUTSIDE: &str = "a quad inside the tile";
 
-/// Place on the Morton curve, covered lanes, group.
+/// Position on the Morton curve, covered lanes, and group of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct QuadPlace {
     pub morton: u8,
     pub mask: u8,
     pub group: u8,
 }
 
-impl Place {
-    /// A record there, its numbers unknown.
+impl QuadPlace {
+    /// A record at this place, with all other fields zero.
     #[inline(always)]
     pub fn record(self) -> QuadRecord {
         let (x, y) = QUAD_POSITIONS
@@ -43,34 +43,34 @@ impl Place {
     }
 }
 
-/// What came after a group's record.
+/// The record that followed a group's record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Follow {
     group: u8,
-    /// It was of the same quad and had the same mask.
+    /// Whether it was in the same quad with the same mask.
     same_quad: bool,
 }
 
-/// What is remembered from one record to the next: eight bytes, which stay in a register.
+/// State from one record to the next: eight bytes, which stay in a register.
 #[derive(Clone, Copy)]
 pub(super) struct Last {
     /// The run's last record; before the first one 0, 0 and the last run's group.
-    pub place: Place,
-    /// Its mask was the likeliest one.
+    pub place: QuadPlace,
+    /// Whether its mask was the most likely one.
     likeliest: bool,
-    /// It came right after the one before it on the curve.
+    /// Whether it directly followed the record before it on the curve.
     stepped_one: bool,
-    /// Place of the first record of the run, or of the last one's before its first record.
+    /// Position of the first record of the run, or of the run before until its first record.
     start: u8,
     first_of_run: bool,
-    /// Whatever is expected in the same quad comes: nothing tells it.
+    /// Whether every expected record in the same quad occurs, so that it is not coded.
     pub regular: bool,
 }
 
 impl Last {
     pub fn new() -> Self {
         Self {
-            place: Place {
+            place: QuadPlace {
                 morton: 0,
                 mask: 0,
                 group: 0,
@@ -83,13 +83,13 @@ impl Last {
         }
     }
 
-    /// How many of the records left in the run are likely to be of a group: half of them where groups
-    /// take turns.
+    /// Number of the run's remaining records that are likely to be of a group: half of them if groups
+    /// alternate.
     pub fn share(&self, left_in_run: u32) -> u32 {
         left_in_run >> u32::from(self.regular)
     }
 
-    /// Which code tells step and mask.
+    /// Index of the code for step and mask.
     #[inline(always)]
     fn context(&self) -> usize {
         if self.first_of_run {
@@ -107,7 +107,7 @@ impl Last {
     }
 }
 
-/// What is remembered through a tile.
+/// State over a tile.
 #[derive(Clone)]
 pub(super) struct Places {
     follows: [Follow; GROUPS],
@@ -138,17 +138,18 @@ impl Places {
         last.regular = false;
     }
 
-    /// Some group is followed by another one in the same quad, so a run tells whether it is regular.
+    /// Whether runs code if they are regular: only if some group is followed by another one in the same
+    /// quad.
     pub fn tells_regular(&self) -> bool {
         self.follows.iter().any(|follow| follow.same_quad)
     }
 
-    /// A run of these records, which starts now, is regular.
-    pub fn is_regular(&self, mut last: Last, mut run: impl Iterator<Item = Place>) -> bool {
+    /// Whether a run of these records, starting now, is regular.
+    pub fn is_regular(&self, mut last: Last, mut run: impl Iterator<Item = QuadPlace>) -> bool {
         let mut places = self.clone();
         run.all(|place| {
             let follow = places.follow(last.place.group);
-            let expected = Place {
+            let expected = QuadPlace {
                 group: follow.group,
                 ..last.place
             };
@@ -158,7 +159,7 @@ impl Places {
         })
     }
 
-    /// What is expected after a record of a group.
+    /// The record expected after a record of a group.
     #[inline(always)]
     fn follow(&self, group: u8) -> Follow {
         let found = self.follows.get(usize::from(group) % GROUPS);
@@ -168,8 +169,8 @@ impl Places {
         })
     }
 
-    /// Swaps a quad's full mask with the one that leaves no lane of it to other primitives of the
-    /// draw, or undoes it: a mesh covers every lane once, so 15 stands for the likeliest mask.
+    /// Exchanges a quad's full mask with the mask of the lanes that the draw has not covered yet, or undoes
+    /// it. A mesh covers every lane once, so 15 stands for the most likely mask.
     #[inline(always)]
     fn swap_mask(&self, morton: u8, mask: u8) -> u8 {
         let covered = self.covered.get(usize::from(morton & 63)).copied();
@@ -177,15 +178,15 @@ impl Places {
         SWAPPED.get(at).copied().unwrap_or_default()
     }
 
-    /// Takes in a record.
-    fn note_at(&mut self, last: &mut Last, place: Place) {
+    /// Updates the state with a record.
+    fn note_at(&mut self, last: &mut Last, place: QuadPlace) {
         let likeliest = self.swap_mask(place.morton, place.mask) == 15;
         self.note(last, place, likeliest);
     }
 
-    /// The same, knowing whether its mask was the likeliest one.
+    /// The same, with the result of whether its mask was the most likely one.
     #[inline(always)]
-    fn note(&mut self, last: &mut Last, place: Place, likeliest: bool) {
+    fn note(&mut self, last: &mut Last, place: QuadPlace, likeliest: bool) {
         let same_quad = !last.first_of_run
             & (place.morton == last.place.morton)
             & (place.mask == last.place.mask);
@@ -193,7 +194,7 @@ impl Places {
     }
 
     #[inline(always)]
-    fn note_other(&mut self, last: &mut Last, place: Place, likeliest: bool, same_quad: bool) {
+    fn note_other(&mut self, last: &mut Last, place: QuadPlace, likeliest: bool, same_quad: bool) {
         if let Some(follow) = self.follows.get_mut(usize::from(last.place.group) % GROUPS) {
             *follow = Follow {
                 group: place.group,
@@ -214,9 +215,9 @@ impl Places {
         last.first_of_run = false;
     }
 
-    /// Where groups take turns in the same quads, two by two, and the last record ended a quad: the group
-    /// of each quad's first record. Where the last record's group follows itself in other quads: that
-    /// group. Then [`Self::read_next_quad`] can read what comes next.
+    /// The group of the next quad's first record, if [`Self::read_next_quad`] can read it: if groups
+    /// alternate in the same quads, two by two, and the last record ended a quad, or if the last record's
+    /// group follows itself in other quads.
     #[inline(always)]
     pub fn starts_next_quad(&self, last: &Last) -> Option<u8> {
         let group = last.place.group;
@@ -227,20 +228,20 @@ impl Places {
         (alone | in_pairs).then_some(next.group)
     }
 
-    /// Group of the first record of a quad where groups take turns, two by two.
+    /// Group of the first record of a quad if groups alternate, two by two.
     pub fn first_of_two(&self, last: &Last) -> u8 {
         self.follow(last.place.group).group
     }
 
-    /// The next quad, if another one is expected: nothing but step and mask; nothing is to be remembered of
-    /// groups. `None` where it is coded otherwise and [`Self::read`] must read it.
+    /// Reads the next quad, if one is expected: only step and mask, without updating the state of groups.
+    /// `None` if it is coded differently, so that [`Self::read`] must read it.
     #[inline(always)]
     pub fn read_next_quad(
         &mut self,
         last: &mut Last,
         codes: &Codes,
         bits: u64,
-    ) -> Result<Option<(Place, u32)>, &'static str> {
+    ) -> Result<Option<(QuadPlace, u32)>, &'static str> {
         let (symbol, length) = codes.place.decode(last.later_context(), bits);
         let far = symbol >= (STEPS - 1) << 4;
         let step = if far {
@@ -267,14 +268,14 @@ impl Places {
         Ok(Some((last.place, length + if far { 6 } else { 0 })))
     }
 
-    /// The next record after `last`, from at least 57 bits; and how many of them tell it.
+    /// Reads the record after `last` from at least 57 bits. Returns the number of bits used.
     #[inline(always)]
     pub fn read(
         &mut self,
         last: &mut Last,
         codes: &Codes,
         mut bits: u64,
-    ) -> Result<(Place, u32), &'static str> {
+    ) -> Result<(QuadPlace, u32), &'static str> {
         let follow = self.follow(last.place.group);
         let mut used = 0;
         let mut before = u32::from(last.place.morton);
@@ -285,7 +286,7 @@ impl Places {
         } else if follow.same_quad {
             used = u32::from(!last.regular);
             if last.regular | (bits & 1 == 1) {
-                let place = Place {
+                let place = QuadPlace {
                     group: follow.group,
                     ..last.place
                 };
@@ -303,7 +304,7 @@ impl Places {
             if morton > 63 {
                 return Err(OUTSIDE);
             }
-            let place = Place {
+            let place = QuadPlace {
                 morton: morton.to_le_bytes()[0],
                 mask: low_u32(bits >> 6 & 15).to_le_bytes()[0],
                 group: low_u32(bits >> 10 & 15).to_le_bytes()[0],
@@ -322,7 +323,7 @@ impl Places {
             return Err(OUTSIDE);
         }
         let morton = morton.to_le_bytes()[0];
-        let place = Place {
+        let place = QuadPlace {
             morton,
             mask: self.swap_mask(morton, mask),
             group: follow.group,
@@ -330,19 +331,25 @@ impl Places {
         if step == 0 {
             self.note(last, place, mask == 15);
         } else {
-            // The context of the next code does not wait for the mask.
+            // The context of the next code does not depend on the mask, so it need not wait for it.
             self.note_other(last, place, mask == 15, false);
         }
         Ok((place, used))
     }
 
     /// Writes the next record.
-    pub fn write(&mut self, codes: &Codes, last: &mut Last, place: Place, sink: &mut impl Sink) {
+    pub fn write(
+        &mut self,
+        codes: &Codes,
+        last: &mut Last,
+        place: QuadPlace,
+        sink: &mut impl Sink,
+    ) {
         self.put(codes, last, place, sink);
         self.note_at(last, place);
     }
 
-    fn put(&self, codes: &Codes, last: &Last, place: Place, sink: &mut impl Sink) {
+    fn put(&self, codes: &Codes, last: &Last, place: QuadPlace, sink: &mut impl Sink) {
         let follow = self.follow(last.place.group);
         let mut step = u32::from(place.morton.wrapping_sub(last.place.morton));
         if last.first_of_run {
@@ -350,7 +357,7 @@ impl Places {
             sink.symbol(&codes.start, apart.into(), 0);
             step = 1;
         } else if follow.same_quad {
-            let expected = Place {
+            let expected = QuadPlace {
                 group: follow.group,
                 ..last.place
             };
@@ -380,7 +387,8 @@ impl Places {
     }
 }
 
-/// By covered lanes, then mask: see [`Places::swap_mask`]. A table, as branches would be hard to predict.
+/// By covered lanes, then mask: see [`Places::swap_mask`]. A table, because branches would be
+/// unpredictable.
 static SWAPPED: [u8; 256] = {
     let mut masks = [0; 256];
     let mut at = 0;

@@ -1,8 +1,8 @@
-//! A primitive's plane: its texture coordinates over the screen.
+//! The plane of a primitive's texture coordinates over the screen.
 //!
-//! `u * w`, `v * w` and `w` are linear in screen space. With w scaled to 1 at an origin, seven
-//! numbers besides the origin's coordinates give u and v everywhere. All of it is `f32` with
-//! additions, multiplications and divisions in a stated order, so every machine predicts the same.
+//! `u * w`, `v * w` and `w` are linear in screen space. With w scaled to 1 at an origin, seven numbers in
+//! addition to the origin's coordinates determine u and v everywhere. All numbers are `f32`, with
+//! additions, multiplications and divisions in a fixed order, so every machine predicts the same values.
 #![deny(clippy::indexing_slicing)]
 
 use crate::textrace::QuadRecord;
@@ -17,10 +17,10 @@ pub(super) fn quad_of(record: &QuadRecord) -> Quad {
     [record.uv, record.dx, record.dy, record.cross]
 }
 
-/// w is taken as at least this, so that nothing becomes infinite.
+/// Lower bound of w, which prevents infinite results.
 const LEAST_W: f32 = 1.0 / 1024.0;
-/// Weight of the expected slope of w against what a quad's cross tells: the square of about half a
-/// fixed-point step in units of the slope's usual error, 2^-9 a pixel.
+/// Weight of the expected tilt against the tilt from a quad's cross: the square of about half a fixed-point
+/// step in units of the tilt's usual error, 2^-9 per pixel.
 const PRIOR: f32 = 65536.0;
 
 /// A plane in perspective around the top-left lane of a quad.
@@ -28,7 +28,7 @@ const PRIOR: f32 = 65536.0;
 pub(super) struct Plane {
     /// Pixel column and row of the origin in the tile.
     origin: [f32; 2],
-    /// u and v at the origin: whole steps, and what is left over.
+    /// u and v at the origin: whole steps, and the fraction.
     base: [i32; 2],
     start: [f32; 2],
     /// Slope of u and v to the right, then down, both times w.
@@ -38,7 +38,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// The plane through the numbers of the quad at a place on the Morton curve, with a slope of w.
+    /// The plane through the quad at a position on the Morton curve, with the given tilt.
     #[inline(always)]
     pub fn through(morton: u8, quad: &Quad, tilt: [f32; 2]) -> Self {
         let [base, [dx_u, dx_v], [dy_u, dy_v], _] = *quad;
@@ -54,7 +54,8 @@ impl Plane {
         }
     }
 
-    /// The same with slopes of w, slopes and start changed by a correction in the units of `level`, from 1 on.
+    /// The same plane with tilt, slopes and start changed by a correction in the units of `level`, which is
+    /// at least 1.
     #[inline(always)]
     pub fn corrected(morton: u8, quad: &Quad, tilt: [f32; 2], level: u32, by: &Quad) -> Self {
         let [start, [right_u, right_v], [down_u, down_v], change] = *by;
@@ -72,10 +73,10 @@ impl Plane {
         plane
     }
 
-    /// What the plane says of the quad at a place on the Morton curve.
+    /// Predicts the quad at a position on the Morton curve.
     #[inline(always)]
     pub fn predict(&self, morton: u8) -> Quad {
-        // u and v of a lane and of the one to its right; the upper two lanes, then the lower two.
+        // u and v of a lane and of the lane to its right: the upper two lanes, then the lower two.
         const OF_RIGHT: Vec4 = Vec4::new(0.0, 0.0, 1.0, 1.0);
         let [left, top] = self.origin.map(Vec4::splat);
         let [right, down] = quad_at(morton);
@@ -99,7 +100,7 @@ impl Plane {
         [uv, dx, dy, cross]
     }
 
-    /// Slope of w around a quad, where w there is 1.
+    /// Tilt around a quad, scaled to w = 1 there.
     #[inline(always)]
     pub fn tilt_at(&self, morton: u8) -> [f32; 2] {
         let [left, top] = self.origin;
@@ -111,8 +112,8 @@ impl Plane {
     }
 }
 
-/// By place on the Morton curve: the columns of the left lane (twice, for u and v) and of the right one, and
-/// the row of the upper lanes, in the tile.
+/// By position on the Morton curve: the columns of the left lane (twice, for u and v) and of the right one,
+/// and the row of the upper lanes, in the tile.
 static QUADS: [[[f32; 4]; 2]; 64] = {
     let mut quads = [[[0.0; 4]; 2]; 64];
     let mut at = 0;
@@ -136,8 +137,8 @@ fn quad_at(morton: u8) -> [Vec4; 2] {
     [Vec4::from_array(right), Vec4::from_array(down)]
 }
 
-/// Nearest integers, ties to even, and others added to them: adding 1.5 * 2^23 leaves them in the low bits.
-/// Right below 2^22; beyond, a prediction is a bad one, but the same everywhere.
+/// Rounds to the nearest integers, ties to even, and adds others. Adding 1.5 * 2^23 leaves them in the low
+/// bits. Exact below 2^22; beyond, predictions are poor but the same on every machine.
 #[inline(always)]
 fn rounded(numbers: Vec4, and: [i32; 4]) -> [[i32; 2]; 2] {
     let [a, b, c, d] = (numbers + Vec4::splat(MAGIC)).to_array();
@@ -150,14 +151,14 @@ fn rounded(numbers: Vec4, and: [i32; 4]) -> [[i32; 2]; 2] {
 
 const MAGIC: f32 = 12_582_912.0;
 
-/// The integer in the low bits of a sum with [`MAGIC`], and another one added to it.
+/// Adds an integer to the one in the low bits of a sum with [`MAGIC`].
 #[inline(always)]
 fn near(sum: f32, and: i32) -> i32 {
     let bits = sum.to_bits().cast_signed();
     bits.wrapping_add(and.wrapping_sub(MAGIC.to_bits().cast_signed()))
 }
 
-/// What a correction of 1 stands for.
+/// Units of a correction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Units {
     pub start: f32,
@@ -166,11 +167,11 @@ pub(super) struct Units {
 }
 
 impl Units {
-    /// The finer, the higher the level; slopes of w the finer, too, the larger dx and dy are.
+    /// Higher levels have finer units. The units of the tilt are also finer for larger dx and dy.
     #[inline(always)]
     pub fn new(level: u32, quad: &Quad) -> Self {
         let [_, [a, b], [c, d], _] = *quad;
-        // As many bits as the largest magnitude, or as its complement's.
+        // Number of bits of the largest magnitude (or of its complement).
         let all = (a ^ a >> 31) | (b ^ b >> 31) | (c ^ c >> 31) | (d ^ d >> 31);
         Self {
             start: 0.25,
@@ -186,7 +187,7 @@ fn power(n: u32) -> f32 {
     f32::from_bits((127 - n.min(126)) << 23)
 }
 
-/// cross of a quad whose dx and dy are known, with a slope of w; as if w were 1 over all of the quad.
+/// Predicts a quad's cross from its dx and dy and the tilt, assuming w = 1 over the whole quad.
 #[inline(always)]
 pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f32; 2]) -> [i32; 2] {
     let [p, q] = tilt;
@@ -195,8 +196,8 @@ pub(super) fn cross(dx: [i32; 2], dy: [i32; 2], tilt: [f32; 2]) -> [i32; 2] {
     [of(dx_u, dy_u), of(dx_v, dy_v)]
 }
 
-/// The slope of w that a quad's own numbers tell, kept near an expected one: cross is
-/// `-(dx * q + dy * p) / (1 + p + q)` for u and for v, so least squares with a prior.
+/// Estimates the tilt from a quad's numbers, close to the expected one. cross is
+/// `-(dx * q + dy * p) / (1 + p + q)` for u and for v, so this is least squares with a prior.
 #[inline(always)]
 pub(super) fn tilt_of(quad: &Quad, expected: [f32; 2]) -> [f32; 2] {
     let [_, dx, dy, cross] = quad.map(|pair| Vec2::from_array(floats(pair)));
@@ -214,7 +215,7 @@ pub(super) fn tilt_of(quad: &Quad, expected: [f32; 2]) -> [f32; 2] {
     ]
 }
 
-/// Not `map`, which is not always inlined.
+/// Written out because `map` is not always inlined.
 #[inline(always)]
 #[allow(clippy::cast_precision_loss, reason = "the nearest f32 is meant")]
 fn floats([a, b]: [i32; 2]) -> [f32; 2] {
@@ -227,7 +228,7 @@ fn four([a, b, c, d]: [i32; 4]) -> Vec4 {
     Vec4::new(a as f32, b as f32, c as f32, d as f32)
 }
 
-/// At least -1 and at most 1, which is also what becomes of no number.
+/// Clamps to -1..=1; NaN becomes 1.
 #[inline(always)]
 fn within_one(slope: f32) -> f32 {
     let slope = if slope < 1.0 { slope } else { 1.0 };

@@ -1,4 +1,4 @@
-//! Residuals: pairs of small numbers in classes, larger ones by their width.
+//! Residuals: pairs of small numbers by class, larger ones by their width.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::plane::Quad;
@@ -7,21 +7,21 @@ use crate::varint::{low_u32, zigzag};
 /// A pair (u, v).
 pub(super) type Pair = [i32; 2];
 
-/// Number of classes of a pair: 0 both are 0; 1 one of them is 1 or -1, the other one 0; 2 both are 1 or
-/// -1; 3 the larger one is 2 or -2; 4 anything else.
+/// Number of classes of a pair. 0: both are 0. 1: one is 1 or -1, the other 0. 2: both are 1 or -1. 3: the
+/// larger one is 2 or -2. 4: anything else.
 const CLASSES: u32 = 5;
-/// The class that tells its width.
+/// The class whose width is coded.
 pub(super) const WIDE: u32 = 4;
-/// How many codes tell the classes of a mode.
+/// Number of codes for the classes of a mode.
 pub(super) const NOISES: usize = 6;
-/// Symbols of the classes of four pairs, and the one after which they follow as numbers.
+/// Number of symbols of four classes, and the symbol after which classes follow as numbers.
 pub(super) const ESCAPE_SIZES: u32 = CLASSES.pow(4);
-/// Bits of such a number.
+/// Number of bits of such a number.
 pub(super) const CLASS_NUMBER_BITS: u32 = 3;
 
-/// Bits that name a pair in each class, a hexadecimal digit each from the lowest.
+/// Number of bits that identify a pair in each class, one hexadecimal digit per class from the lowest.
 const CLASS_BITS: u32 = 0x0_4220;
-/// First pair of each class, likewise.
+/// Index of each class's first pair, in the same form.
 const STARTS: u32 = 0x0_9510;
 
 /// The pairs of the classes 0 to 3, each class by u, then v.
@@ -64,18 +64,18 @@ const fn class_of(u: i32, v: i32) -> u32 {
     }
 }
 
-/// What the classes of a quad's four pairs come to, in fields.
+/// Facts derived from the classes of a quad's four pairs, as bit fields.
 ///
 /// | bits | content |
 /// | --- | --- |
-/// | 0 to 4 | bits of all that names small pairs |
-/// | 5 to 8 | of those, the bits of the first two pairs |
-/// | 9 to 11 | which code tells of the group's next residuals |
+/// | 0 to 4 | number of bits that identify small pairs |
+/// | 5 to 8 | number of those bits for the first two pairs |
+/// | 9 to 11 | index of the code for the group's next residuals |
 /// | 12 | a pair is wide |
 /// | 13 | the classes follow as numbers |
-/// | 16 to 25, 32 to 41 | first of the first two pairs in [`TWO_PAIRS`], and of the last two |
+/// | 16 to 25, 32 to 41 | index in [`TWO_PAIRS`] for the first two pairs, and for the last two |
 /// | 26 to 29 | which pairs are wide |
-/// | 48 to 55, 56 to 63 | ones in the bits that name the first two pairs, and the last two |
+/// | 48 to 55, 56 to 63 | mask of the bits that identify the first two pairs, and the last two |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Classes(u64);
 
@@ -102,26 +102,26 @@ impl Classes {
         Self(low as u64 | (middle as u64) << 16 | (high as u64) << 48)
     }
 
-    /// Those of a symbol.
+    /// The classes of a symbol.
     #[inline(always)]
     pub fn of_symbol(symbol: u32) -> Self {
         let found = OF_SYMBOL.get(symbol as usize % OF_SYMBOL.len());
         found.copied().unwrap_or_default()
     }
 
-    /// Bits that name the small pairs.
+    /// Number of bits that identify the small pairs.
     #[inline(always)]
     pub fn bits(self) -> u32 {
         low_u32(self.0) & 31
     }
 
-    /// Which code tells of the group's next residuals.
+    /// Index of the code for the group's next residuals.
     #[inline(always)]
     pub fn noise(self) -> usize {
         (low_u32(self.0) >> 9 & 7) as usize
     }
 
-    /// The small pairs that bits name; a wide one is taken for 0.
+    /// The small pairs identified by bits; wide ones are 0.
     #[inline(always)]
     pub fn small_pairs(self, bits: u64) -> Quad {
         let two = |start: u64, ones: u64, bits: u64| {
@@ -135,19 +135,19 @@ impl Classes {
         [uv, dx, dy, cross]
     }
 
-    /// There is more to do: pairs are wide, or the classes follow as numbers.
+    /// Whether further decoding is needed: pairs are wide, or the classes follow as numbers.
     #[inline(always)]
     pub fn is_special(self) -> bool {
         low_u32(self.0) >> 12 & 3 != 0
     }
 
-    /// The classes follow as numbers.
+    /// Whether the classes follow as numbers.
     #[inline(always)]
     pub fn is_escape(self) -> bool {
         low_u32(self.0) >> 13 & 1 != 0
     }
 
-    /// Which pairs are wide: 1 for each of uv, dx, dy and cross, else 0.
+    /// Which pairs are wide: 1 for each wide one of uv, dx, dy and cross, else 0.
     #[inline(always)]
     pub fn wide(self) -> [u32; 4] {
         let wide = low_u32(self.0 >> 26);
@@ -155,7 +155,7 @@ impl Classes {
     }
 }
 
-/// As long as makes checks of its indices needless.
+/// Long enough that the compiler can remove index checks.
 static OF_SYMBOL: [Classes; 1024] = {
     let mut table = [Classes(1 << 13); 1024];
     let mut s = 0;
@@ -174,7 +174,7 @@ pub(super) fn symbol([uv, dx, dy, cross]: [u32; 4]) -> u32 {
     uv + CLASSES * (dx + CLASSES * (dy + CLASSES * cross))
 }
 
-/// Two pairs by their classes, then by the bits that name them.
+/// Two pairs by their classes, then by the bits that identify them.
 static TWO_PAIRS: [[Pair; 2]; 1024] = {
     let mut pairs = [[[0; 2]; 2]; 1024];
     let mut classes = 0;
@@ -207,7 +207,7 @@ const fn two_start(one: u32, other: u32) -> u32 {
     start
 }
 
-/// The pair of a class that some bits name.
+/// The pair of a class with these bits.
 #[allow(
     clippy::indexing_slicing,
     reason = "evaluated when compiled, or a test"
@@ -222,13 +222,13 @@ const fn nibble(digits: u32, at: u32) -> u32 {
     digits >> (4 * at) & 15
 }
 
-/// Bits of a class.
+/// Number of bits of a class.
 #[inline(always)]
 pub(super) const fn class_bits(class: u32) -> u32 {
     nibble(CLASS_BITS, class)
 }
 
-/// Class of a pair and, unless it is wide, the bits that name it.
+/// Class of a pair and, unless it is wide, the bits that identify it.
 pub(super) fn classify([u, v]: Pair) -> (u32, u32) {
     let place = |number: i32| usize::try_from(number.checked_add(2)?).ok();
     let found = place(u)
@@ -257,18 +257,18 @@ const NAMES: [[(u32, u32); 5]; 5] = {
     names
 };
 
-/// Bits that the larger of a pair needs.
+/// Number of bits of the larger number of a pair.
 pub(super) fn width(pair: Pair) -> u32 {
     let [u, v] = pair.map(fold);
     32 - (u | v).leading_zeros()
 }
 
-/// A number as it is stored: 0, -1, 1, -2, ...
+/// A number in its stored form: 0, -1, 1, -2, ...
 pub(super) fn fold(number: i32) -> u32 {
     low_u32(zigzag(number.into()))
 }
 
-/// The number that is stored so.
+/// The number with this stored form.
 #[inline(always)]
 pub(super) fn unfold(stored: u64) -> i32 {
     let stored = low_u32(stored);

@@ -6,7 +6,7 @@
 
 use super::codes::{Code, Codes, MOST_BITS};
 use super::lengths::LENGTHS;
-use super::mode::{Departure, Mode};
+use super::mode::{Deviation, Mode};
 use super::places::ESCAPE_PLACE;
 use super::plane::{Plane, Quad, tilt_of};
 use super::residual::{Classes, ESCAPE_SIZES, class_bits, classify, small, symbol, width};
@@ -16,7 +16,7 @@ use crate::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, quad_morton};
 use crate::varint::low_u32;
 use proptest::prelude::*;
 
-/// Coordinates in perspective in two groups, as a capture rounds them.
+/// Coordinates in perspective in two groups, rounded as in a capture.
 fn record(x: u8, y: u8, group: u8, mask: u8, bend: f64) -> QuadRecord {
     let at = |x: f64, y: f64| {
         let w = 1.0 + 0.004 * x - 0.009 * y;
@@ -41,7 +41,7 @@ fn record(x: u8, y: u8, group: u8, mask: u8, bend: f64) -> QuadRecord {
     }
 }
 
-/// A tile that one primitive covers, a record for each quad and group.
+/// A tile covered by one primitive, with a record for each quad and group.
 fn covered(groups: u8, bend: f64) -> Tile {
     let mut records: Vec<QuadRecord> = (0..64u8)
         .flat_map(|at| (0..groups).map(move |group| record(at % 8, at / 8, group, 15, bend)))
@@ -72,25 +72,25 @@ fn bytes_a_record(tile: &Tile) -> f64 {
 }
 
 #[test]
-fn a_plane_in_perspective_takes_less_than_two_bytes_a_quad() {
+fn a_plane_in_perspective_takes_less_than_two_bytes_per_quad() {
     let bytes = bytes_a_record(&covered(1, 0.0));
-    assert!(bytes < 1.6, "{bytes} bytes a record");
+    assert!(bytes < 1.6, "{bytes} bytes per record");
 }
 
 #[test]
-fn a_second_group_of_the_same_quads_costs_no_place() {
+fn a_second_group_of_the_same_quads_takes_no_bits_for_places() {
     let bytes = bytes_a_record(&covered(2, 0.0));
-    assert!(bytes < 1.5, "{bytes} bytes a record");
+    assert!(bytes < 1.5, "{bytes} bytes per record");
 }
 
 #[test]
-fn a_surface_that_is_no_plane_is_followed() {
+fn a_curved_surface_is_predicted() {
     let bytes = bytes_a_record(&covered(1, 0.5));
-    assert!(bytes < 4.0, "{bytes} bytes a record");
+    assert!(bytes < 4.0, "{bytes} bytes per record");
 }
 
 #[test]
-fn numbers_at_the_ends_of_their_range_come_back() {
+fn numbers_at_the_ends_of_their_range_are_decoded() {
     let extremes = [i32::MIN, i32::MAX, 0, -1];
     let mut tile = Tile::default();
     for (number, group) in [(0, 0), (1, NO_GROUP)] {
@@ -131,7 +131,7 @@ fn cut_or_longer_bytes_are_refused() {
 }
 
 #[test]
-fn other_counts_than_the_index_tells_are_refused() {
+fn counts_that_differ_from_the_index_are_refused() {
     let tile = covered(1, 0.0);
     let bytes = encode(&tile);
     for (runs, records) in [(1, 63), (1, 65), (2, 64), (0, 64), (u32::MAX, u32::MAX)] {
@@ -146,7 +146,7 @@ fn other_counts_than_the_index_tells_are_refused() {
 }
 
 #[test]
-fn every_code_is_complete_and_has_an_escape_where_symbols_lack() {
+fn every_code_is_complete_and_has_an_escape_if_symbols_are_missing() {
     for (number, lengths) in LENGTHS.iter().enumerate() {
         let lengths: Vec<u32> = lengths.chars().map(|c| c.to_digit(16).unwrap()).collect();
         let used = lengths.iter().filter(|length| **length > 0);
@@ -155,7 +155,7 @@ fn every_code_is_complete_and_has_an_escape_where_symbols_lack() {
         let escape = match lengths.len() as u32 - 1 {
             111 => Some(ESCAPE_PLACE),
             ESCAPE_SIZES => Some(ESCAPE_SIZES),
-            // Of widths, the widest.
+            // For widths, the escape is the widest.
             last @ (511 | 1023 | 2047) => Some(last),
             _ => None,
         };
@@ -167,7 +167,7 @@ fn every_code_is_complete_and_has_an_escape_where_symbols_lack() {
 }
 
 #[test]
-fn the_documented_lengths_are_the_codes() {
+fn the_documented_lengths_equal_those_of_the_code() {
     let text = include_str!("../../../../FORMAT.md");
     let (_, text) = text.split_once("### Code lengths of encoding 3\n").unwrap();
     let block = text.split("```\n").nth(1).unwrap();
@@ -176,7 +176,7 @@ fn the_documented_lengths_are_the_codes() {
 }
 
 #[test]
-fn symbols_come_back_from_their_bits() {
+fn symbols_are_decoded_from_their_bits() {
     let codes = Codes::get();
     for family in [&codes.place, &codes.sizes] {
         for (context, code) in family.codes.iter().enumerate() {
@@ -192,7 +192,7 @@ fn symbols_come_back_from_their_bits() {
 }
 
 #[test]
-fn small_pairs_come_back_from_class_and_index() {
+fn small_pairs_are_decoded_from_class_and_index() {
     for u in -2..=2i32 {
         for v in -2..=2i32 {
             let (class, index) = classify([u, v]);
@@ -211,7 +211,7 @@ fn small_pairs_come_back_from_class_and_index() {
 }
 
 #[test]
-fn four_pairs_come_back_from_their_symbol_and_bits() {
+fn four_pairs_are_decoded_from_their_symbol_and_bits() {
     for each in 0..ESCAPE_SIZES {
         let of = [each % 5, each / 5 % 5, each / 25 % 5, each / 125];
         assert_eq!(symbol(of), each);
@@ -238,7 +238,7 @@ fn a_quad_without_its_second_group_makes_a_run_irregular() {
     let mut tile = covered(2, 0.0);
     let first = tile.runs[0];
     let mut second = covered(2, 0.0).records;
-    // Once the second group comes without the first one, once the first one alone.
+    // In one case the second group occurs alone, in the other the first one.
     second.remove(20);
     second.remove(41);
     tile.runs[0].primitive = 3;
@@ -252,7 +252,7 @@ fn a_quad_without_its_second_group_makes_a_run_irregular() {
 }
 
 #[test]
-fn a_plane_passes_through_the_quad_it_was_made_from() {
+fn a_plane_passes_through_its_quad() {
     let quad = record(3, 5, 0, 15, 0.0);
     let quad = [quad.uv, quad.dx, quad.dy, quad.cross];
     // In the quad's own frame, by the closed form of w around it.
@@ -274,12 +274,12 @@ fn a_plane_passes_through_the_quad_it_was_made_from() {
 }
 
 #[test]
-fn a_quad_tells_how_its_surface_is_tilted() {
-    // Far from what is expected, but cross is large.
+fn the_tilt_is_estimated_from_a_quad() {
+    // Far from the expected tilt, but with a large cross.
     let [p, q] = [0.02, -0.03];
     let [dx, dy] = [[9000, -4000], [1500, 8000]];
-    let told = |axis: usize| -f64::from(dx[axis]) * q - f64::from(dy[axis]) * p;
-    let cross = [0, 1].map(|axis| (told(axis) / (1.0 + p + q)).round() as i32);
+    let estimate = |axis: usize| -f64::from(dx[axis]) * q - f64::from(dy[axis]) * p;
+    let cross = [0, 1].map(|axis| (estimate(axis) / (1.0 + p + q)).round() as i32);
     let found = tilt_of(&[[0; 2], dx, dy, cross], [0.0; 2]);
     for (found, exact) in found.iter().zip([p, q]) {
         assert!(
@@ -287,14 +287,14 @@ fn a_quad_tells_how_its_surface_is_tilted() {
             "{found}, not {exact}"
         );
     }
-    // The squares of such numbers are beyond f32: the slopes stay numbers.
+    // The squares of such numbers exceed f32, but the slopes must stay finite.
     let largest = [[i32::MAX, i32::MIN], [i32::MIN, i32::MAX]];
     let [one, other] = largest;
     let found = tilt_of(&[one, one, other, other], [0.5, -0.5]);
     assert!(found.iter().all(|slope| slope.abs() <= 1.0), "{found:?}");
 }
 
-/// Every symbol of a code, against the one that the encoder chooses.
+/// Compares every symbol of a code with the encoder's choice.
 fn chosen_is_best<const N: usize>(
     code: &Code,
     layout: Layout<N>,
@@ -321,7 +321,7 @@ fn quad() -> impl Strategy<Value = Quad> {
 }
 
 proptest! {
-    /// The checksum guards against damage; against malice only care in the decoder does.
+    /// The checksum detects damage; the decoder must also tolerate malicious bytes.
     #[test]
     fn arbitrary_bytes_never_panic(
         bytes in prop::collection::vec(any::<u8>(), 0..400), runs in 0..40u32, records in 0..2000u32,
@@ -345,7 +345,7 @@ proptest! {
     }
 
     #[test]
-    fn widths_are_told_in_fewest_bits(shifts in prop::array::uniform4(0..32u32), bits in any::<i32>()) {
+    fn widths_are_coded_in_the_fewest_bits(shifts in prop::array::uniform4(0..32u32), bits in any::<i32>()) {
         let codes = Codes::get();
         let choices = codes.choices();
         let [a, b, c, d] = shifts.map(|shift| [bits >> shift, !(bits >> shift) / 2]);
@@ -353,16 +353,16 @@ proptest! {
         for (code, choices) in codes.rest.codes.iter().zip(&choices.rest) {
             chosen_is_best(code, DY_AND_CROSS, choices, [c, d]);
         }
-        // What a correction may hold.
+        // The range of a correction.
         let within = |[u, v]: [i32; 2], bits: u32| [u >> (32 - bits), v >> (32 - bits)];
         let correction = [within(a, 5), within(b, 9), within(c, 9), within(d, 16)];
         chosen_is_best(&codes.correction, CORRECTION, &choices.correction, correction);
     }
 
     #[test]
-    fn departures_come_back_in_every_mode(quads in prop::collection::vec((0..8u8, 0..8u8, quad()), 1..9)) {
+    fn deviations_are_decoded_in_every_mode(quads in prop::collection::vec((0..8u8, 0..8u8, quad()), 1..9)) {
         for mode in Mode::ALL {
-            let mut written = Departure::start(mode, 2, 3);
+            let mut written = Deviation::start(mode, 2, 3);
             let mut read = written;
             for (x, y, quad) in &quads {
                 let residual = written.write(*x, *y, quad);

@@ -1,6 +1,7 @@
-//! Where the code lengths come from: `TEXTRACES=a.textrace:b.textrace cargo test --release
-//! -p formats --lib planes::train -- --ignored --nocapture` counts symbols in traces and prints
-//! `lengths.rs` for them, `ROUNDS` times over, of every `EVERY`th tile; and where the bits of a record go.
+//! Computes the code lengths.
+//! `TEXTRACES=a.textrace:b.textrace cargo test --release -p formats --lib planes::train -- --ignored --nocapture`
+//! counts symbols in traces and prints `lengths.rs` for them, and the bits of a record by purpose. It
+//! repeats this `ROUNDS` times and uses every `EVERY`th tile.
 #![allow(
     clippy::indexing_slicing,
     clippy::cast_possible_truncation,
@@ -16,7 +17,7 @@ use super::widths::{CORRECTION, DX_AND_UV, DY_AND_CROSS};
 use crate::textrace::{Textrace, Tile};
 use std::path::Path;
 
-/// Counts what an encoder would write.
+/// Counts the encoder's output.
 struct Counts {
     by_code: Vec<Vec<u64>>,
     /// Bits by code: of its symbols and of the numbers after them.
@@ -25,7 +26,7 @@ struct Counts {
 }
 
 impl Counts {
-    /// For codes of these lengths.
+    /// Starts with codes of these lengths.
     fn new(texts: &[String]) -> Self {
         Self {
             by_code: texts.iter().map(|l| vec![0; l.len()]).collect(),
@@ -68,8 +69,8 @@ fn row(code: usize) -> usize {
 /// The code of parents' numbers.
 const PARENT: usize = CODES - 2;
 
-/// Bits of the numbers that a symbol of a first quad tells.
-fn told_bits(code: usize, symbol: u32) -> u32 {
+/// Number of bits of the numbers that follow a symbol of a first quad.
+fn number_bits(code: usize, symbol: u32) -> u32 {
     let both = match code {
         41 => DX_AND_UV.widths(symbol).iter().sum(),
         42..=47 => DY_AND_CROSS.widths(symbol).iter().sum(),
@@ -81,7 +82,7 @@ fn told_bits(code: usize, symbol: u32) -> u32 {
 
 impl Sink for Counts {
     fn bits(&mut self, _: u32, count: u32) {
-        // A first quad's numbers follow all of its symbols, which have told their bits.
+        // A first quad's numbers come after all of its symbols, which determine their bits.
         if !matches!(row(self.last), 1 | 2) {
             self.bits[self.last][1] += u64::from(count);
         }
@@ -93,12 +94,12 @@ impl Sink for Counts {
         let length = code.length(symbol, code.length(escape, 0));
         let [of_symbols, of_numbers] = &mut self.bits[code.number];
         *of_symbols += u64::from(length);
-        *of_numbers += u64::from(told_bits(code.number, symbol));
+        *of_numbers += u64::from(number_bits(code.number, symbol));
         code.encode(symbol).is_some()
     }
 }
 
-/// Code lengths of at most [`MOST_BITS`] for symbols seen so often, by the package-merge method.
+/// Code lengths of at most [`MOST_BITS`] for these symbol counts, by the package-merge method.
 fn lengths(counts: &[u64]) -> Vec<u32> {
     let mut items: Vec<(u64, Vec<usize>)> = (0..counts.len())
         .filter(|symbol| counts[*symbol] > 0)
@@ -172,15 +173,15 @@ fn train() {
         }
         texts = (0..CODES)
             .map(|code| {
-                // Every trace weighs the same.
+                // Every trace has the same weight.
                 let mut counts = vec![0u64; texts[code].len()];
                 for (by_code, records) in &sums {
                     for (sum, count) in counts.iter_mut().zip(&by_code[code]) {
                         *sum += count * 100_000_000 / *records as u64;
                     }
                 }
-                // What tells symbols that are not in the code, and whether it is told instead of them: of widths,
-                // other symbols are.
+                // The escape of symbols that are not in the code, and whether it is used. For widths, other
+                // symbols serve as escapes.
                 let escape = match code {
                     0..17 => Some((ESCAPE_PLACE as usize, true)),
                     17..41 => Some((ESCAPE_SIZES as usize, true)),

@@ -1,11 +1,12 @@
-//! Widths of several pairs, told by one symbol.
+//! Widths of several pairs, coded by one symbol.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::codes::Code;
 use super::residual::{Pair, width};
 use std::array::from_fn;
 
-/// Pairs of at most this width fit in one look at the bits; wider ones have 32 bits, which hold any number.
+/// Largest width of pairs that can be read from one peek at the bits. Wider ones have 32 bits, which hold
+/// any number.
 pub(super) const MOST_WIDTH: u32 = 28;
 
 /// Widths of a first quad's dx, dy and uv, by level.
@@ -13,17 +14,17 @@ pub(super) const EACH: [u8; 32] = [
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25,
     26, 27, 28, 32, 32, 32,
 ];
-/// Those of its cross.
+/// Widths of its cross.
 pub(super) const CROSS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 13, 16, 20, 32];
-/// Those of a correction's start.
+/// Widths of a correction's start.
 pub(super) const START: [u8; 4] = [1, 2, 3, 5];
-/// Those of a correction's slopes.
+/// Widths of a correction's slopes.
 pub(super) const SLOPE: [u8; 8] = [1, 2, 3, 4, 5, 6, 7, 9];
-/// Those of a correction's tilt.
+/// Widths of a correction's tilt.
 pub(super) const TILT: [u8; 8] = [4, 5, 6, 7, 8, 9, 11, 16];
 
-/// What a symbol stands for: a level for each of several pairs, from its lowest bits on. The highest symbol
-/// tells the widest numbers of all of them, so it has to be in every code.
+/// Structure of a symbol: a level for each of several pairs, from its lowest bits on. The highest symbol
+/// has the largest widths of all pairs, so it must be in every code.
 #[derive(Clone, Copy)]
 pub(super) struct Layout<const PAIRS: usize>(pub [&'static [u8]; PAIRS]);
 
@@ -34,7 +35,7 @@ pub(super) const DY_AND_CROSS: Layout<2> = Layout([&EACH, &CROSS]);
 /// Start, slopes to the right and down, and tilt of a correction.
 pub(super) const CORRECTION: Layout<4> = Layout([&START, &SLOPE, &SLOPE, &TILT]);
 
-/// A level's width.
+/// Width of a level.
 #[inline(always)]
 pub(super) fn of_level<const N: usize>(levels: &[u8; N], level: u32) -> u32 {
     let width = levels.get(level as usize % N).copied();
@@ -42,7 +43,7 @@ pub(super) fn of_level<const N: usize>(levels: &[u8; N], level: u32) -> u32 {
 }
 
 impl<const PAIRS: usize> Layout<PAIRS> {
-    /// Symbols that there are.
+    /// Number of symbols.
     pub fn symbols(&self) -> usize {
         self.0.iter().map(|levels| levels.len()).product()
     }
@@ -57,7 +58,7 @@ impl<const PAIRS: usize> Layout<PAIRS> {
     }
 }
 
-/// A symbol, the widths that it tells, and the bits that it and the numbers take.
+/// A symbol, its widths, and the number of bits of the symbol and the numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chosen<const PAIRS: usize> {
     pub symbol: u32,
@@ -65,11 +66,11 @@ pub(super) struct Chosen<const PAIRS: usize> {
     pub bits: u32,
 }
 
-/// Which symbol of a code tells pairs in fewest bits.
+/// The symbols of a code that encode pairs in the fewest bits.
 pub(super) struct Choices<const PAIRS: usize> {
-    /// By width, the narrowest level of each pair that holds it, as part of a symbol.
+    /// By width, the narrowest sufficient level of each pair, as part of a symbol.
     narrowest: [[usize; 33]; PAIRS],
-    /// By the symbol of the narrowest levels.
+    /// The best symbol, by the symbol of the narrowest levels.
     best: Vec<Chosen<PAIRS>>,
 }
 
@@ -79,7 +80,7 @@ impl<const PAIRS: usize> Choices<PAIRS> {
             .take(layout.symbols())
             .map(|symbol| {
                 let widths = layout.widths(symbol);
-                // What is not in the code is never the best.
+                // Symbols that are not in the code are never the best.
                 let bits = code.length(symbol, 1 << 16) + 2 * widths.iter().sum::<u32>();
                 Chosen {
                     symbol,

@@ -104,7 +104,7 @@ fn every_order_writes_the_same_accesses() {
 }
 
 #[test]
-fn csv_and_json_lines_have_a_line_an_access() {
+fn csv_and_json_lines_have_one_line_per_access() {
     let file = file_of(&small());
     let trace = Trace::open(file.path()).unwrap();
     let config = RunConfig::default();

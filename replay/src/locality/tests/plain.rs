@@ -110,7 +110,7 @@ pub fn split(origins: &[Option<Origin>], own: &[bool], all: &[bool]) -> MissSpli
         compulsory: origins.iter().filter(|origin| origin.is_none()).count() as u64,
         capacity: count(false, false),
         conflict: count(false, true),
-        spared: count(true, false),
+        avoided: count(true, false),
         hits_of_both: count(true, true),
     }
 }

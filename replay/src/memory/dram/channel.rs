@@ -1,7 +1,7 @@
 //! A DRAM channel: its queues, its banks and the earliest clock of each command.
 
 use super::PagePolicy;
-use super::mapping::Place;
+use super::mapping::BurstAddress;
 use super::presets::Device;
 use std::collections::VecDeque;
 
@@ -33,7 +33,7 @@ pub struct Counts {
 /// A queued request.
 #[derive(Clone, Copy, Debug)]
 struct Request {
-    place: Place,
+    place: BurstAddress,
     arrival: u64,
     /// The first command it needed.
     needed: Option<Needed>,
@@ -75,7 +75,7 @@ pub struct Channel {
     /// True while writes are served.
     is_writing: bool,
     /// Requests that found their queue full: place, true for writes, and arrival clock if given.
-    backlog: VecDeque<(Place, bool, Option<u64>)>,
+    backlog: VecDeque<(BurstAddress, bool, Option<u64>)>,
     /// The next free clock of the command bus.
     now: u64,
     refresh_due: u64,
@@ -112,7 +112,7 @@ impl Channel {
     }
 
     /// Adds a request that arrives at `clock`, or without one as soon as the queue has room.
-    pub fn arrive(&mut self, place: Place, write: bool, clock: Option<u64>) {
+    pub fn arrive(&mut self, place: BurstAddress, write: bool, clock: Option<u64>) {
         if let Some(clock) = clock {
             // Later requests cannot change earlier commands.
             while self.is_busy() && self.step(Some(clock)) {}
@@ -229,7 +229,7 @@ impl Channel {
     /// The next command of a request and its earliest clock. None while queued requests still need
     /// the bank's open row.
     fn next_command(&self, request: &Request) -> Option<(u64, Needed)> {
-        let Place {
+        let BurstAddress {
             bank, group, row, ..
         } = request.place;
         let (bank_state, group) = (&self.banks[bank as usize], group as usize);
@@ -264,7 +264,7 @@ impl Channel {
         bank.activate_from = bank.activate_from.max(clock + u64::from(self.device.rp));
     }
 
-    fn activate(&mut self, place: Place, clock: u64) {
+    fn activate(&mut self, place: BurstAddress, clock: u64) {
         let device = &self.device;
         let bank = &mut self.banks[place.bank as usize];
         bank.row = Some(place.row);

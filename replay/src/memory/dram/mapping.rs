@@ -21,7 +21,7 @@ pub enum Mapping {
 
 /// Location of a burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct BurstAddress {
     /// Channel.
     pub channel: u32,
     /// Bank group.
@@ -55,7 +55,7 @@ impl Mapper {
     }
 
     /// The location of a burst.
-    pub const fn place(&self, burst: u64) -> Place {
+    pub const fn place(&self, burst: u64) -> BurstAddress {
         let mut rest = burst;
         let channel = take(&mut rest, self.channel_bits);
         let bank = match self.mapping {
@@ -74,7 +74,7 @@ impl Mapper {
             Mapping::RowBankXorColumnChannel => bank ^ take(&mut rest, self.bank_bits),
             _ => bank,
         };
-        Place {
+        BurstAddress {
             channel,
             // Consecutive banks lie in different groups, because reads of different groups can follow most closely.
             group: bank % self.groups,

@@ -1,5 +1,5 @@
 use super::channel::Channel;
-use super::mapping::{Mapper, Place};
+use super::mapping::{BurstAddress, Mapper};
 use super::*;
 
 const ALL: [DramPreset; 4] = [
@@ -254,7 +254,7 @@ fn every_burst_has_a_place_of_its_own() {
             let mut rows = std::collections::HashMap::new();
             let bursts = 4 * device.banks() * per_row * 4;
             for burst in 0..u64::from(bursts) {
-                let Place {
+                let BurstAddress {
                     channel, bank, row, ..
                 } = mapper.place(burst);
                 *rows.entry((channel, bank, row)).or_insert(0) += 1;

@@ -1,5 +1,5 @@
-//! How far headline figures are from the truth, as `replay accuracy` has measured it on the scenes
-//! that the table names. What nobody has measured is not in the table.
+//! Known errors of headline figures, measured by `replay accuracy` on the scenes that the table names.
+//! Errors that were not measured are not in the table.
 
 use super::columns::Column;
 use super::html::Section;
@@ -9,14 +9,14 @@ use maud::html;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
-/// A part of a figure's error.
+/// A contribution to a figure's error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KnownError {
     /// Key of the figure.
     pub figure: String,
     /// Its name.
     pub name: String,
-    /// What the error comes from: `capture`, `lod`, `timing`, `calibration`, `model`.
+    /// Source of the error: `capture`, `lod`, `timing`, `calibration`, `model`.
     pub contribution: String,
     /// Mean absolute error.
     pub mean: f64,
@@ -24,21 +24,21 @@ pub struct KnownError {
     pub largest: f64,
     /// Unit of both.
     pub unit: String,
-    /// Scenes that it was measured on.
+    /// Scenes of the measurement.
     pub scenes: String,
-    /// How.
+    /// Command of the measurement.
     pub command: String,
 }
 
 static ERRORS: LazyLock<Vec<KnownError>> = LazyLock::new(|| parse(include_str!("measured.csv")));
 
-/// Lines that do not parse are left out; a test holds that there are none.
+/// Skips lines that do not parse; a test checks that there are none.
 fn parse(text: &str) -> Vec<KnownError> {
     let mut lines = csv::Reader::from_reader(text.as_bytes());
     lines.deserialize().filter_map(Result::ok).collect()
 }
 
-/// What figures are of.
+/// Kind of trace that the figures are computed from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Of {
     /// A texture trace.
@@ -47,7 +47,7 @@ pub enum Of {
     Rays,
 }
 
-/// What was measured of these figures.
+/// The measured errors of these figures.
 #[must_use]
 pub fn known(of: Of) -> Vec<&'static KnownError> {
     let rays = |error: &&KnownError| error.figure == REUSE.key;
@@ -57,14 +57,14 @@ pub fn known(of: Of) -> Vec<&'static KnownError> {
     wanted.collect()
 }
 
-/// A figure with what is known of its error.
+/// A figure and its measured errors.
 struct Figure {
     first: &'static KnownError,
     /// By [`Contribution::ALL`].
     errors: [Option<&'static KnownError>; 5],
 }
 
-/// The figures that anything is known of, in the table's order.
+/// The figures with measured errors, in the table's order.
 fn by_figure(of: Of) -> Vec<Figure> {
     let mut figures: Vec<Figure> = Vec::new();
     for error in known(of) {
@@ -84,7 +84,7 @@ fn by_figure(of: Of) -> Vec<Figure> {
     figures
 }
 
-/// The table for a terminal and for the page: a row a figure, the largest error of each source.
+/// The table: one row per figure, with the maximum error of each source.
 #[must_use]
 pub fn table(of: Of) -> Table {
     let mut columns = vec![
@@ -101,28 +101,28 @@ pub fn table(of: Of) -> Table {
     Table::new(&columns, &by_figure(of)).without_empty_columns()
 }
 
-/// The table under its heading, for a terminal; empty where nothing was measured.
+/// The table with its heading, for a terminal; empty if nothing was measured.
 #[must_use]
 pub fn text(of: Of) -> String {
     source(of).map_or_else(String::new, |source| {
-        format!("\nHow far figures are off ({source})\n{}", table(of).text())
+        format!("\nError of the figures ({source})\n{}", table(of).text())
     })
 }
 
-/// The table as a section of a page; none where nothing was measured.
+/// The table as a section of a page; `None` if nothing was measured.
 #[must_use]
 pub fn section(of: Of) -> Option<Section> {
     let source = source(of)?;
     Some(Section::new(
-        "How far the figures are off",
+        "Error of the figures",
         html! {
-            p { "The largest error of each figure by its source, measured by " (source) "; on other scenes it may be another. What is empty was not measured." }
+            p { "The largest error of each figure by its source, measured by " (source) ". Other scenes may have other errors. Empty cells were not measured." }
             (table(of).markup())
         },
     ))
 }
 
-/// How and on what the errors were measured; none where nothing was.
+/// The commands and scenes of the measurements; `None` if nothing was measured.
 fn source(of: Of) -> Option<String> {
     let known = known(of);
     let command = &known.first()?.command;
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn every_headline_figure_has_an_error_of_its_own_and_the_table_all_of_them() {
+    fn every_headline_figure_has_its_own_error_and_the_table_lists_all_of_them() {
         let tables = [Of::Textures, Of::Rays].map(table);
         let rows = || tables.iter().flat_map(|table| &table.rows);
         assert_eq!(rows().count(), headline_figures().count());

@@ -1,11 +1,11 @@
-//! The self-contained HTML page: inline styles and pictures, no script, nothing fetched.
+//! The self-contained HTML page: inline styles and pictures, no script, no external resources.
 //!
-//! A page is a title, a few facts and a list of [`Section`]s; every subcommand that writes a page
-//! makes sections and hands them to [`page`].
+//! A page is a title, a few facts and a list of [`Section`]s. Every subcommand that writes a page builds
+//! sections and calls [`page`].
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// Inline style sheet; it maps the plots' inks by attribute so that they follow the colour scheme.
+/// Inline style sheet. It recolours the plots' inks by attribute to follow the reader's colour scheme.
 const CSS: &str = include_str!("style.css");
 
 /// One part of a page.
@@ -20,7 +20,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// A section whose anchor follows from its title.
+    /// A section whose anchor is derived from its title.
     pub fn new(title: impl Into<String>, body: Markup) -> Self {
         let title = title.into();
         Self {
@@ -45,7 +45,7 @@ pub fn slug(title: &str) -> String {
     out.trim_end_matches('-').to_owned()
 }
 
-/// The whole page. `lead` is the paragraph under the title: what was run.
+/// The whole page. `lead` is the paragraph under the title.
 #[must_use]
 pub fn page(title: &str, lead: &Markup, sections: &[Section]) -> String {
     html! {
@@ -74,7 +74,7 @@ pub fn page(title: &str, lead: &Markup, sections: &[Section]) -> String {
     .into_string()
 }
 
-/// A picture with a caption; wide ones scroll in their own box.
+/// A picture with a caption; wide pictures scroll in their own box.
 #[must_use]
 pub fn figure(svg: &str, caption: &str) -> Markup {
     html! {
@@ -85,7 +85,7 @@ pub fn figure(svg: &str, caption: &str) -> Markup {
     }
 }
 
-/// Pictures side by side where the window has room.
+/// Pictures in rows that wrap to the window's width.
 #[must_use]
 pub fn figures(pictures: &[(String, String)]) -> Markup {
     html! {
@@ -93,7 +93,7 @@ pub fn figures(pictures: &[(String, String)]) -> Markup {
     }
 }
 
-/// Text set as typed (configuration, command lines), folded behind a summary line.
+/// Preformatted text (configuration, command lines) in a collapsible element.
 #[must_use]
 pub fn folded(summary: &str, text: &str) -> Markup {
     html! { details { summary { (summary) } pre { (text) } } }
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_page_fetches_nothing_and_runs_no_script() {
+    fn a_page_loads_no_resources_and_runs_no_script() {
         let section = Section::new("Table 2: a & b", html! { p { "x" } });
         assert_eq!(section.id, "table-2-a-b");
         let text = page("T", &html! { "lead" }, &[section]);

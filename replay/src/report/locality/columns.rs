@@ -1,4 +1,4 @@
-//! The tables' rows and their columns, a line each.
+//! Row types of the tables, and their columns.
 
 use crate::config::LevelConfig;
 use crate::locality::{
@@ -6,58 +6,58 @@ use crate::locality::{
 };
 use crate::report::columns::{Column, Show};
 
-/// What a row is about.
+/// The stream that a row describes.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
     /// Label of the trace.
     pub trace: &'a str,
-    /// What puts the accesses one after another.
+    /// The sequence of the accesses.
     pub order: Sequence,
     /// The stream.
     pub stream: Stream,
-    /// Bytes of a line.
+    /// Line size in bytes.
     pub line_bytes: u32,
 }
 
 /// A stream and the cache that it goes to.
 #[derive(Clone, Copy, Debug)]
 pub struct Summary<'a> {
-    /// Whose.
+    /// The stream.
     pub of: Subject<'a>,
     /// The configured cache.
     pub cache: &'a LevelConfig,
-    /// What was found.
+    /// The figures.
     pub figures: &'a Figures,
 }
 
-/// A cache of a curve.
+/// A point of a miss-ratio curve.
 #[derive(Clone, Copy, Debug)]
 pub struct CurvePoint<'a> {
-    /// Whose.
+    /// The stream.
     pub of: Subject<'a>,
     /// `lru` or `opt`.
     pub policy: &'static str,
     /// Size and hits.
     pub cache: CacheHits,
-    /// Lines asked for.
+    /// Number of line accesses.
     pub accesses: u64,
 }
 
-/// Reuses at some distances.
+/// Reuses within a range of distances.
 #[derive(Clone, Copy, Debug)]
 pub struct Reuses<'a> {
-    /// Whose.
+    /// The stream.
     pub of: Subject<'a>,
     /// First and last distance.
     pub distances: (u64, u64),
-    /// By where the use before was.
+    /// Reuses by the origin of the previous use.
     pub reuses: ByOrigin,
 }
 
-/// The working set of a stretch length.
+/// The working sets of stretches of one length.
 #[derive(Clone, Copy, Debug)]
 pub struct Window<'a> {
-    /// Whose.
+    /// The stream.
     pub of: Subject<'a>,
     /// Sums over stretches.
     pub set: WorkingSet,
@@ -67,7 +67,7 @@ fn pct(part: u64, whole: u64) -> Option<f64> {
     (whole > 0).then(|| 100.0 * part as f64 / whole as f64)
 }
 
-/// Share of one origin, percent of all.
+/// Share of one origin in percent.
 fn share(counts: &ByOrigin, origin: Origin) -> Option<f64> {
     pct(counts[origin.index()], counts.iter().sum())
 }
@@ -77,26 +77,26 @@ impl Summary<'_> {
         &self.figures.split
     }
 
-    /// A count, percent of the lines asked for.
+    /// A count as a percentage of the line accesses.
     #[must_use]
     pub fn share_pct(&self, count: u64) -> Option<f64> {
         pct(count, self.figures.accesses)
     }
 
-    /// Misses of a fully associative cache of the size under OPT.
+    /// Misses of a fully associative cache of this size under OPT.
     #[must_use]
     pub fn opt_misses(&self) -> u64 {
         self.figures.misses(&self.figures.opt_of_size())
     }
 
-    /// Misses of the geometry under OPT.
+    /// Misses of the configured geometry under OPT.
     #[must_use]
     pub fn opt_ways_misses(&self) -> u64 {
         self.figures.misses(&self.figures.opt_of_geometry)
     }
 }
 
-/// The columns that say what a row is about.
+/// Columns that identify the stream of a row.
 fn subject_columns<'a, R>(of: fn(&R) -> &Subject<'a>) -> Vec<Column<'a, R>>
 where
     R: 'a,
@@ -108,7 +108,7 @@ where
     ]
 }
 
-/// Columns of counts by where the use before was.
+/// Columns of counts by the origin of the previous use.
 fn origin_columns<'a, R: 'a>(of: fn(&R) -> &ByOrigin) -> Vec<Column<'a, R>> {
     let column = |origin: Origin| {
         let name = origin.key().replace('_', " ");
@@ -119,7 +119,7 @@ fn origin_columns<'a, R: 'a>(of: fn(&R) -> &ByOrigin) -> Vec<Column<'a, R>> {
     Origin::ALL.into_iter().map(column).collect()
 }
 
-/// Keys of the summary for a terminal.
+/// Keys of the summary on a terminal.
 pub const SHORT: [&str; 15] = [
     "trace",
     "order",
@@ -152,42 +152,42 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
         C::text("replacement", "policy", |r| r.cache.replacement.name()),
         whole("line_bytes", "line", |r| r.of.line_bytes.into()),
 
-        whole("accesses", "asked for", |r| r.figures.accesses).about("lines asked for, repeats counted"),
+        whole("accesses", "accesses", |r| r.figures.accesses).about("line accesses, repeats counted"),
         whole("unique_lines", "distinct", |r| r.figures.unique_lines).about("distinct lines, summed over the caches of the level"),
         whole("frame_lines", "of frames", |r| r.figures.frame_lines).about("distinct lines of each frame, summed over frames"),
         real("both_eyes_pct", "both eyes'", |r| pct(r.figures.frame_lines_of_both_eyes, r.figures.frame_lines))
-            .about("of the frames' lines, those that both eyes' tiles use in the frame"),
+            .about("percentage of the frames' lines that tiles of both eyes use in the same frame"),
         real("earlier_frames_pct", "earlier frames'", |r| pct(r.figures.frame_lines_of_earlier_frames, r.figures.frame_lines))
-            .about("of the frames' lines, those that an earlier frame used"),
+            .about("percentage of the frames' lines that an earlier frame used"),
 
         whole("misses", "misses", |r| r.split().misses()),
-        real("miss_pct", "miss rate", |r| r.share_pct(r.split().misses())).about("misses of the configured cache, of the lines asked for"),
+        real("miss_pct", "miss rate", |r| r.share_pct(r.split().misses())).about("misses of the configured cache, percent of line accesses"),
         whole("compulsory", "compulsory", |r| r.split().compulsory),
         whole("capacity", "capacity", |r| r.split().capacity.iter().sum()),
         whole("conflict", "conflict", |r| r.split().conflict.iter().sum()),
-        whole("spared", "spared", |r| r.split().spared.iter().sum()),
+        whole("spared", "avoided", |r| r.split().avoided.iter().sum()),
         real("compulsory_pct", "compulsory", |r| r.share_pct(r.split().compulsory)).about("first uses"),
         real("capacity_pct", "capacity", |r| r.share_pct(r.split().capacity.iter().sum()))
-            .about("further misses where a fully associative LRU cache of the size misses, too"),
+            .about("misses that a fully associative LRU cache of this size also has, without first uses"),
         real("conflict_pct", "conflict", |r| r.share_pct(r.split().conflict.iter().sum()))
             .about("misses where the fully associative cache hits"),
-        real("spared_pct", "spared", |r| r.share_pct(r.split().spared.iter().sum()))
-            .about("hits where the fully associative cache misses: conflicts that helped"),
+        real("spared_pct", "avoided", |r| r.share_pct(r.split().avoided.iter().sum()))
+            .about("hits where the fully associative cache misses: limited associativity avoids these misses"),
         C::real("conflict_net", "conflict, net", "", 0, |r| r.split().misses() as f64 - r.split().fully_associative_misses() as f64)
-            .about("conflict less spared: negative where sets help"),
+            .about("conflict misses minus avoided misses; negative if limited associativity helps"),
         real("capacity_other_eye_pct", "capacity, other eye's", |r| share(&r.split().capacity, Origin::OtherEye))
-            .about("of the capacity misses, those of lines that the other eye used last"),
+            .about("percentage of the capacity misses whose line was last used by the other eye"),
         real("capacity_earlier_frame_pct", "capacity, earlier frame's", |r| share(&r.split().capacity, Origin::EarlierFrame)),
         real("conflict_other_eye_pct", "conflict, other eye's", |r| share(&r.split().conflict, Origin::OtherEye))
-            .about("likewise of the conflict misses"),
+            .about("percentage of the conflict misses whose line was last used by the other eye"),
         real("conflict_earlier_frame_pct", "conflict, earlier frame's", |r| share(&r.split().conflict, Origin::EarlierFrame)),
 
         whole("fully_associative_misses", "fully associative", |r| r.split().fully_associative_misses()),
         real("fully_associative_miss_pct", "full LRU", |r| r.share_pct(r.split().fully_associative_misses()))
-            .about("misses of a fully associative LRU cache of the size"),
+            .about("misses of a fully associative LRU cache of this size"),
         whole("opt_misses", "OPT", |r| r.opt_misses()),
         real("opt_miss_pct", "full OPT", |r| r.share_pct(r.opt_misses()))
-            .about("misses of a fully associative cache of the size under Belady's OPT"),
+            .about("misses of a fully associative cache of this size under Belady's OPT"),
         whole("opt_ways_misses", "OPT, ways", |r| r.opt_ways_misses()),
         real("opt_ways_miss_pct", "OPT, ways", |r| r.share_pct(r.opt_ways_misses()))
             .about("misses of the configured sets and ways under OPT"),
@@ -195,19 +195,19 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
     for origin in Origin::ALL {
         let name = origin.key().replace('_', " ");
         columns.push(C::real(format!("hits.{}_pct", origin.key()), name, "% of hits", 2, move |r| share(&r.split().hits(), origin))
-            .about("hits of the configured cache, by where the use before was"));
+            .about("hits of the configured cache, by the origin of the previous use"));
     }
     for origin in Origin::ALL {
         let name = origin.key().replace('_', " ");
         columns.push(C::real(format!("reuses.{}_pct", origin.key()), name, "% of reuses", 2, move |r| share(&r.figures.reuses(), origin))
-            .about("all reuses likewise: hits of a cache that forgets nothing"));
+            .about("all reuses, by the origin of the previous use: the hits of an infinite cache"));
     }
     columns.extend([
-        whole("tiles", "tiles", |r| r.figures.tiles).about("tiles in which lines were asked for"),
+        whole("tiles", "tiles", |r| r.figures.tiles).about("tiles with line accesses"),
         C::real("tile_lines", "lines a tile", "", 1, |r| {
             let set = r.figures.working_sets.first()?;
             Some(set.lines as f64 / set.stretches as f64)
-        }).about("mean distinct lines while a tile, or a pair of tiles, is worked on"),
+        }).about("mean number of distinct lines per work item (a tile or a pair of tiles)"),
     ]);
     columns
 }
@@ -242,14 +242,14 @@ impl CurvePoint<'_> {
         self.cache.lines * u64::from(self.of.line_bytes)
     }
 
-    /// Misses, percent of the lines asked for.
+    /// Misses in percent of the line accesses.
     #[must_use]
     pub fn miss_pct(&self) -> Option<f64> {
         let hits: u64 = self.cache.hits.iter().sum();
         pct(self.accesses - hits, self.accesses)
     }
 
-    /// Hits whose use before was in a tile of the other eye, percent of the lines asked for.
+    /// Hits whose previous use was in a tile of the other eye, percent of the line accesses.
     #[must_use]
     pub fn other_eye_pct(&self) -> Option<f64> {
         pct(self.cache.hits[Origin::OtherEye.index()], self.accesses)
@@ -264,7 +264,7 @@ pub fn distances<'a>() -> Vec<Column<'a, Reuses<'a>>> {
         Column::new("from", "from", "lines", Show::Whole, |r: &Reuses| {
             r.distances.0
         })
-        .about("distinct other lines used in between, from"),
+        .about("smallest number of distinct other lines since the previous use"),
         Column::new("to", "to", "lines", Show::Whole, |r: &Reuses| r.distances.1),
     ]);
     columns.extend(origin_columns(|r: &Reuses| &r.reuses));

@@ -1,4 +1,4 @@
-//! Locality of traces, order beside order: table, JSON, CSV and page.
+//! Results of locality analyses, by trace and order: table, JSON, CSV and page.
 
 mod columns;
 mod page;
@@ -20,22 +20,22 @@ pub const SCHEMA: &str = "replay.locality/1";
 pub struct TraceFigures {
     /// Short name, unique in the report.
     pub label: String,
-    /// Scene and checksum; none of plain addresses.
+    /// Scene and checksum; `None` for plain addresses.
     pub id: Option<TraceId>,
-    /// Frames that it renders.
+    /// Number of frames.
     pub frames: u32,
     /// By order.
     pub orders: Vec<OrderFigures>,
 }
 
 impl TraceFigures {
-    /// Tiles of two eyes in an order, and no plain addresses.
+    /// Whether the accesses come from a rendered trace, not from plain addresses.
     fn is_rendered(&self) -> bool {
         self.id.is_some()
     }
 }
 
-/// What is found of some traces.
+/// Locality figures of some traces.
 pub struct LocalityReport {
     /// The traces.
     pub traces: Vec<TraceFigures>,
@@ -45,7 +45,7 @@ pub struct LocalityReport {
 
 /// The JSON object.
 #[derive(Serialize)]
-struct Document<'r, 'a> {
+struct LocalityJson<'r, 'a> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
@@ -75,7 +75,8 @@ impl<'a> TraceFacts<'a> {
     }
 }
 
-/// Sizes of a curve of fully associative caches: four a doubling, up to where nothing more is gained.
+/// Sizes of a curve of fully associative caches: four per doubling, up to the size where misses stop
+/// falling.
 fn curve_sizes(figures: &Figures) -> Vec<u64> {
     let enough = figures.distances.enough_lines().max(1);
     let size = |step: i32| (f64::from(step) / 4.0).exp2().round() as u64;
@@ -127,7 +128,7 @@ impl LocalityReport {
         rows
     }
 
-    /// The curves of a stream: fully associative LRU, LRU of some ways, OPT.
+    /// The curves of a stream: fully associative LRU, LRU by associativity, OPT.
     fn curve<'a>(summary: &Summary<'a>) -> Vec<CurvePoint<'a>> {
         let figures = summary.figures;
         let full = figures.distances.curve(&curve_sizes(figures));
@@ -142,7 +143,7 @@ impl LocalityReport {
         lru.chain(opt).map(point).collect()
     }
 
-    /// Reuses by distance, in bins that double.
+    /// Reuses by distance; each bin is twice as wide as the one before.
     fn distances<'a>(summary: &Summary<'a>) -> Vec<Reuses<'a>> {
         let bins = summary.figures.distances.bins().into_iter();
         bins.map(|bin| Reuses {
@@ -179,7 +180,7 @@ impl LocalityReport {
         Table::new(&columns::summary(), &self.summaries()).grouped_by(1)
     }
 
-    /// The figures that fit a terminal.
+    /// The figures for a terminal.
     #[must_use]
     pub fn text(&self) -> String {
         let one = self.traces.len() == 1;
@@ -200,7 +201,7 @@ impl LocalityReport {
         let rows = self.summaries();
         let curves: Vec<_> = rows.iter().flat_map(Self::curve).collect();
         let sets: Vec<_> = rows.iter().flat_map(Self::working_sets).collect();
-        // A stream at a time: there are many distances.
+        // One stream after another, because there are many distances.
         let mut distances = String::new();
         for row in &rows {
             let text = Table::new(&columns::distances(), &Self::exact_distances(row)).csv();
@@ -226,7 +227,7 @@ impl LocalityReport {
         let curves: Vec<_> = rows.iter().flat_map(Self::curve).collect();
         let distances: Vec<_> = rows.iter().flat_map(Self::distances).collect();
         let sets: Vec<_> = rows.iter().flat_map(Self::working_sets).collect();
-        serde_json::to_string_pretty(&Document {
+        serde_json::to_string_pretty(&LocalityJson {
             schema: SCHEMA,
             tool: TOOL,
             model_version: MODEL_VERSION,

@@ -10,8 +10,8 @@ use crate::report::table::Table;
 use crate::size::format_bytes;
 use maud::{Markup, html};
 
-/// Keys of the columns that the page's table shows; CSV and JSON have them all. Traces of one frame
-/// have no earlier ones.
+/// Keys of the columns in the page's table; CSV and JSON have all columns. Earlier frames are left out for
+/// traces of one frame.
 const SHOWN: [&str; 21] = [
     "order",
     "accesses",
@@ -71,13 +71,13 @@ impl LocalityReport {
         let rendered = self.traces.iter().any(TraceFigures::is_rendered);
         let lead = html! {
             p {
-                "How far apart the uses of cache lines lie in " (names.join(", ")) @if rendered { ", in each tile order" }
-                ", and what that means for caches of every size, without latencies. "
-                "The JSON file beside this page has every number of the plots, the CSV file the tables."
+                "Reuse distances of cache lines in " (names.join(", ")) @if rendered { ", in each tile order" }
+                ", and the resulting misses of caches of every size, without latencies. "
+                "The JSON file next to this page has every number of the plots; the CSV file has the tables."
             }
             @if rendered {
                 p {
-                    "A reuse belongs to where the use before it was: in the same tile, in another tile, in a tile of the other eye, or in an earlier frame."
+                    "A reuse is counted by the origin of the previous use: the same tile, another tile, a tile of the other eye, or an earlier frame."
                 }
             }
         };
@@ -89,7 +89,7 @@ impl LocalityReport {
 fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Markup, PlotError> {
     let (rendered, one_frame) = (trace.is_rendered(), trace.frames < 2);
     let plain = |svg: String| (svg, String::new());
-    // Where a bin begins.
+    // The start of a bin.
     let far_from = (rows[0].figures.configured_lines / 8)
         .max(1)
         .next_power_of_two();
@@ -110,7 +110,7 @@ fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Marku
     }
     by_size.push(plain(plots::above_opt(rows).svg()?));
     let together = if rendered {
-        "Two tiles that are rendered together take two tiles' time, and their lines belong to both."
+        "Two tiles rendered together count as two tiles in length, and their lines belong to both."
     } else {
         ""
     };
@@ -126,33 +126,33 @@ fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Marku
         (figures(&by_size))
         h3 { "The configured cache" }
         (figures(&[
-            (plots::causes(rows).svg()?, "Compulsory: first uses. Conflict: a fully associative cache of the size hits. Capacity: it misses, too.".to_owned()),
-            (plots::bounds(rows).svg()?, "OPT drops the line whose next use is furthest: no cache of the size that is filled by every miss does better.".to_owned()),
+            (plots::causes(rows).svg()?, "Compulsory: first uses. Conflict: a fully associative cache of this size hits. Capacity: it also misses.".to_owned()),
+            (plots::bounds(rows).svg()?, "OPT evicts the line whose next use is furthest away. No cache of this size that allocates on every miss has fewer misses.".to_owned()),
         ]))
         h3 { "Reuse distances" }
         p { "Reuses that a fully associative cache of an eighth of the configured size would miss:" }
         (figures(&far))
         details {
-            summary { "nearer reuses, too" }
+            summary { "smaller distances" }
             (figures(&all))
         }
         h3 { "Working sets" }
         (figures(&working_sets))
         details {
-            summary { "miss ratio by size and ways, order by order" }
+            summary { "miss ratio by size and ways, by order" }
             (figures(&ways))
         }
     })
 }
 
-/// A chart an order of the reuses at distances from `from` on.
+/// Charts of the reuses at distances of at least `from`, one per order.
 fn distances(rows: &[Summary], from: u64) -> Result<Vec<(String, String)>, PlotError> {
     let charts = plots::distances(rows, from);
     let figure = |(chart, row): (&StackedChart, &Summary)| {
         let nearer = plots::nearer_pct(row, from).unwrap_or(0.0);
         Ok((
             chart.svg()?,
-            format!("Not drawn: {nearer:.1} % at smaller distances."),
+            format!("Not shown: {nearer:.1} % at smaller distances."),
         ))
     };
     charts.iter().zip(rows).map(figure).collect()
@@ -162,16 +162,16 @@ fn about(rows: &[Summary], rendered: bool) -> String {
     let (of, cache) = (rows[0].of, rows[0].cache);
     let sees = match of.stream {
         Stream::L1 if !rendered => {
-            "What is asked of the L1, in the trace's order; 1,024 look-ups stand for a tile"
+            "Accesses to the L1 in the trace's order; 1,024 look-ups count as a tile"
         }
-        Stream::L2 if !rendered => "What misses the configured L1",
+        Stream::L2 if !rendered => "Misses of the configured L1",
         Stream::L1 => {
-            "What each core asks its own L1 for; counts are sums over the cores, and a size is that of each core's cache"
+            "Accesses of each core to its own L1; counts are sums over the cores, and a size is the size of each core's cache"
         }
         Stream::L2 => {
-            "What misses the configured L1 caches, in the order in which it reaches the L2 that the cores share"
+            "Misses of the configured L1 caches, in the order in which they reach the L2 that the cores share"
         }
-        Stream::Merged => "What all cores ask for, as one L1 that they share would see it",
+        Stream::Merged => "Accesses of all cores to an L1 that they share",
     };
     let (size, line) = (
         format_bytes(cache.size_bytes),
@@ -181,11 +181,11 @@ fn about(rows: &[Summary], rendered: bool) -> String {
     format!("{sees}. The configured cache: {size}, {ways} ways, {policy}, lines of {line}.")
 }
 
-/// What the columns are.
+/// Definitions of the columns.
 fn meanings(table: &Table) -> Markup {
     html! {
         details {
-            summary { "what the columns are" }
+            summary { "definitions of the columns" }
             dl.note {
                 @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
                     dt { (h.name) @if !h.unit.is_empty() { ", " (h.unit) } } dd { (h.about) }

@@ -1,4 +1,4 @@
-//! The plots of a stream, orders side by side.
+//! The plots of a stream, with all orders in each plot.
 
 use super::LocalityReport;
 use super::columns::{CurvePoint, Reuses, Summary};
@@ -23,8 +23,8 @@ fn sizes() -> Axis {
     Axis::doublings("cache size", Doublings::Bytes)
 }
 
-/// A chart with a line an order over cache sizes; values of zero or less are left out where the axis
-/// has doublings.
+/// A chart over cache sizes with one line per order. On an axis of doublings, values of zero or less are
+/// left out.
 fn over_sizes<'a>(
     rows: &[Summary<'a>],
     title: String,
@@ -44,7 +44,7 @@ fn over_sizes<'a>(
     }
 }
 
-/// Fully associative LRU caches from this size on are drawn: below it nearly everything misses.
+/// Smallest fully associative LRU cache in the charts; smaller ones miss nearly always.
 const SMALLEST_BYTES: u64 = 256;
 
 fn full_lru<'a>(row: &Summary<'a>) -> impl Iterator<Item = CurvePoint<'a>> {
@@ -56,7 +56,7 @@ fn full_lru<'a>(row: &Summary<'a>) -> impl Iterator<Item = CurvePoint<'a>> {
 /// Misses of fully associative LRU caches of every size.
 #[must_use]
 pub fn miss_ratio(rows: &[Summary]) -> LineChart {
-    let y = Axis::doublings("misses, % of lines asked for", Doublings::Numbers);
+    let y = Axis::doublings("misses, % of line accesses", Doublings::Numbers);
     over_sizes(
         rows,
         "Miss ratio by size, fully associative LRU".into(),
@@ -68,13 +68,13 @@ pub fn miss_ratio(rows: &[Summary]) -> LineChart {
     )
 }
 
-/// Hits that the other eye's use before gives.
+/// Hits whose previous use was by the other eye.
 #[must_use]
 pub fn other_eye(rows: &[Summary]) -> LineChart {
-    let y = Axis::linear("hits whose use before was the other eye's, % of lines asked for");
+    let y = Axis::linear("hits whose previous use was by the other eye, % of line accesses");
     over_sizes(
         rows,
-        "What the eyes give each other, by size".into(),
+        "Hits on the other eye's lines, by size".into(),
         y,
         |row| {
             let points =
@@ -84,13 +84,13 @@ pub fn other_eye(rows: &[Summary]) -> LineChart {
     )
 }
 
-/// Misses of LRU over those of OPT.
+/// LRU misses over OPT misses.
 #[must_use]
 pub fn above_opt(rows: &[Summary]) -> LineChart {
-    let y = Axis::linear("misses of LRU over those of OPT");
+    let y = Axis::linear("LRU misses over OPT misses");
     over_sizes(
         rows,
-        "LRU above OPT by size, both fully associative".into(),
+        "LRU misses over OPT misses by size, both fully associative".into(),
         y,
         |row| {
             let figures = row.figures;
@@ -139,12 +139,12 @@ pub fn associativity(row: &Summary) -> LineChart {
     LineChart {
         title: format!("{}: miss ratio by size and ways, LRU", row.of.order.title()),
         x: sizes(),
-        y: Axis::doublings("misses, % of lines asked for", Doublings::Numbers),
+        y: Axis::doublings("misses, % of line accesses", Doublings::Numbers),
         series: of_ways.chain([full]).collect(),
     }
 }
 
-/// Names and colours of where the use before was.
+/// Names and colours of the origins of the previous use.
 fn origins() -> Vec<SeriesStyle> {
     let name = |(index, origin): (usize, Origin)| {
         let colors = [7, 1, 4, 3];
@@ -153,13 +153,13 @@ fn origins() -> Vec<SeriesStyle> {
     Origin::ALL.into_iter().enumerate().map(name).collect()
 }
 
-/// Bins of the distances from `from` on.
+/// Bins of distances of at least `from`.
 fn bins_from<'a>(row: &Summary<'a>, from: u64) -> impl Iterator<Item = Reuses<'a>> {
     let bins = LocalityReport::distances(row).into_iter();
     bins.filter(move |bin| bin.distances.0 >= from)
 }
 
-/// Reuses at the distances from `from` on, by where the use before was, one chart an order.
+/// Reuses at distances of at least `from`, by the origin of the previous use, one chart per order.
 #[must_use]
 pub fn distances(rows: &[Summary], from: u64) -> Vec<StackedChart> {
     let share =
@@ -181,13 +181,13 @@ pub fn distances(rows: &[Summary], from: u64) -> Vec<StackedChart> {
             })
             .collect();
         bars.resize(most, (String::new(), vec![0.0; Origin::ALL.len()]));
-        // Names of every other bin have room.
+        // There is room for every second label.
         for (name, _) in bars.iter_mut().skip(1).step_by(2) {
             name.clear();
         }
         StackedChart {
             title: row.of.order.title().to_owned(),
-            value_label: "reuses, % of lines asked for".into(),
+            value_label: "reuses, % of line accesses".into(),
             bar_label: "distance, distinct lines from".into(),
             series: origins(),
             bars,
@@ -208,7 +208,7 @@ fn short(number: u64) -> String {
     }
 }
 
-/// Reuses at smaller distances, percent of the lines asked for. `from` is 1 or begins a bin.
+/// Reuses at smaller distances, percent of the line accesses. `from` is 1 or the start of a bin.
 #[must_use]
 pub fn nearer_pct(row: &Summary, from: u64) -> Option<f64> {
     row.share_pct(row.figures.distances.hits(from).iter().sum())
@@ -254,7 +254,7 @@ pub fn shared_working_sets(rows: &[Summary]) -> LineChart {
         }
     };
     LineChart {
-        title: "What both eyes use of a stretch of tiles".into(),
+        title: "Lines shared by both eyes, by stretch of tiles".into(),
         x: Axis::doublings("tiles", Doublings::Numbers),
         y: Axis::linear("lines that both eyes use, % of the stretch's"),
         series: rows.iter().map(series).collect(),
@@ -275,8 +275,8 @@ pub fn causes(rows: &[Summary]) -> StackedChart {
         (row.of.order.title().to_owned(), parts.to_vec())
     };
     StackedChart {
-        title: "Why the cache misses".into(),
-        value_label: "misses, % of lines asked for".into(),
+        title: "Misses by cause".into(),
+        value_label: "misses, % of line accesses".into(),
         series: names
             .map(|(name, index)| SeriesStyle::nth(name, index))
             .collect(),
@@ -287,7 +287,7 @@ pub fn causes(rows: &[Summary]) -> StackedChart {
     }
 }
 
-/// The configured cache beside a fully associative one, and both under OPT.
+/// Misses of the configured cache and of a fully associative one, with LRU and with OPT.
 #[must_use]
 pub fn bounds(rows: &[Summary]) -> BarChart {
     let names = ["as configured", "full LRU", "OPT, ways", "full OPT"];
@@ -306,7 +306,7 @@ pub fn bounds(rows: &[Summary]) -> BarChart {
     let series = names.into_iter().zip([7, 1, 3, 2]);
     BarChart {
         title: "LRU and OPT at the configured size".into(),
-        value_label: "misses, % of lines asked for".into(),
+        value_label: "misses, % of line accesses".into(),
         series: series
             .map(|(name, index)| SeriesStyle::nth(name, index))
             .collect(),

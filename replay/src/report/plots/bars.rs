@@ -1,4 +1,4 @@
-//! Grouped bars with optional reference marks (a paper's values) over them.
+//! Grouped bars with optional reference marks, such as a paper's values.
 
 use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
 use super::{PlotError, SeriesStyle};
@@ -6,14 +6,14 @@ use crate::report::theme;
 use plotters::prelude::{Color, PathElement, Rectangle};
 use plotters::style::text_anchor::HPos;
 
-/// One group of bars: a scene, a cache configuration.
+/// One group of bars, such as a scene or a cache configuration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BarGroup {
     /// Name under the bars.
     pub label: String,
-    /// One value a series; `None` leaves the place empty.
+    /// One value per series; `None` leaves its place empty.
     pub values: Vec<Option<f64>>,
-    /// One reference mark a series, in the values' unit.
+    /// One reference mark per series, in the values' unit.
     pub marks: Vec<Option<f64>>,
 }
 
@@ -24,13 +24,13 @@ pub struct BarChart {
     pub title: String,
     /// What the bars show, with its unit: `external traffic, MB per frame`.
     pub value_label: String,
-    /// What the groups are, with the unit where they have one.
+    /// What the groups are, with the unit if they have one.
     pub group_label: String,
     /// Series in drawing order.
     pub series: Vec<SeriesStyle>,
     /// Groups from left to right.
     pub groups: Vec<BarGroup>,
-    /// What the marks are; `None` when there are none.
+    /// Name of the marks; `None` without marks.
     pub mark_name: Option<String>,
     /// Draws a line at this value (1.0 for ratios).
     pub reference: Option<f64>,
@@ -41,7 +41,7 @@ pub struct BarChart {
 const LEFT_PX: u32 = 58;
 const TOP_PX: u32 = 66;
 const PLOT_HEIGHT_PX: f64 = 216.0;
-/// The highest value keeps this share of the height free for its number.
+/// Factor on the axis that leaves room for the number over the highest bar.
 const HEADROOM: f64 = 1.08;
 const LINE_HEIGHT_PX: i32 = 15;
 
@@ -88,7 +88,7 @@ impl BarChart {
             ],
         };
         frame.draw(|root, mut builder| {
-            // Group number `g` is from g to g + 1.
+            // Group number `g` spans g to g + 1.
             let mut chart = builder.build_cartesian_2d(0.0..groups, values.clone())?;
             let mut mesh = chart.configure_mesh();
             themed(&mut mesh)
@@ -161,7 +161,7 @@ impl BarChart {
         Ok(())
     }
 
-    /// Group names break at spaces, so that neighbours cannot touch when a group has this width.
+    /// Width of the longest word in the group names, which break at spaces: the minimum width of a group.
     fn widest_word_px(&self) -> f64 {
         self.groups
             .iter()
@@ -170,7 +170,7 @@ impl BarChart {
             .fold(0.0, f64::max)
     }
 
-    /// Wide enough that the numbers over neighbouring bars do not touch.
+    /// Minimum width at which the numbers over neighbouring bars do not touch.
     fn bar_width_px(&self) -> f64 {
         let Some(decimals) = self.decimals else {
             return 22.0;
@@ -216,10 +216,10 @@ pub(super) fn wrap(label: &str, width_px: f64, size_px: u32) -> Vec<String> {
     lines
 }
 
-/// Middle of the number over a bar: above the lines that would strike it through. All in pixels.
+/// Centre of the number over a bar, in pixels, moved up if a line would cross it.
 fn label_y(bar_top: i32, lines: [Option<i32>; 2]) -> i32 {
     let mut lines: Vec<i32> = lines.into_iter().flatten().collect();
-    // From the lowest up: a number moved off one line may come to lie on the next.
+    // From the lowest line up, because moving off one line can move the number onto the next.
     lines.sort_by(|a, b| b.cmp(a));
     lines.into_iter().fold(bar_top - 8, |y, line| {
         if (line - y).abs() < 8 {
@@ -276,11 +276,11 @@ mod tests {
     }
 
     #[test]
-    fn no_line_strikes_a_number_through() {
+    fn no_line_crosses_a_number() {
         assert_eq!(label_y(100, [None, None]), 92);
         assert_eq!(label_y(100, [Some(110), None]), 92, "a line below the top");
         assert_eq!(label_y(100, [Some(94), None]), 86);
-        assert_eq!(label_y(100, [Some(82), Some(94)]), 74, "both in turn");
+        assert_eq!(label_y(100, [Some(82), Some(94)]), 74, "two lines");
         assert_eq!(label_y(100, [Some(50), None]), 92, "a line far above");
     }
 

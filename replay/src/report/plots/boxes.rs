@@ -1,4 +1,4 @@
-//! Distributions as horizontal boxes: whiskers, quartiles and median, one a row.
+//! Distributions as horizontal boxes, one per row: whiskers, quartiles and median.
 
 use super::frame::{AXIS_PX, Frame, text_style, themed, tick_format};
 use super::lines::Axis;
@@ -12,7 +12,7 @@ use plotters::style::text_anchor::HPos;
 pub struct BoxChart {
     /// Heading.
     pub title: String,
-    /// What whiskers, boxes and marks are.
+    /// Definition of whiskers, boxes and marks.
     pub note: String,
     /// The values, with their unit.
     pub x: Axis,
@@ -20,7 +20,7 @@ pub struct BoxChart {
     pub rows: Vec<BoxRow>,
     /// A value to compare with, as a vertical line.
     pub reference: Option<f64>,
-    /// Decimals of the medians, which are written at the right edge.
+    /// Decimals of the medians, which are printed at the right edge.
     pub decimals: usize,
 }
 

@@ -1,4 +1,4 @@
-//! A function of two miss rates as contour lines, with measured points over it.
+//! A function of two miss rates as contour lines, with measured points.
 
 use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
 use super::{PlotError, SeriesStyle};
@@ -27,7 +27,7 @@ pub struct ContourChart<'a> {
     pub y_label: String,
     /// Ends of the horizontal axis.
     pub x_range: (f64, f64),
-    /// The function; falls as `y` grows.
+    /// The function; it falls as `y` grows.
     pub surface: &'a dyn Fn(f64, f64) -> f64,
     /// Values at which a line is drawn, and their unit.
     pub levels: (Vec<f64>, &'a str),
@@ -101,8 +101,7 @@ impl ContourChart<'_> {
                         .draw(&PathElement::new(line, theme::AXIS))?;
                 }
             }
-            // Lines end at the top edge (from there on the level is out of reach); names stand
-            // above.
+            // Lines end at the top edge, beyond which the level does not occur. Their names stand above.
             let wishes: Vec<f64> = ends.iter().map(|(_, x)| *x).collect();
             let left = f64::from(LEFT_PX);
             let placed = theme::spread(&wishes, 34.0, left, left + PLOT_PX.0);
@@ -125,7 +124,7 @@ impl ContourChart<'_> {
         })
     }
 
-    /// The `y` from 0 to 100 at which the surface has this level, by bisection.
+    /// The `y` from 0 to 100 at which the surface has this level, found by bisection.
     fn solve(&self, x: f64, level: f64) -> Option<f64> {
         let (mut low, mut high) = (0.0, 100.0);
         if (self.surface)(x, low) < level || (self.surface)(x, high) > level {

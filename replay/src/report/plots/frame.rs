@@ -1,4 +1,4 @@
-//! What every chart has around its data: heading, legend, axes and grid in the theme's look.
+//! The frame of every chart: heading, legend, axes and grid in the theme's style.
 
 use super::{PlotError, escape};
 use crate::report::theme;
@@ -16,12 +16,12 @@ use std::ops::Range;
 
 /// The drawing area of a chart in pixels.
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// What drawing returns.
+/// Result of drawing.
 pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// Radius of a point of a scatter chart, px.
 pub(super) const DOT_PX: i32 = 4;
-/// Room for tick labels and an axis' name below a plotting area, px.
+/// Room for tick labels and an axis name below a plotting area, px.
 pub(super) const AXIS_PX: u32 = 44;
 const MOST_TICKS: usize = 7;
 const LEGEND_SYMBOL_PX: f64 = 17.0;
@@ -30,24 +30,24 @@ const LEGEND_GAP_PX: f64 = 17.0;
 /// A chart without its data.
 pub(super) struct Frame<'a> {
     pub title: &'a str,
-    /// The values' name and unit, below the title.
+    /// Name and unit of the values, below the title.
     pub value_label: &'a str,
-    /// Names in a row below the heading: bars and clouds of points have no end to name them at.
+    /// Names in a row below the heading, for bars and point clouds, which have no line end to label.
     pub legend: Vec<LegendEntry<'a>>,
     /// Width and height of the plotting area.
     pub plot_px: (f64, f64),
-    /// Room above, right of, below and left of the plotting area.
+    /// Space above, right of, below and left of the plotting area.
     pub around_px: [u32; 4],
 }
 
-/// One name of a legend.
+/// One entry of a legend.
 pub(super) struct LegendEntry<'a> {
     pub name: &'a str,
     pub color: RGBColor,
     pub symbol: Symbol,
 }
 
-/// What stands before a name in a legend.
+/// Symbol of a legend entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Symbol {
     Box,
@@ -63,9 +63,8 @@ impl LegendEntry<'_> {
 }
 
 impl Frame<'_> {
-    /// Draws the frame on a fresh SVG, then what `paint` draws: on the whole picture, or in the
-    /// coordinates that it builds on the plotting area. Returns the SVG's text; its alternative
-    /// text for screen readers is the title.
+    /// Draws the frame on a new SVG, then calls `paint` with the whole picture and the plotting area.
+    /// Returns the SVG's text, with the title as alternative text for screen readers.
     pub(super) fn draw(
         &self,
         paint: impl FnOnce(&Area, ChartBuilder<SVGBackend>) -> Drawn,
@@ -137,7 +136,7 @@ pub(super) fn text_style(size_px: u32, color: RGBColor, anchor: HPos) -> TextSty
         .pos(Pos::new(anchor, VPos::Center))
 }
 
-/// Gives axes and grid the theme's look.
+/// Applies the theme to axes and grid.
 pub(super) fn themed<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
     mesh: &'m mut MeshStyle<'a, 'b, X, Y, DB>,
 ) -> &'m mut MeshStyle<'a, 'b, X, Y, DB> {
@@ -151,7 +150,7 @@ pub(super) fn themed<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
         .axis_desc_style(text_style(theme::LABEL_PX, theme::MUTED, HPos::Center))
 }
 
-/// Writes the ticks of a themed axis over `range` with as many decimals as their step needs.
+/// Formats ticks over `range` with as many decimals as their step needs.
 pub(super) fn tick_format(range: &Range<f64>) -> impl Fn(&f64) -> String + use<> {
     let ticks = RangedCoordf64::from(range.clone()).key_points(MOST_TICKS);
     let step = match ticks[..] {
@@ -159,7 +158,7 @@ pub(super) fn tick_format(range: &Range<f64>) -> impl Fn(&f64) -> String + use<>
         _ => 1.0,
     };
     let decimals = (-(step.log10() + 1e-9).floor()).max(0.0) as usize;
-    // Adding zero takes the sign off a negative one.
+    // Adding zero removes the sign of negative zero.
     move |value| {
         let tick = (value / step).round() * step + 0.0;
         theme::group_thousands(&format!("{tick:.decimals$}"))

@@ -6,7 +6,7 @@ use crate::report::theme;
 use plotters::prelude::{BindKeyPoints, Color, Rectangle};
 use plotters::style::text_anchor::HPos;
 
-/// A chart of horizontal bars, one group a row.
+/// A chart of horizontal bars, one group per row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HBarChart {
     /// Heading.
@@ -15,7 +15,7 @@ pub struct HBarChart {
     pub value_label: String,
     /// Series in drawing order.
     pub series: Vec<SeriesStyle>,
-    /// Row names and values, one a series.
+    /// Row names and values, one value per series.
     pub rows: Vec<(String, Vec<Option<f64>>)>,
     /// Decimals of the values written at the bars' ends; `None` writes none.
     pub decimals: Option<usize>,
@@ -23,7 +23,7 @@ pub struct HBarChart {
 
 const TOP_PX: u32 = 66;
 const BAR_PX: i32 = 6;
-/// Bars with a number beside them are a line of text high.
+/// Height of a bar with a number: a line of text.
 const NUMBERED_BAR_PX: i32 = 12;
 const ROW_GAP_PX: i32 = 7;
 const PLOT_WIDTH_PX: f64 = 300.0;
@@ -77,7 +77,7 @@ impl HBarChart {
             around_px: [TOP_PX, right_px, 26, name_px as u32 + 16],
         };
         frame.draw(|root, mut builder| {
-            // Rows are counted in pixels from the top: numbers beside bars need that place.
+            // Positions are in pixels from the top, because numbers next to bars need a line of text.
             let middles: Vec<i32> = (0..names.len() as i32)
                 .map(|row| row_px * row + row_px / 2)
                 .collect();
@@ -109,7 +109,7 @@ impl HBarChart {
     }
 }
 
-/// The end of a long name tells more than its start (folders).
+/// Shortens a long name (a path) at its start, because the end identifies it.
 fn shorten(name: &str) -> String {
     let chars: Vec<char> = name.chars().collect();
     if chars.len() <= LONGEST_NAME_CHARS {

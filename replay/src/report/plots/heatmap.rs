@@ -1,7 +1,7 @@
-//! Per-tile heat maps of both eyes side by side, with one colour bar.
+//! Per-tile heat maps of both eyes side by side, with a colour bar.
 //!
-//! Cells travel as a small embedded PNG (one pixel a tile, scaled without smoothing), which keeps
-//! a 60x68 map near two kilobytes; everything else is vector.
+//! The cells are a small embedded PNG (one pixel per tile, scaled without smoothing), which keeps a 60x68
+//! map near two kilobytes. Everything else is vector graphics.
 
 use super::frame::{Area, Drawn, Frame, text_style, themed, tick_format};
 use super::{PlotError, escape};
@@ -19,7 +19,7 @@ pub struct Panel {
     pub name: String,
     /// Columns and rows.
     pub tiles: [u32; 2],
-    /// Values, one a tile.
+    /// Values, one per tile.
     pub values: Vec<f64>,
 }
 
@@ -32,15 +32,14 @@ pub struct HeatMap {
     pub value_label: String,
     /// Panels from left to right.
     pub panels: Vec<Panel>,
-    /// End of the colour scale; `None` takes the largest value. Charts that are to be compared
-    /// are given the same.
+    /// End of the colour scale; `None` uses the largest value. Charts to be compared need the same end.
     pub high: Option<f64>,
 }
 
 const TOP_PX: f64 = 66.0;
 const GAP_PX: f64 = 18.0;
 const BAR_PX: f64 = 14.0;
-/// Room for the colour bar's tick labels.
+/// Space for the colour bar's tick labels.
 const TICKS_PX: f64 = 58.0;
 
 impl HeatMap {
@@ -138,12 +137,12 @@ impl HeatMap {
     }
 }
 
-/// Small grids get larger cells.
+/// Cell size; small grids have larger cells.
 fn cell_px(tiles: [u32; 2]) -> u32 {
     (240 / tiles[0].max(tiles[1]).max(1)).clamp(1, 24)
 }
 
-/// The colours from 0 to `high` with an axis right of them.
+/// Draws the colours from 0 to `high` with an axis on the right.
 fn color_bar(area: &Area, high: f64) -> Drawn {
     let mut builder = ChartBuilder::on(area);
     let builder = builder.right_y_label_area_size(TICKS_PX);
@@ -173,7 +172,7 @@ fn png_of(panel: &Panel, high: f64) -> Result<Vec<u8>, String> {
     Ok(png.into_inner())
 }
 
-/// Viridis (van der Walt and Smith, 2015) at nine even points, linear between: perceptually
+/// Viridis (van der Walt and Smith, 2015) at nine equidistant points, linear in between: perceptually
 /// uniform and readable in grey.
 const VIRIDIS: [[u8; 3]; 9] = [
     [0x44, 0x01, 0x54],

@@ -1,5 +1,5 @@
-//! Line and scatter charts. A line's name stands at its last point, moved apart where lines meet;
-//! clouds of points are named in a row under the heading.
+//! Line and scatter charts. Lines are labelled at their last point, with labels moved apart if they
+//! overlap. Point clouds are named in a row below the heading.
 
 use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
 use super::{PlotError, SeriesStyle};
@@ -12,7 +12,7 @@ use std::ops::Range;
 /// How a series' points are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
-    /// A thin line through the points, named at its end.
+    /// A thin line through the points, labelled at its end.
     Line,
     /// A cloud of dots.
     Dots,
@@ -29,7 +29,7 @@ pub struct LineSeries {
     pub mark: Mark,
 }
 
-/// What doubles along an axis, and so how its ticks are written.
+/// Unit of an axis of doublings, for its ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doublings {
     /// Sizes, with binary units.
@@ -45,7 +45,7 @@ pub struct Axis {
     pub label: String,
     /// Ends of the axis; `None` takes them from the data.
     pub range: Option<(f64, f64)>,
-    /// Even steps are doublings of this; `None` for a linear axis.
+    /// The axis is logarithmic to base 2 with ticks in this unit; `None` for a linear axis.
     pub doublings: Option<Doublings>,
 }
 
@@ -67,7 +67,7 @@ impl Axis {
         }
     }
 
-    /// Where on the axis a value is.
+    /// The coordinate of a value on the axis.
     fn place(&self, value: f64) -> f64 {
         match self.doublings {
             Some(_) => value.log2(),
@@ -75,7 +75,7 @@ impl Axis {
         }
     }
 
-    /// Writes what is at a place on the axis; nothing between doublings, but numbers on an axis that has few.
+    /// Formats ticks. On an axis of doublings, only doublings have labels, unless the axis has few of them.
     fn tick(&self, range: &Range<f64>) -> Box<dyn Fn(&f64) -> String> {
         match self.doublings {
             None => Box::new(tick_format(range)),
@@ -112,7 +112,7 @@ const LEFT_PX: u32 = 58;
 const TOP_PX: u32 = 72;
 const PLOT_PX: (f64, f64) = (430.0, 260.0);
 const LABEL_GAP_PX: f64 = 15.0;
-/// From the plotting area to the names at the lines' ends.
+/// Distance from the plotting area to the labels at the lines' ends.
 const NAMES_PX: i32 = 22;
 
 impl LineChart {
@@ -209,7 +209,7 @@ impl LineChart {
 }
 
 impl Axis {
-    /// The ends of the axis over these values.
+    /// The ends of the axis for these values.
     pub(super) fn fit(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
         if let Some((low, high)) = self.range {
             return low..high;
@@ -219,7 +219,7 @@ impl Axis {
                 Some(range.map_or((v, v), |(l, h)| (l.min(v), h.max(v))))
             })
             .unwrap_or((0.0, 1.0));
-        // Points stand off the edges; an axis that comes near zero begins there.
+        // Points keep a distance from the edges; an axis that comes near zero starts at zero.
         let room = match 0.04 * (high - low) {
             0.0 => (0.04 * high.abs()).max(0.5),
             room => room,
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_series_that_end_together_do_not_overlap() {
+    fn labels_of_series_that_end_together_do_not_overlap() {
         let svg = chart().svg().unwrap();
         let mut at = ["Morton", "Z2 LRTA", "Z2 STA"].map(|name| text_at(&svg, name).1);
         at.sort_by(f64::total_cmp);
@@ -269,14 +269,14 @@ mod tests {
     }
 
     #[test]
-    fn both_axes_carry_their_units() {
+    fn both_axes_show_their_units() {
         let svg = chart().svg().unwrap();
         assert!(svg.contains("L1 size, KiB") && svg.contains("L1 miss rate, %"));
         assert!(svg.contains("\n16\n") && svg.contains("\n20\n"), "ticks");
     }
 
     #[test]
-    fn an_axis_of_doublings_has_its_points_at_even_steps() {
+    fn an_axis_of_doublings_is_logarithmic() {
         let mut chart = chart();
         chart.x = Axis::doublings("L1 size", Doublings::Bytes);
         chart.series[0].points = vec![(8.0, 1.0), (16.0, 1.0), (32.0, 1.0), (2048.0, 1.0)];

@@ -1,4 +1,4 @@
-//! Charts as SVG text by plotters: a pure function of the numbers, byte for byte.
+//! Charts as SVG text, drawn by plotters. Equal numbers give equal bytes.
 
 pub mod bars;
 pub mod boxes;
@@ -18,13 +18,13 @@ pub(crate) mod testing;
 use super::theme;
 use plotters::prelude::RGBColor;
 
-/// A chart could not be drawn.
+/// Error for a chart that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 #[error("plot `{title}`: {problem}")]
 pub struct PlotError {
     /// The chart's title.
     pub title: String,
-    /// What plotters or the data said.
+    /// Message from plotters or from the check of the data.
     pub problem: String,
 }
 

@@ -17,7 +17,7 @@ pub struct Stop {
     pub x: u32,
     /// Tile row.
     pub y: u32,
-    /// Taken together with the stop before it, on the same core.
+    /// Whether it is rendered together with the stop before it, on the same core.
     pub paired: bool,
 }
 
@@ -38,8 +38,8 @@ const TOP_PX: f64 = 62.0;
 const GAP_PX: f64 = 26.0;
 
 impl PathPlot {
-    /// The path as SVG: a line through numbered tiles. For grids that are too fine to number see
-    /// [`PathPlot::steps`].
+    /// The path as SVG: a line through numbered tiles. Use [`PathPlot::steps`] for grids that are too fine
+    /// for numbers.
     ///
     /// # Errors
     /// A stop outside the grid.
@@ -71,7 +71,7 @@ impl PathPlot {
                 let style = text_style(theme::LABEL_PX, theme::MUTED, HPos::Center);
                 let middle = (x + w / 2.0) as i32;
                 root.draw_text(name, &style, (middle, TOP_PX as i32 - 11))?;
-                // The last line of the grid is a pixel wide too.
+                // One pixel more for the last line of the grid.
                 self.numbered(&root.clone().shrink((x, TOP_PX), (w + 1.0, h + 1.0)), eye)?;
             }
             Ok(())
@@ -103,8 +103,8 @@ impl PathPlot {
         }
     }
 
-    /// One eye's path. A line between the eyes at every other step would hide both curves, so the
-    /// numbers tell the turn.
+    /// Draws one eye's path. The numbers show when the order changes eyes; lines between the eyes would
+    /// hide both curves.
     fn numbered(&self, area: &Area, eye: u32) -> Drawn {
         let [columns, rows] = self.tiles;
         let mut builder = ChartBuilder::on(area);
@@ -140,7 +140,7 @@ impl PathPlot {
         Ok(())
     }
 
-    /// Steps from 1; the two tiles of a pair share one.
+    /// Step numbers from 1; the two tiles of a pair share a number.
     fn numbering(&self) -> Vec<(usize, &Stop)> {
         let mut step = 0;
         self.stops

@@ -1,5 +1,5 @@
-//! Named points of two costs, with the front of those that no other beats. Every point's name
-//! stands near it, where it covers neither another name nor another point.
+//! Named points with two costs, and the front of those that are not dominated. Each point's label is near
+//! it and covers no other label or point.
 
 use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
 use super::lines::Axis;
@@ -17,7 +17,7 @@ pub struct ScatterChart {
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// Names of both kinds of point, dominated ones second.
+    /// Names of the two kinds of points: not dominated, then dominated.
     pub kinds: [String; 2],
     /// The points.
     pub points: Vec<NamedPoint>,
@@ -28,9 +28,9 @@ pub struct ScatterChart {
 pub struct NamedPoint {
     /// Name and colour.
     pub style: SeriesStyle,
-    /// Where it is.
+    /// Position.
     pub at: (f64, f64),
-    /// Another point is as good in both and better in one: drawn hollow.
+    /// Whether another point is at least as good in both costs and better in one; drawn hollow.
     pub dominated: bool,
 }
 
@@ -39,7 +39,7 @@ const LEFT_PX: u32 = 58;
 const RIGHT_PX: u32 = 120;
 const PLOT_PX: (f64, f64) = (720.0, 400.0);
 const NAME_HEIGHT_PX: f64 = 14.0;
-/// Names no further than this from their point need no line to it.
+/// Labels within this distance from their point need no leader line.
 const NEAR_PX: f64 = 16.0;
 const FARTHEST_PX: f64 = 230.0;
 
@@ -59,7 +59,7 @@ impl ScatterChart {
         let x = self.x.fit(self.points.iter().map(|p| p.at.0));
         let mut y = self.y.fit(self.points.iter().map(|p| p.at.1));
         if y.start == 0.0 {
-            // Points at zero are drawn whole.
+            // Points at zero are not clipped.
             y.start = -0.03 * y.end;
         }
         let frame = Frame {
@@ -95,7 +95,7 @@ impl ScatterChart {
                 .map(|p| p.at)
                 .collect();
             front.sort_by(|a, b| a.0.total_cmp(&b.0));
-            // Steps: a point covers all that is right of and above it.
+            // Steps: a point dominates everything to the right of and above it.
             let corner = |pair: &[(f64, f64)]| [pair[0], (pair[1].0, pair[0].1)];
             let mut steps: Vec<(f64, f64)> = front.windows(2).flat_map(corner).collect();
             steps.extend(front.last());
@@ -110,7 +110,7 @@ impl ScatterChart {
             let widths: Vec<f64> = self
                 .points
                 .iter()
-                // Some fonts are wider than is thought.
+                // Some fonts are wider than the estimate.
                 .map(|p| 1.07 * theme::text_width_px(&p.style.name, theme::TICK_PX))
                 .collect();
             let room = Rect {
@@ -119,7 +119,7 @@ impl ScatterChart {
                 right: f64::from(LEFT_PX + RIGHT_PX) + PLOT_PX.0 - 2.0,
                 bottom: f64::from(TOP_PX) + PLOT_PX.1 - 2.0,
             };
-            // Leaders lie under dots and names.
+            // Leader lines are below dots and labels.
             let names = place(&dots, &widths, &steps, room);
             for (dot, name) in dots.iter().zip(&names) {
                 let to = name.nearest(*dot);
@@ -176,7 +176,7 @@ impl Rect {
             * side((self.top, self.bottom), (other.top, other.bottom))
     }
 
-    /// The point of the rectangle that is nearest to another.
+    /// The point of the rectangle closest to another point.
     fn nearest(&self, (x, y): (f64, f64)) -> (f64, f64) {
         (
             x.clamp(self.left, self.right),
@@ -206,8 +206,8 @@ fn cross(a: [(f64, f64); 2], b: [(f64, f64); 2]) -> bool {
     side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0
 }
 
-/// A rectangle for the name of each dot: of the places around it, the nearest one that covers
-/// nothing placed before, no dot and none of the front's `steps`, and whose line to the dot crosses none.
+/// A rectangle for the label of each dot: the closest place around it that covers no placed label, no dot
+/// and none of the front's `steps`, and whose leader line crosses none.
 fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) -> Vec<Rect> {
     let mut placed: Vec<Rect> = Vec::new();
     let mut leaders: Vec<[(f64, f64); 2]> = Vec::new();
@@ -218,7 +218,7 @@ fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) 
                 .iter()
                 .map(|dot| place.overlap(&Rect::around(*dot, f64::from(DOT_PX) + 1.0)))
                 .sum();
-            // A step is upright or level: a narrow rectangle.
+            // A step is vertical or horizontal, so it is a narrow rectangle.
             let on_steps = steps.windows(2).filter(|ends| {
                 let between = |a: f64, b: f64| (a.min(b) - 1.0, a.max(b) + 1.0);
                 let ((left, right), (top, bottom)) =
@@ -239,7 +239,7 @@ fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) 
                 .filter(|other| cross(**other, leader))
                 .count();
             let through = if away > NEAR_PX {
-                // A line through another name reads as that name's.
+                // A leader line through another label would look like that label's.
                 let steps = (away / 4.0) as usize;
                 let on = |t: usize| {
                     let t = t as f64 / steps.max(1) as f64;
@@ -258,7 +258,7 @@ fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) 
             } else {
                 0
             };
-            // Beside a dot, its own height reads best.
+            // A label at the height of its dot is easiest to read.
             let aside = (f64::midpoint(place.top, place.bottom) - dot.1).abs();
             away + aside
                 + on_steps
@@ -269,12 +269,12 @@ fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) 
         let mut best: Option<(f64, Rect)> = None;
         let mut radius = f64::from(DOT_PX) + 4.0;
         while radius <= FARTHEST_PX {
-            // Beyond the best there is nothing better.
+            // Stop at the best possible place.
             if best.is_some_and(|(cost, _)| cost < radius) {
                 break;
             }
             for step in 0..24 {
-                // Right first, then upwards and down in turn.
+                // Right first, then alternately above and below.
                 let turn = f64::from((step + 1) / 2) * if step % 2 == 1 { -1.0 } else { 1.0 };
                 let angle = turn * std::f64::consts::TAU / 24.0;
                 let (x, y) = (dot.0 + radius * angle.cos(), dot.1 + radius * angle.sin());
@@ -295,7 +295,7 @@ fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) 
             }
             radius += 6.0;
         }
-        // Where nothing fits the name stands right of its dot.
+        // If nothing fits, the label is to the right of its dot.
         let beside = Rect {
             left: dot.0 + 8.0,
             top: dot.1 - NAME_HEIGHT_PX / 2.0,
@@ -323,7 +323,7 @@ mod tests {
 
     #[test]
     fn names_of_crowded_points_cover_neither_each_other_nor_a_point() {
-        // Ten techniques without error and of much the same time, as lossless ones are.
+        // Ten techniques without error and with similar times, such as lossless ones.
         let dots: Vec<(f64, f64)> = (0..10)
             .map(|i| (300.0 + 9.0 * f64::from(i), 390.0))
             .collect();
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_alone_has_its_name_right_beside_it() {
+    fn a_single_point_has_its_label_to_its_right() {
         let names = place(&[(100.0, 100.0)], &[50.0], &[], ROOM);
         assert!(
             names[0].left > 104.0 && names[0].left < 112.0,

@@ -1,4 +1,4 @@
-//! Spans of time on rows: who works on what when.
+//! Spans of time in rows: when each row works, and on what.
 
 use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
 use super::{PlotError, SeriesStyle};
@@ -18,18 +18,18 @@ pub struct SpanChart {
     pub kinds: Vec<SeriesStyle>,
     /// Names of the rows and their spans.
     pub rows: Vec<(String, Vec<Span>)>,
-    /// What the axis shows; spans are cut there.
+    /// Range of the axis; spans are cut at its ends.
     pub range: Range<f64>,
 }
 
 /// A span of a row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
-    /// From where to where.
+    /// Start and end.
     pub range: Range<f64>,
-    /// Index of its kind; with two, the upper half has the first.
+    /// Indices of its kinds; with two, the first one colours the upper half.
     pub kinds: Vec<usize>,
-    /// Written into it where there is room.
+    /// Text drawn inside if it fits.
     pub label: String,
 }
 
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_carry_labels_where_there_is_room_and_end_with_the_axis() {
+    fn spans_have_labels_where_these_fit_and_end_with_the_axis() {
         let svg = chart().svg().unwrap();
         assert_eq!(svg, chart().svg().unwrap());
         for text in ["\n12\n", "\n13\n", "\ncore 1\n"] {

@@ -1,4 +1,4 @@
-//! Stacked bars: the parts of a whole side by side with those of others.
+//! Stacked bars: the parts of several totals.
 
 use super::bars::wrap;
 use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
@@ -14,9 +14,9 @@ pub struct StackedChart {
     pub title: String,
     /// What the bars show, with its unit.
     pub value_label: String,
-    /// What the bars are, with the unit where they have one.
+    /// What the bars are, with the unit if they have one.
     pub bar_label: String,
-    /// Parts from the bottom up.
+    /// Parts, from bottom to top.
     pub series: Vec<SeriesStyle>,
     /// Name under each bar, which may be empty, and its parts.
     pub bars: Vec<(String, Vec<f64>)>,
@@ -32,7 +32,7 @@ const LEFT_PX: u32 = 58;
 const TOP_PX: u32 = 66;
 const PLOT_HEIGHT_PX: f64 = 216.0;
 const LINE_HEIGHT_PX: i32 = 15;
-/// Share of a bar's place that stays free.
+/// Free share of the width of each bar's place.
 const GAP: f64 = 0.16;
 
 impl StackedChart {

@@ -1,6 +1,6 @@
-//! Where a chart wrote a text.
+//! Finds where a chart draws a text.
 
-/// The point, px, at which `svg` has `text`.
+/// Position of `text` in `svg`, px.
 pub(crate) fn text_at(svg: &str, text: &str) -> (f64, f64) {
     let end = svg.find(&format!("\n{text}\n")).expect("the text is drawn");
     let attribute = |name: &str| {

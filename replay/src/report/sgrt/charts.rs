@@ -10,7 +10,7 @@ use crate::sgrt::compose::Reuse;
 use crate::sgrt::result::{Outcome, Report};
 use maud::Markup;
 
-/// The paper's figure 3: relative performance and relative energy, its values as marks.
+/// The paper's figure 3: relative performance and relative energy, with the published values as marks.
 pub fn ratios(entries: &[Entry]) -> Result<Markup, PlotError> {
     let performance = chart(
         entries,
@@ -67,7 +67,7 @@ fn chart(
     }
 }
 
-/// Units' cycles saved against image error: one cloud a level of reuse.
+/// Unit cycles saved against image error: one point cloud per level of reuse.
 pub fn curve(report: &Report) -> Result<Markup, PlotError> {
     let name = |reuse| match reuse {
         Reuse::Primary => "primary hits reused",
@@ -89,7 +89,7 @@ pub fn curve(report: &Report) -> Result<Markup, PlotError> {
             mark: Mark::Dots,
         }
     };
-    // Colour reuse saves the units nothing beyond shadow reuse, and looks the same.
+    // Colour reuse saves no more unit cycles than shadow reuse, and looks the same.
     let levels = [(Reuse::Primary, 2), (Reuse::Shadow, 0)];
     let of = |x: &dyn Fn(&crate::sgrt::result::CurvePoint) -> f64| {
         levels
@@ -115,7 +115,7 @@ pub fn curve(report: &Report) -> Result<Markup, PlotError> {
     Ok(figures(&[
         (
             flip.svg()?,
-            "One dot a rule; the table below names them.".to_owned(),
+            "One dot per rule; the table below names them.".to_owned(),
         ),
         (wrong.svg()?, String::new()),
     ]))

@@ -13,20 +13,20 @@ pub fn scene_name(report: &Report) -> String {
     crate::result::scene_name(&report.trace.scene).to_owned()
 }
 
-/// Which rule and level of reuse the rows called "chosen" have.
+/// Describes the rule and level of reuse of the rows named "chosen".
 #[must_use]
 pub fn rule_line(entries: &[Entry]) -> String {
     entries.first().map_or_else(String::new, |entry| {
         let config = &entry.report.config;
         format!(
-            "chosen: rule {}, reuse of {}; plain: rule none, every arrival reused as it is",
+            "chosen: rule {}, reuse of {}; plain: rule none, every reprojected hit is reused",
             config.rule,
             reuse_name(config.reuse)
         )
     })
 }
 
-/// Mean reuse over the traces that are set beside scenes of the paper, chosen and plain.
+/// Mean reuse over the traces that correspond to a scene of the paper, for both rules.
 #[must_use]
 pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
     let of_paper: Vec<&Report> = entries
@@ -39,7 +39,7 @@ pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
         |pct: fn(&Report) -> f64| of_paper.iter().map(|r| pct(r)).sum::<f64>() / count as f64;
     (count > 0).then(|| {
         format!(
-            "right pixels reused, mean of {count} scenes beside the paper's: {:.2} % chosen, \
+            "right pixels reused, mean of {count} scenes that stand for the paper's: {:.2} % chosen, \
              {:.2} % plain; paper {:.2} %",
             mean(|r| r.result.reuse_pct),
             mean(|r| r.plain.reuse_pct),
@@ -48,7 +48,7 @@ pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
     })
 }
 
-/// What to know of traces whose eyes the paper's row test is not made for.
+/// Notes on traces whose eyes do not meet the conditions of the paper's row test.
 #[must_use]
 pub fn row_notes(entries: &[Entry]) -> Vec<String> {
     let reports = entries.iter().map(|e| &e.report);
@@ -78,11 +78,11 @@ pub fn reuse_name(reuse: Reuse) -> &'static str {
     }
 }
 
-/// A trace under one of the two rules that every report has.
+/// A trace with one of the two rules that every report has.
 struct RuleRow<'a> {
     report: &'a Report,
-    /// Rules can be long: tables call them "chosen" and "plain", and [`rule_line`] says which one
-    /// was chosen.
+    /// "chosen" or "plain": tables use these names because rules can be long. [`rule_line`] describes the
+    /// chosen rule.
     run: &'static str,
     outcome: &'a Outcome,
 }
@@ -271,7 +271,7 @@ fn by_rule(entries: &[Entry], keys: &[&str]) -> Table {
     Table::new(&columns, &rule_rows(entries)).grouped_by(1)
 }
 
-/// The ratios beside the paper's.
+/// The ratios, and the paper's.
 pub fn performance(entries: &[Entry]) -> Table {
     let keys = [
         "reuse_pct",
@@ -288,7 +288,7 @@ pub fn performance(entries: &[Entry]) -> Table {
     by_rule(entries, &keys).without_empty_columns()
 }
 
-/// Reuse with its error.
+/// Reuse and its error.
 pub fn accuracy(entries: &[Entry]) -> Table {
     let keys = [
         "reuse_pct",
@@ -322,7 +322,7 @@ pub fn work(entries: &[Entry]) -> Table {
     by_rule(entries, &keys)
 }
 
-/// Bytes moved, with the G-buffer in tiles and without.
+/// Bytes moved, with a tiled G-buffer and without.
 pub fn traffic(entries: &[Entry]) -> Table {
     let keys = [
         "detection_bytes",
@@ -338,13 +338,13 @@ pub fn traffic(entries: &[Entry]) -> Table {
     by_rule(entries, &keys)
 }
 
-/// A row for the rule and one for plain reuse, per trace.
+/// Per trace, one row for the rule and one for plain reuse.
 #[must_use]
 pub fn rows(entries: &[Entry]) -> Table {
     Table::new(&RuleRow::columns(), &rule_rows(entries))
 }
 
-/// The same as CSV.
+/// [`rows`] as CSV.
 #[must_use]
 pub fn csv(entries: &[Entry]) -> String {
     rows(entries).csv()
@@ -363,7 +363,7 @@ impl ClassRow<'_> {
     }
 }
 
-/// Pixels by class, and what is wrong with those reused.
+/// Pixels by class, and the errors of the reused ones.
 pub fn classes(entries: &[Entry]) -> Table {
     let runs = rule_rows(entries);
     let pixels = |key, name, value: fn(&ClassCounts) -> u64| {
@@ -400,7 +400,7 @@ pub fn classes(entries: &[Entry]) -> Table {
     Table::new(&columns, &rows).grouped_by(2)
 }
 
-/// Energy of a way of rendering.
+/// Energy of a rendering method.
 struct EnergyRow<'a> {
     scene: String,
     run: &'static str,
@@ -408,7 +408,7 @@ struct EnergyRow<'a> {
     whole_pj: f64,
 }
 
-/// Energy by component over the reference's total.
+/// Energy by component, relative to the reference's total.
 pub fn energy(entries: &[Entry]) -> Table {
     let part = |key, name, value: fn(&EnergyPj) -> f64| {
         Column::real(key, name, "%", 1, move |r: &EnergyRow| {
@@ -484,7 +484,7 @@ pub fn curve(report: &Report) -> Table {
     Table::new(&columns, &report.curve).grouped_by(1)
 }
 
-/// Parameters by their effect on the ratios.
+/// Parameters, sorted by their effect on the ratios.
 pub fn sensitivity(report: &Report) -> Table {
     let ratio = |key, name, value: fn(&Sensitivity) -> f64| {
         Column::real(key, name, "ratio", 3, move |s: &Sensitivity| value(s))

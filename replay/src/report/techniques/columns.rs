@@ -1,4 +1,4 @@
-//! The figures of a technique, a line each.
+//! The figures of a technique, one per line.
 
 use crate::config::Order;
 use crate::model_version::MODEL_VERSION;
@@ -8,7 +8,7 @@ use crate::techniques::{CacheFigures, Count, Measured, OrderGain, RATES_HZ};
 /// A column of techniques.
 pub type Figure<'a> = Column<'a, &'a Measured<'a>>;
 
-/// Keys of the table for a terminal, where it has them.
+/// Keys of the table on a terminal; missing columns are skipped.
 pub const SHORT: [&str; 20] = [
     "scene",
     "technique",
@@ -56,8 +56,8 @@ fn ratio<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
     })
 }
 
-/// Every figure of these techniques: what the captures name themselves (stages, predictions) has
-/// columns as they name it. `order` is the order of the cache figures.
+/// Every figure of these techniques. Stages and predictions have the names that the captures give them.
+/// `order` is the order of the cache figures.
 #[must_use]
 #[rustfmt::skip]
 pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
@@ -70,29 +70,29 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
         Figure::text("camera", "camera", |m| m.manifest.camera.as_str()),
         Figure::text("display", "display", |m| m.manifest.hmd.name.as_str()),
         Figure::text("width_px", "width", |m| u64::from(m.manifest.size_px[0]))
-            .about("width of an eye's picture in pixels"),
+            .about("image width per eye in pixels"),
         Figure::text("height_px", "height", |m| u64::from(m.manifest.size_px[1]))
-            .about("height of an eye's picture in pixels"),
+            .about("image height per eye in pixels"),
         Figure::text("model_version", "model", |_| u64::from(MODEL_VERSION))
             .about("version of the models; counts of different versions cannot be compared"),
         Figure::text("technique", "technique", |m| m.row.technique.as_str()),
         Figure::text("title", "name", |m| m.row.title.as_str()),
         Figure::text("parts", "combines", |m| m.row.parts.join(" + ")),
         Figure::text("lossless", "lossless", |m| m.row.lossless)
-            .about("no pixel that the user can see is meant to change"),
+            .about("meant to leave every visible pixel unchanged"),
         Figure::text("dominated", "dominated", |m| m.dominated)
-            .about("another technique errs no more and takes less time: the quartiles of both are apart"),
+            .about("another technique has no more error and takes less time (the interquartile ranges do not overlap)"),
         Figure::text("dominated_in", "dominated in", |m| m.dominated_in.join(" "))
-            .about("counts of which another technique needs no more, with no more error in its worst picture, and is better at one of both"),
+            .about("counts in which another technique is at least as good, with at most the same error in its worst picture, and better in one of both"),
 
         Figure::real("frame_time_ratio", "time", "\u{d7} baseline", 3, |m| m.timing.ratio.median)
-            .about("median over all frames and repeats of the frame time over the baseline's that was measured beside it"),
+            .about("frame time over that of the baseline measured next to it: median over all frames and repeats"),
         Figure::real("frame_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q1),
         Figure::real("frame_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q3),
         Figure::real("frame_time_ratio_p1", "1 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p1),
         Figure::real("frame_time_ratio_p99", "99 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p99),
         Figure::real("processor_time_ratio", "processors", "\u{d7} baseline", 3, |m| m.timing.processor_ratio)
-            .about("what processors worked for all frames over what they worked for the baseline's, of each frame the least of its repeats: steadier than the clock's time where others use the machine"),
+            .about("processor time over the baseline's, all frames; each frame counts with its fastest repeat. Other load on the machine affects it less than the frame time"),
         Figure::real("processor_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.processor_ratios.map(|r| r.q1)),
         Figure::real("processor_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.processor_ratios.map(|r| r.q3)),
         Figure::real("frame_ms", "frame", "ms", 2, |m| m.timing.frame_ms.median)
@@ -100,21 +100,21 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
         Figure::real("frame_ms_p1", "1 %", "ms", 2, |m| m.timing.frame_ms.p1),
         Figure::real("frame_ms_p99", "99 %", "ms", 2, |m| m.timing.frame_ms.p99),
         Figure::real("beyond_90hz_pct", "late at 90 Hz", "%", 1, |m| m.timing.beyond_pct[0])
-            .about("frames beyond 11.1 ms, times scaled so that the baseline's median takes 11.1 ms"),
+            .about("frames longer than 11.1 ms, with times scaled to a median of 11.1 ms for the baseline"),
         Figure::real("beyond_72hz_pct", "late at 72 Hz", "%", 1, |m| m.timing.beyond_pct[1])
-            .about("frames beyond 13.9 ms, times scaled so that the baseline's median takes 11.1 ms"),
+            .about("frames longer than 13.9 ms, with times scaled to a median of 11.1 ms for the baseline"),
         Figure::real("cull_ms", "culling", "ms", 3, |m| m.timing.cull_ms)
-            .about("median time of culling a frame"),
+            .about("median culling time per frame"),
     ];
     columns.extend((0..RATES_HZ.len()).map(|at| {
         let hz = RATES_HZ[at];
         Figure::real(format!("missed_pct_{hz}hz"), format!("missed at {hz} Hz"), "%", 1, move |m| Some(m.timing.pacing.get(at)?.missed_pct))
-            .about("frames that take longer than a refresh, by their times as measured")
+            .about("frames that take longer than a refresh interval, by measured times")
     }));
     columns.extend((0..RATES_HZ.len()).map(|at| {
         let hz = RATES_HZ[at];
         Figure::real(format!("steps_{hz}hz"), format!("steps at {hz} Hz"), "refreshes", 2, move |m| Some(m.timing.pacing.get(at)?.steps))
-            .about("refreshes that a frame takes on average, 1 where none is missed; the rate over it is what is shown")
+            .about("mean number of refresh intervals per frame, 1 if no frame is late; the display rate divided by it is the frame rate")
     }));
     let mut stages: Vec<&str> = Vec::new();
     for (stage, _) in rows.iter().flat_map(|m| &m.timing.stages_ms) {
@@ -135,9 +135,9 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
             .about("bounds tested against a frustum"),
         ratio("cull_tests_ratio", "tests", |f| Some(f.cull_tests)),
         Figure::new("false_negatives", "missed", "draws", Show::Whole, |m| m.total(|f| f.false_negatives))
-            .about("draws left out of which a fragment can be seen, all frames"),
+            .about("draws that were culled although a fragment is visible, all frames"),
         Figure::new("false_positives", "needless", "draws", Show::Whole, |m| m.total(|f| f.false_positives))
-            .about("draws kept of which nothing can be seen, all frames"),
+            .about("draws that were rendered although nothing of them is visible, all frames"),
         mean("draws", "draws", |f| Some(f.draws)),
         ratio("draws_ratio", "draws", |f| Some(f.draws)),
         mean("draw_calls", "calls", |f| Some(f.draw_calls)),
@@ -149,37 +149,37 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
         ratio("fragments_ratio", "fragments", |f| f.fragments),
         mean("bytes_uploaded", "uploaded", |f| Some(f.bytes_uploaded)),
         mean("memory_bytes", "traffic", |f| f.memory_bytes)
-            .about("counted memory traffic: texture lines once a tile, vertices, pictures, uploads"),
+            .about("counted memory traffic: texture lines once per tile, vertices, images, uploads"),
         ratio("memory_bytes_ratio", "traffic", |f| f.memory_bytes),
         Figure::real("energy_ratio", "energy", "\u{d7} baseline", 3, |m| m.energy_ratio())
-            .about("energy of the counted traffic, fragments and vertices over the baseline's"),
+            .about("energy of the counted traffic, fragments and vertices, over the baseline's"),
         mean("bytes_reprojected", "reprojected", |f| Some(f.bytes_reprojected)),
         Figure::new("target_color_bytes", "colour targets", "MB", Show::Millions(2), |m| m.most(|f| f.target_color_bytes))
-            .about("colour of all layers of a frame, and of pictures composed of them; the frame with the most"),
+            .about("colour targets of all layers and composed images; the frame with the most"),
         Figure::new("target_depth_bytes", "depth targets", "MB", Show::Millions(2), |m| m.most(|f| f.target_depth_bytes))
-            .about("depth buffers that have to be there at a time: passes one after the other share one, views drawn at once do not"),
+            .about("depth buffers in use at the same time: successive render passes share one, views drawn at once do not"),
         Figure::new("texture_bytes", "textures", "MB", Show::Millions(2), |m| m.row.texture_bytes)
-            .about("texels of the scene, there once for both eyes"),
+            .about("texels of the scene, stored once for both eyes"),
         Figure::new("peak_memory_bytes", "memory", "MB", Show::Millions(0), |m| m.row.peak_memory_bytes)
-            .about("most memory that the capturer held"),
+            .about("peak memory of the capturing process"),
 
         Figure::real("flip_mean", "FLIP", "", 5, |m| m.pictures.flip_mean)
-            .about("mean FLIP where the user can see"),
+            .about("mean FLIP inside the visible area of the lens"),
         Figure::real("flip_p99", "FLIP 99 %", "", 5, |m| m.pictures.flip_p99)
             .about("mean of the pictures' 99th percentiles of FLIP"),
         Figure::real("flip_worst", "worst", "FLIP", 5, |m| m.pictures.flip_worst)
             .about("mean FLIP of the worst picture"),
         Figure::new("worst_frame", "frame", "worst", Show::Whole, |m| u64::from(m.worst_frame)),
         Figure::real("psnr_db", "PSNR", "dB", 1, |m| m.pictures.psnr_db)
-            .about("mean peak signal-to-noise ratio; 100 stands for no difference"),
+            .about("mean peak signal-to-noise ratio; 100 means identical"),
         Figure::real("psnr_worst_db", "worst", "dB", 1, |m| m.pictures.psnr_worst_db),
         Figure::real("ssim", "SSIM", "", 4, |m| m.pictures.ssim)
             .about("mean structural similarity"),
         Figure::real("ssim_worst", "worst", "SSIM", 4, |m| m.pictures.ssim_worst),
         Figure::real("flicker", "flicker", "", 5, |m| m.pictures.flicker)
-            .about("how much more the picture changes from frame to frame than the baseline's, 0 to 1, followed along the baseline's motion"),
+            .about("temporal change of the picture minus that of the baseline, 0 to 1, along the baseline's motion"),
         Figure::real("identical_pct", "identical", "% of pictures", 1, |m| m.pictures.identical_pct)
-            .about("pictures whose visible pixels are the baseline's to the bit"),
+            .about("pictures whose visible pixels equal the baseline's bit for bit"),
     ]);
     let mut predictions: Vec<&str> = Vec::new();
     for (key, _) in rows.iter().flat_map(|m| &m.row.frames).flat_map(|f| &f.predicted) {
@@ -190,7 +190,7 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
     columns.extend(predictions.into_iter().map(str::to_owned).map(|key| {
         let heading = (format!("predicted.{key}"), format!("predicted {}", key.replace('_', " ")));
         Figure::real(heading.0, heading.1, "", 3, move |m| m.predicted(&key))
-            .about("mean of what the technique said beforehand")
+            .about("mean of the technique's own prediction")
     }));
     columns.extend([
         Figure::new("footprints", "footprints", "", Show::Whole, move |m| Some(m.caches_in(order)?.footprints))
@@ -205,11 +205,10 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
     columns
 }
 
-/// A column of what an order gains with a technique.
+/// A column of an order's saving with a technique.
 pub type GainFigure<'a> = Column<'a, OrderGain<'a>>;
 
-/// The table of orders with and without each technique. `gain` is the order whose saving over
-/// `against` is shown.
+/// The table of orders with and without each technique. It shows the saving of `gain` over `against`.
 #[must_use]
 #[rustfmt::skip]
 pub fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -> Vec<GainFigure<'a>> {
@@ -228,11 +227,11 @@ pub fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -> Vec<G
     columns.extend([
         GainFigure::real("saved_pct", saved, "%", 1, |g| g.own.saved_pct),
         GainFigure::real("saved_without_pct", "without", "%", 1, |g| g.baseline.saved_pct)
-            .about("what the order saves on the baseline's trace"),
+            .about("saving of the order on the baseline's trace"),
         GainFigure::real("shared_pct", "shared", "% of lines", 1, |g| g.own.shared_pct)
-            .about("lines that both eyes touch, of those that either does"),
+            .about("percentage of the touched lines that both eyes touch"),
         GainFigure::real("headroom_pct", "above bound", "%", 1, |g| g.own.headroom_pct)
-            .about("traffic above that of an infinite cache: no order saves more"),
+            .about("traffic above that of an infinite cache: the largest possible saving of any order"),
         GainFigure::text("reason", "why", OrderGain::reason),
     ]);
     if let Some(column) = columns.iter_mut().find(|c| c.heading.key == "saved_pct") {

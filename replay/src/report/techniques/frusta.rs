@@ -7,29 +7,29 @@ use formats::view::{Hmd, Lens};
 use plotters::prelude::RGBColor;
 use std::fmt::Write;
 
-/// Edge of each of both drawings, px.
+/// Edge of each of the two drawings, px.
 const PANEL_PX: f64 = 430.0;
 const GAP_PX: f64 = 46.0;
 const TOP_PX: f64 = 84.0;
 const BOTTOM_PX: f64 = 46.0;
-/// Distance ahead that the far drawing shows where nothing asks for more, metres.
+/// Least distance ahead that the far drawing shows, metres.
 const FAR_M: f64 = 10.0;
-/// A rank of labels at the same height, px.
+/// Height of a row of labels, px.
 const LINE_PX: f64 = 15.0;
 
-/// What the drawing is of.
+/// Input of the drawing.
 pub struct Frusta<'a> {
     /// Heading.
     pub title: String,
     /// The display.
     pub hmd: &'a Hmd,
-    /// What the lenses show.
+    /// The visible areas of the lenses.
     pub lens: [Lens; 2],
-    /// Where far fields begin, metres, by the technique's name.
+    /// Split distances of far fields in metres, by the technique's name.
     pub splits: Vec<(String, f64)>,
 }
 
-/// An edge seen from above: where it begins and where it leads, x to the right and z ahead.
+/// An edge seen from above: its origin, x to the right and z ahead, and its direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Edge {
     from: [f64; 2],
@@ -44,7 +44,7 @@ impl Edge {
 }
 
 impl Frusta<'_> {
-    /// Left and right edge of eye 0 (left) or 1 (right) between two tangents of its own axis.
+    /// Left and right edge of eye 0 (left) or 1 (right) between two tangents to its own axis.
     fn edges(&self, eye: usize, left: f64, right: f64) -> [Edge; 2] {
         let side = if eye == 0 { -1.0 } else { 1.0 };
         let from = [side * f64::from(self.hmd.ipd_m) / 2.0, 0.0];
@@ -66,12 +66,12 @@ impl Frusta<'_> {
         self.edges(eye, radius - center, radius + center)
     }
 
-    /// Where the outermost edges of both eyes meet behind them; none where they do not.
+    /// Intersection of the outermost edges behind the eyes; `None` if they do not meet there.
     fn apex(&self) -> Option<[f64; 2]> {
         let (left, right) = (self.frustum(0)[0], self.frustum(1)[1]);
         let ([ax, az], [bx, bz]) = (left.direction(), right.direction());
         let turn = ax * bz - az * bx;
-        // Beyond 180 degrees together the edges meet ahead, or nowhere.
+        // With 180 degrees or more together, the edges do not meet behind the eyes.
         if left.angle - right.angle >= 0.0 || right.angle - left.angle >= std::f64::consts::PI {
             return None;
         }
@@ -80,7 +80,7 @@ impl Frusta<'_> {
         Some([left.from[0] + along * ax, left.from[1] + along * az])
     }
 
-    /// The drawing as SVG: near the eyes in millimetres, and as far as the splits in metres.
+    /// The drawing as SVG: one panel near the eyes in millimetres, one up to the splits in metres.
     #[must_use]
     pub fn svg(&self) -> String {
         let width = 2.0 * PANEL_PX + 3.0 * GAP_PX;
@@ -205,11 +205,11 @@ impl Frusta<'_> {
         *out += "</g>";
     }
 
-    /// Each split as a line across, its label above the line and clear of the label before.
+    /// Draws each split as a horizontal line with its label above, without overlapping labels.
     fn draw_splits(&self, out: &mut String, panel: &Panel) {
         let mut splits: Vec<(f64, Vec<&str>)> = Vec::new();
         for (name, split) in &self.splits {
-            // What the label cannot tell apart is one line.
+            // Splits with the same label text become one line.
             match splits
                 .iter_mut()
                 .find(|(known, _)| (known - split).abs() < 0.005)
@@ -236,7 +236,7 @@ impl Frusta<'_> {
     }
 }
 
-/// One of both drawings.
+/// One of the two drawings.
 struct Panel {
     left_px: f64,
     /// Its left and lower edge, metres.
@@ -260,7 +260,7 @@ impl Panel {
         [self.px(edge.from), self.px(end)]
     }
 
-    /// The frame, and ticks in the axis's unit along the lower and the left edge.
+    /// Draws the frame, and ticks in the axis's unit along the lower and the left edge.
     fn frame(&self, out: &mut String, axis: &str, scale: f64) {
         let step = tick_step(self.span * scale) / scale;
         for side in 0..2 {
@@ -310,12 +310,12 @@ const fn rgb(color: RGBColor) -> Rgb {
     [color.0, color.1, color.2]
 }
 
-/// As the page's style sheet knows colours.
+/// A colour in the form that the page's style sheet matches.
 fn hex([red, green, blue]: Rgb) -> String {
     format!("#{red:02X}{green:02X}{blue:02X}")
 }
 
-/// The distance between ticks of an axis that long: 1, 2 or 5 times a power of ten, at most ten of them.
+/// The distance between ticks of an axis of this length: 1, 2 or 5 times a power of ten, at most ten ticks.
 fn tick_step(span: f64) -> f64 {
     let power = 10_f64.powf((span / 10.0).log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].map(|times| times * power);
@@ -346,7 +346,7 @@ fn label(out: &mut String, [x, y]: [f64; 2], anchor: &str, size_px: u32, color: 
     );
 }
 
-/// A label on a piece of the page's own colour, so that lines behind it do not cross it.
+/// A label on a background in the page's colour, which hides lines behind it.
 fn lifted(out: &mut String, [x, y]: [f64; 2], text: &str) {
     let half = theme::text_width_px(text, theme::LABEL_PX) / 2.0 + 3.0;
     let _ = write!(
@@ -397,13 +397,13 @@ mod tests {
     }
 
     #[test]
-    fn the_apex_of_parallel_eyes_is_where_the_closed_form_has_it() {
+    fn the_apex_of_parallel_eyes_matches_the_closed_form() {
         // Symmetric eyes of 90 degrees, 64 mm apart: 32 mm behind them.
         let [x, z] = drawing(&hmd(1.0, 1.0, 0.0), &[]).apex().unwrap();
         assert!(x.abs() < 1e-7 && (z + 0.032).abs() < 1e-7, "{x} {z}");
         let [_, z] = drawing(&hmd(1.4, 0.9, 0.0), &[]).apex().unwrap();
         assert!((z + 0.064 / 2.8).abs() < 1e-7);
-        // Canted eyes look further out, which moves it nearer; beyond 180 degrees there is none.
+        // Canted eyes look further out, so the apex is nearer; beyond 180 degrees there is none.
         let [_, canted] = drawing(&hmd(1.4, 0.9, 10.0), &[]).apex().unwrap();
         assert!(canted > z && canted < 0.0);
         assert_eq!(drawing(&hmd(6.0, 1.0, 12.0), &[]).apex(), None);
@@ -420,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_of_splits_never_overlap_and_equal_ones_are_one() {
+    fn labels_of_splits_do_not_overlap_and_equal_ones_are_merged() {
         let text = frusta(
             1.2,
             1.2,

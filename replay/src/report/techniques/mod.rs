@@ -1,4 +1,4 @@
-//! Techniques of stereo rendering on some scenes: table, JSON, CSV and page.
+//! Results of stereo rendering techniques: table, JSON, CSV and page.
 
 mod columns;
 mod frusta;
@@ -23,21 +23,21 @@ use serde::Serialize;
 /// Schema of the JSON object.
 pub const SCHEMA: &str = "replay.techniques/1";
 
-/// What is measured of some scenes.
+/// Measurements of the techniques on some scenes.
 pub struct TechniquesReport<'a> {
     /// The scenes.
     pub scenes: &'a [Measures<'a>],
     /// Their manifests.
     pub manifests: Vec<&'a Manifest>,
-    /// Caches, sampling and layout; its order is the one of the table.
+    /// Caches, sampling and layout; its order is the order of the table.
     pub config: RunConfig,
-    /// Orders that the traces were replayed in.
+    /// Orders of the replays.
     pub orders: Vec<Order>,
 }
 
 /// The JSON object.
 #[derive(Serialize)]
-struct Document<'r, 'a> {
+struct TechniquesJson<'r, 'a> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
@@ -48,7 +48,7 @@ struct Document<'r, 'a> {
     published: Records<'r, 'static, ClaimRow<'a>>,
 }
 
-/// What the figures of a scene belong to.
+/// Facts about a scene, for the JSON.
 #[derive(Serialize)]
 struct SceneFacts<'a> {
     scene: &'a str,
@@ -69,7 +69,7 @@ struct SceneFacts<'a> {
 }
 
 impl<'a> TechniquesReport<'a> {
-    /// The order whose saving is shown, and the order that it is measured against.
+    /// The order whose saving is shown, and the order that it is compared with.
     #[must_use]
     pub fn gain_orders(&self) -> (Order, Order) {
         let own = self.config.order;
@@ -99,7 +99,7 @@ impl<'a> TechniquesReport<'a> {
         Table::new(&columns, &rows).grouped_by(1)
     }
 
-    /// The figures that fit a terminal.
+    /// The figures for a terminal.
     #[must_use]
     pub fn short_table(&self) -> Table {
         let one = self.scenes.len() == 1;
@@ -110,7 +110,7 @@ impl<'a> TechniquesReport<'a> {
         table.grouped_by(usize::from(!one))
     }
 
-    /// How the frames fare at the refresh rates of displays.
+    /// Late frames at the refresh rates of displays.
     #[must_use]
     pub fn pacing_table(&self) -> Table {
         let one = self.scenes.len() == 1;
@@ -122,7 +122,7 @@ impl<'a> TechniquesReport<'a> {
         table.grouped_by(usize::from(!one))
     }
 
-    /// What an order gains with and without each technique.
+    /// Saving of an order with and without each technique.
     #[must_use]
     pub fn order_table(&self) -> Table {
         let (order, against) = self.gain_orders();
@@ -130,7 +130,7 @@ impl<'a> TechniquesReport<'a> {
         Table::new(&columns, &self.gains()).grouped_by(1)
     }
 
-    /// Published savings beside ours.
+    /// Published savings and the measured ones.
     #[must_use]
     pub fn claim_table(&self) -> Table {
         Table::new(&claim_columns(), &claims(self.scenes)).without_empty_columns()
@@ -157,7 +157,7 @@ impl<'a> TechniquesReport<'a> {
         for manifest in &self.manifests {
             if let Some(defect) = &manifest.multiview_defect {
                 text += &format!(
-                    "multiview was timed view by view, counted as one submission: {}\n",
+                    "multiview was timed as separate views and counted as one submission: {}\n",
                     formats::text::printable(defect)
                 );
             }
@@ -199,7 +199,7 @@ impl<'a> TechniquesReport<'a> {
             baseline: &m.baseline,
             auto: m.auto.as_ref(),
         };
-        serde_json::to_string_pretty(&Document {
+        serde_json::to_string_pretty(&TechniquesJson {
             schema: SCHEMA,
             tool: TOOL,
             model_version: MODEL_VERSION,

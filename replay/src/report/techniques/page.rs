@@ -12,7 +12,7 @@ use crate::techniques::{Difference, Measured, Measures};
 use formats::view::Eye;
 use maud::{Markup, html};
 
-/// Keys of the columns that the page's table shows; CSV and JSON have them all.
+/// Keys of the columns in the page's table; CSV and JSON have all columns.
 const SHOWN: [&str; 30] = [
     "technique",
     "frame_time_ratio",
@@ -48,12 +48,12 @@ const SHOWN: [&str; 30] = [
 
 /// A scene's pictures.
 pub struct Scene {
-    /// The difference pictures, each with its picture for the page.
+    /// The difference pictures, each with its form for the page.
     pub differences: Vec<(Difference, EmbeddedPicture)>,
 }
 
 impl TechniquesReport<'_> {
-    /// The page; `pictures` has one a scene.
+    /// The page; `pictures` has one entry per scene.
     ///
     /// # Errors
     /// A plot that cannot be drawn.
@@ -91,32 +91,26 @@ impl TechniquesReport<'_> {
                 html! {
                     (pacing.markup())
                     (meanings(&pacing))
-                    p.note { "Times are as they were measured on the device above, not scaled to a display's." }
+                    p.note { "Times are as measured on the device above, not scaled to a display's refresh rate." }
                 },
             ));
             sections.push(section(
                 format!("{name}: frusta and cones"),
                 html::figure(
                     &frusta(measures, manifest).svg(),
-                    "Both drawings are to scale. Far fields lie beyond their split, seen by one camera between the eyes.",
+                    "Both drawings are to scale. Far fields begin at their split and are rendered by one camera between the eyes.",
                 ),
             ));
             let stages = self.stage_table(&table, name);
             if !stages.rows.is_empty() {
-                sections.push(section(
-                    format!("{name}: where the time goes"),
-                    stages.markup(),
-                ));
+                sections.push(section(format!("{name}: time by stage"), stages.markup()));
             }
             if let Some(auto) = &manifest.auto {
-                sections.push(section(
-                    format!("{name}: chosen for a budget"),
-                    chosen(auto),
-                ));
+                sections.push(section(format!("{name}: automatic choice"), chosen(auto)));
             }
             if !scene.differences.is_empty() {
                 sections.push(section(
-                    format!("{name}: what was skipped"),
+                    format!("{name}: skipped work"),
                     differences(measures, &scene.differences),
                 ));
             }
@@ -131,10 +125,10 @@ impl TechniquesReport<'_> {
         let claims = self.claim_table();
         if !claims.rows.is_empty() {
             sections.push(Section::new(
-                "Published savings beside ours",
+                "Published and measured savings",
                 html! {
                     (claims.markup())
-                    p.note { "Ours is on another device and other scenes than the published figure; what it costs in image error stands beside it." }
+                    p.note { "Device and scenes differ from those of the published figure. The image error of the technique is in the same row." }
                 },
             ));
         }
@@ -149,12 +143,12 @@ impl TechniquesReport<'_> {
         let software = self.manifests.iter().any(|m| m.software_driver);
         let lead = html! {
             p {
-                "Every technique on " (scenes.join(", ")) ", alone and combined, held against the baseline: "
-                "frame time measured alternately with it, image error where the user can see, and what the texture caches fetch. "
-                "All figures are in the JSON and CSV files beside this page."
+                "Every technique on " (scenes.join(", ")) ", alone and combined, compared with the baseline: "
+                "frame time (measured in alternation with the baseline), image error inside the visible area, and texture cache traffic. "
+                "All figures are in the JSON and CSV files next to this page."
             }
             @if software {
-                p { strong { "Frame times are a processor's" } ": the driver renders in software, so they weigh vertices, fragments and state changes otherwise than a GPU does. Counts, image errors and cache figures do not depend on it." }
+                p { strong { "Frame times are a processor's" } ": the driver renders in software, so the cost of vertices, fragments and state changes differs from a GPU's. Counts, image errors and cache figures do not depend on that." }
             }
         };
         Ok(html::page(
@@ -164,7 +158,7 @@ impl TechniquesReport<'_> {
         ))
     }
 
-    /// The stages' times, if the capture tells them.
+    /// The times of the stages, if the capture has them.
     fn stage_table(&self, table: &Table, scene: &str) -> Table {
         let keys: Vec<&str> = table
             .headings
@@ -184,9 +178,9 @@ impl TechniquesReport<'_> {
             (orders.markup())
             (meanings(orders))
             p.note {
-                (order.title()) " renders the tiles of both eyes that show the same place together, so that the second eye finds the lines that the first one fetched. "
-                "It can save what " (against.title()) " fetches more than once: the traffic above an infinite cache's, and of that what both eyes touch. "
-                "A technique that shrinks either leaves less to save."
+                (order.title()) " renders the tiles of both eyes that show the same place together. The second eye then hits the lines that the first eye fetched. "
+                "It can save at most the repeated fetches of " (against.title()) ": the traffic above that of an infinite cache, as far as both eyes touch the lines. "
+                "A technique that reduces either leaves less to save."
             }
         }
     }
@@ -205,24 +199,24 @@ fn facts(manifest: &Manifest) -> Markup {
                 " at " (manifest.fps) " a second"
             }
             dt { "display" } dd {
-                (manifest.hmd.name) ", " (width) "\u{d7}" (height) " px an eye, "
-                strong { (format!("{:.2}", manifest.pixels_per_degree)) " pixels per degree" } ", to which every FLIP belongs; lens of radius tangent " (format!("{:.3}", lens.radius))
+                (manifest.hmd.name) ", " (width) "\u{d7}" (height) " px per eye, "
+                strong { (format!("{:.2}", manifest.pixels_per_degree)) " pixels per degree" } ", used by every FLIP value; lens of radius tangent " (format!("{:.3}", lens.radius))
                 " (errors count inside it)"
             }
             dt { "rendered by" } dd { (manifest.adapter) ", " (manifest.driver) @if manifest.software_driver { " (in software: frame times are a processor's)" } }
             @if let Some(defect) = &manifest.multiview_defect {
-                dt { "multiview" } dd { "timed view by view, counted as one submission: the driver's cannot be trusted (" (defect) ")" }
+                dt { "multiview" } dd { "timed as separate views, counted as one submission, because of a driver defect (" (defect) ")" }
             }
             dt { "measured by" } dd { (manifest.tool) "; baseline " (manifest.baseline) }
         }
     }
 }
 
-/// What the columns are.
+/// Definitions of the columns.
 fn meanings(table: &Table) -> Markup {
     html! {
         details {
-            summary { "what the columns are" }
+            summary { "definitions of the columns" }
             dl.note {
                 @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
                     dt { (h.name) @if !h.unit.is_empty() { ", " (h.unit) } } dd { (h.about) }
@@ -232,7 +226,7 @@ fn meanings(table: &Table) -> Markup {
     }
 }
 
-/// The display from above, with the splits that the scene's techniques chose on average.
+/// The display from above, with the mean splits of the scene's techniques.
 fn frusta<'a>(measures: &Measures, manifest: &'a Manifest) -> Frusta<'a> {
     let split = |m: &Measured| Some((m.row.technique.clone(), m.predicted("split_m")?));
     Frusta {
@@ -252,9 +246,9 @@ fn time_and_error(measures: &Measures, manifest: &Manifest) -> Result<Markup, Pl
         }
     }
     Ok(html! {
-        (html::figure(&plots::pareto(measures).svg()?, "The line joins the techniques that no other dominates: another takes no more time, errs no more, and is better at one of both."))
+        (html::figure(&plots::pareto(measures).svg()?, "The line joins the techniques that are not dominated. A technique is dominated if another one is at least as good in time and error and better in one of them."))
         (figures(&rows))
-        @if manifest.frames.len() > 1 { p.note { "Lines along the path: the baseline and the techniques that no other dominates." } }
+        @if manifest.frames.len() > 1 { p.note { "Lines along the path: the baseline and the techniques that are not dominated." } }
     })
 }
 
@@ -289,14 +283,14 @@ fn chosen(auto: &Auto) -> Markup {
 fn differences(measures: &Measures, pictures: &[(Difference, EmbeddedPicture)]) -> Markup {
     html! {
         p {
-            "The worst picture of each technique: as it is, its FLIP error (black none, yellow the most) and what was skipped in vermilion, "
-            "by the share of the baseline's fragments that a 16\u{d7}16 tile was spared where the traces tell it, else by the pixel's error. What the lens hides is dimmed."
+            "The worst picture of each technique: the picture, its FLIP error (from black to yellow) and the skipped work in vermilion. "
+            "Skipped work is the share of the baseline's fragments that each 16\u{d7}16 tile skipped, if there are traces, else the pixel's error. Pixels outside the lens are dimmed."
         }
         div.row {
             @for (difference, picture) in pictures {
                 @let m = &measures.rows[difference.row];
                 figure.picture {
-                    img src=(picture.data_uri()) alt={ (m.row.title) ": picture, error, what was skipped" }
+                    img src=(picture.data_uri()) alt={ (m.row.title) ": picture, error, skipped work" }
                         width=(picture.size_px[0]) height=(picture.size_px[1]);
                     figcaption {
                         (m.row.title) ", frame " (difference.frame) ", "

@@ -6,13 +6,13 @@ use crate::report::plots::lines::{Axis, LineChart, LineSeries, Mark};
 use crate::report::plots::scatter::{NamedPoint, ScatterChart};
 use crate::techniques::{Measured, Measures, Spread};
 
-/// Most lines that a chart can show apart.
+/// Largest number of lines that a chart can distinguish.
 const MOST_LINES: usize = 6;
 
-/// Longest name in a plot; tables have them whole.
+/// Longest name in a plot; tables have the full names.
 const LONGEST_NAME_CHARS: usize = 48;
 
-/// A technique's name as a plot writes it.
+/// A technique's name, shortened for plots.
 fn name(measured: &Measured) -> String {
     let name = &measured.row.technique;
     if name.chars().count() <= LONGEST_NAME_CHARS {
@@ -22,7 +22,7 @@ fn name(measured: &Measured) -> String {
     format!("{start}\u{2026}")
 }
 
-/// Colour by what a technique is: lossless, lossy, or the baseline.
+/// Colour by type of technique: lossless, lossy, or baseline.
 fn style(measured: &Measured) -> SeriesStyle {
     let index = match (measured.is_baseline(), measured.row.lossless) {
         (true, _) => 7,
@@ -61,7 +61,7 @@ pub fn ratios(measures: &Measures) -> BoxChart {
     BoxChart {
         title: format!("{}: frame time over the baseline's", measures.scene),
         note: "whiskers 1 and 99 %, box quartiles, mark and number median".to_owned(),
-        x: Axis::linear("frame time over the baseline's that was measured beside it"),
+        x: Axis::linear("frame time over that of the baseline measured next to it"),
         rows: measures
             .rows
             .iter()
@@ -75,12 +75,12 @@ pub fn ratios(measures: &Measures) -> BoxChart {
     }
 }
 
-/// The baseline and what is not dominated, at most [`MOST_LINES`].
+/// The baseline and techniques that are not dominated, at most [`MOST_LINES`].
 fn chosen<'m, 'a>(measures: &'m Measures<'a>) -> Vec<(&'m Measured<'a>, SeriesStyle)> {
     let (baseline, others): (Vec<_>, Vec<_>) = measures.rows.iter().partition(|m| m.is_baseline());
     let best = others.into_iter().filter(|m| !m.dominated);
     let styled = |(index, m): (usize, &'m Measured<'a>)| {
-        // The neutral colour is the baseline's.
+        // The neutral colour is reserved for the baseline.
         let index = if m.is_baseline() { 7 } else { index - 1 };
         (m, SeriesStyle::nth(name(m), index))
     };
@@ -116,12 +116,12 @@ pub fn frame_times(measures: &Measures) -> LineChart {
     over_frames(
         measures,
         "frame time along the path",
-        "median of a frame's repeats, ms",
+        "median of each frame's repeats, ms",
         |m| m.timing.frames_ms.clone(),
     )
 }
 
-/// Errors along the path; none where there are none.
+/// Errors along the path; `None` without errors.
 #[must_use]
 pub fn errors(measures: &Measures) -> Option<LineChart> {
     let chart = over_frames(

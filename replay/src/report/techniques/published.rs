@@ -1,16 +1,16 @@
-//! Published savings beside those that were measured.
+//! Published savings and the measured ones.
 
 use crate::paper::vr::{CLAIMS, Claim, Quantity};
 use crate::report::columns::Column;
 use crate::techniques::{Measured, Measures};
 
-/// A published saving, and ours on a scene.
+/// A published saving, and the measured one on a scene.
 pub struct ClaimRow<'a> {
     claim: &'static Claim,
     measured: &'a Measured<'a>,
 }
 
-/// Each claim on each scene that has the technique alone.
+/// Each claim on each scene that has the technique on its own.
 pub fn claims<'a>(scenes: &'a [Measures<'a>]) -> Vec<ClaimRow<'a>> {
     let of = |claim: &'static Claim| {
         let rows = scenes.iter().flat_map(|scene| &scene.rows);

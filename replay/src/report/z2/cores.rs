@@ -1,4 +1,4 @@
-//! Tiles on cores over time, as the Z2 paper's Fig. 3 shows them for an example.
+//! Tiles on cores over time, like Fig. 3 of the Z2 paper.
 
 use super::model::PaperReport;
 use crate::experiment::ResultRow;
@@ -10,10 +10,10 @@ use formats::textrace::Pass;
 use formats::view::Eye;
 use maud::html;
 
-/// Items of a core that a chart shows.
+/// Number of work items per core in the chart.
 const ITEMS: usize = 14;
 
-/// The section; none where nothing was recorded.
+/// The section; `None` if no timeline was recorded.
 pub fn section(report: &PaperReport) -> Result<Option<Section>, PlotError> {
     let mut charts = Vec::new();
     for info in &report.traces {
@@ -26,7 +26,7 @@ pub fn section(report: &PaperReport) -> Result<Option<Section>, PlotError> {
     if charts.is_empty() {
         return Ok(None);
     }
-    let note = "Work items from the middle of the frame, with the number of their tile. The texture unit decides how long an item takes.";
+    let note = "Work items from the middle of the frame, labelled with their tile. Their lengths follow from the texture unit.";
     let body = html! { p { (note) } (figures(&charts)) };
     Ok(Some(Section::new(
         "Tiles on cores over time (Fig. 3)",
@@ -46,7 +46,7 @@ fn chart(row: &ResultRow, timeline: &Timeline) -> SpanChart {
             .skip_while(move |item| item.end_cycle <= middle)
             .take(ITEMS)
     };
-    // Until the first core has shown its items.
+    // The chart ends when the first core has shown its items.
     let ends = (0..cores).filter_map(|core| of_core(core).last().map(|item| item.end_cycle));
     let last = ends.min().unwrap_or(middle + 1).max(middle + 1);
     let span = |item: &TimelineItem| Span {

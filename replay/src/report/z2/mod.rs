@@ -1,6 +1,6 @@
 //! The Z2 paper's experiment: cache configurations times orders on each trace (Table 2, Fig. 5).
 //!
-//! [`model`] takes an outcome apart; tables, plots and the page only print its rows.
+//! [`model`] turns an outcome into rows; tables, plots and the page print them.
 
 mod cores;
 pub mod model;

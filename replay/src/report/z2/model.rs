@@ -29,15 +29,15 @@ pub struct TraceInfo {
     pub frames: u32,
     /// Quads of the trace.
     pub quads: u64,
-    /// Covered lanes.
+    /// Number of covered lanes.
     pub lanes: u64,
     /// Footprints under the base configuration.
     pub footprints: u64,
-    /// Textures in the table.
+    /// Number of textures in the table.
     pub textures: usize,
     /// Tile columns and rows of a main view.
     pub tiles: [u32; 2],
-    /// Passes of the first frame's left and right eye.
+    /// Render passes of the first frame's left and right eye.
     pub eye_passes: Vec<u32>,
     /// Description from the trace.
     pub meta: TraceMeta,
@@ -52,9 +52,9 @@ pub struct Average {
     pub order: Order,
     /// Mean traffic saved against Morton, percent.
     pub reduction_pct: f64,
-    /// Mean utilisation over Morton's; none in functional mode.
+    /// Mean utilisation over that in Morton order; `None` in functional mode.
     pub tmu_ratio: Option<f64>,
-    /// The paper's mean reduction: for the scene that this one stands for, or over all its scenes.
+    /// The paper's mean reduction, for the corresponding scene or over all its scenes.
     pub paper_reduction_pct: Option<f64>,
     /// The paper's mean ratio.
     pub paper_tmu_ratio: Option<f64>,
@@ -74,8 +74,8 @@ impl Row for Average {
     }
 }
 
-/// How far utilisation is from the surface of the paper's table, at rates that are counted as the
-/// paper's are: on the machine of `--preset z2-paper`.
+/// Deviation of the utilisation from the surface of the paper's table, on the machine of
+/// `--preset z2-paper`, which counts rates as the paper does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Deviation {
     /// Mean absolute deviation, points.
@@ -101,7 +101,7 @@ pub struct Conservation {
 
 /// The whole experiment.
 pub struct PaperReport<'a> {
-    /// The base configuration; caches and order vary as the rows say.
+    /// The base configuration; each row has its own caches and order.
     pub config: RunConfig,
     /// Traces.
     pub traces: Vec<TraceInfo>,
@@ -109,14 +109,14 @@ pub struct PaperReport<'a> {
     pub rows: Vec<ResultRow<'a>>,
     /// Means.
     pub averages: Vec<Average>,
-    /// Utilisation against the paper's surface.
+    /// Utilisation compared with the paper's surface.
     pub closed_form: Deviation,
     /// Conservation check.
     pub conservation: Vec<Conservation>,
 }
 
 impl<'a> PaperReport<'a> {
-    /// Puts an outcome of [`Plan::paper`](crate::experiment::Plan::paper) into rows.
+    /// Builds the rows from an outcome of [`Plan::paper`](crate::experiment::Plan::paper).
     #[must_use]
     pub fn new(outcome: &'a Outcome<'a>) -> Self {
         let mut rows = outcome.rows();
@@ -178,7 +178,7 @@ impl<'a> PaperReport<'a> {
         })
     }
 
-    /// A trace's rows with the first cache configuration, one an order: its parts are shown.
+    /// A trace's rows with the first cache configuration, one per order; the page shows their details.
     #[must_use]
     pub fn details(&self, scene: &str) -> Vec<&ResultRow<'a>> {
         let mut of_scene = self.rows.iter().filter(|r| r.subject.label == scene);
@@ -189,7 +189,7 @@ impl<'a> PaperReport<'a> {
             .collect()
     }
 
-    /// Means a scene, then over all scenes if there are several, for every order but the baseline.
+    /// Means per scene, then over all scenes if there are several, for every order except the baseline.
     fn means(&self) -> Vec<Average> {
         let average = |scene: Option<&TraceInfo>, order: Order| {
             let mean_of = |figure: &str| {
@@ -227,7 +227,7 @@ impl<'a> PaperReport<'a> {
             .collect()
     }
 
-    /// The figures that the experiment writes: there is no change that could be held against a base.
+    /// The figures of the experiment, without those of a change against a base.
     fn figures() -> Vec<Figure<'a>> {
         let mut columns = ResultRow::columns();
         columns.retain(|c| !matches!(c.heading.key.as_ref(), "over_base" | "caches"));
@@ -253,7 +253,7 @@ impl<'a> PaperReport<'a> {
     pub fn json(&self) -> serde_json::Result<String> {
         let columns = Self::figures();
         let details = self.traces.iter().flat_map(|t| self.details(&t.label));
-        serde_json::to_string(&Document {
+        serde_json::to_string(&PaperJson {
             schema: PAPER_SCHEMA,
             tool: TOOL,
             model_version: MODEL_VERSION,
@@ -277,7 +277,7 @@ impl<'a> PaperReport<'a> {
 
 /// The JSON object.
 #[derive(Serialize)]
-struct Document<'a, 'r> {
+struct PaperJson<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
@@ -292,7 +292,7 @@ struct Document<'a, 'r> {
     details: Vec<Detail<'a>>,
 }
 
-/// Where a trace's traffic goes under one configuration and order.
+/// Breakdown of a trace's traffic for one configuration and order.
 #[derive(Serialize)]
 struct Detail<'a> {
     scene: &'a str,

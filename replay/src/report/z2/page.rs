@@ -12,7 +12,7 @@ use crate::report::table::Table;
 use crate::result::TOOL;
 use maud::{Markup, html};
 
-/// Textures or draws in the charts and tables by them.
+/// Number of textures or draws in the charts and tables by part.
 const BUSIEST_PARTS: usize = 20;
 /// Grid of the example paths, as in the paper's Fig. 3 (32 tiles).
 const EXAMPLE_TILES: [u32; 2] = [8, 4];
@@ -53,7 +53,7 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
         ));
     }
     if let Some(modes) = tables::modes(report) {
-        let note = "Functional mode knows no latencies: a miss fills at once. The difference shows what timing does to the order in which the cores' accesses meet in the L2.";
+        let note = "Functional mode has no latencies: misses fill at once. The difference shows how timing changes the order in which the cores' accesses reach the L2.";
         let body = html! { p { (note) } (modes.markup()) };
         sections.push(Section::new("Functional against timed mode", body));
     }
@@ -75,7 +75,7 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
         p {
             "Stereo frames replayed through the caches and the texture unit of the Z\u{b2} paper's machine ("
             (report.config.cores) " cores, " (report.config.line_bytes) "-byte lines) in "
-            (report.orders().len()) " tile orders, with its published figures beside ours. "
+            (report.orders().len()) " tile orders, compared with its published figures. "
             "The same numbers are in the JSON and CSV files next to this page."
         }
         (in_short(report))
@@ -87,7 +87,7 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
     ))
 }
 
-/// The means over everything, in words.
+/// The means over everything, as sentences.
 fn in_short(report: &PaperReport) -> Markup {
     let Some(last) = report.averages.last() else {
         return html! {};
@@ -119,13 +119,13 @@ fn runs(report: &PaperReport) -> Markup {
                 dt { "scene" } dd { (info.trace.scene) ", " (thousands(info.meta.scene_triangles)) " triangles, camera " (info.meta.camera) }
                 @if let Some(scene) = info.stand_in_for { dt { "stands for" } dd { (scene) " of the paper" } }
                 dt { "display" } dd {
-                    (info.meta.hmd.name) ", " (info.meta.hmd.eye_size_px[0]) "\u{d7}" (info.meta.hmd.eye_size_px[1]) " px an eye, "
+                    (info.meta.hmd.name) ", " (info.meta.hmd.eye_size_px[0]) "\u{d7}" (info.meta.hmd.eye_size_px[1]) " px per eye, "
                     (fov(info)) ", " (format!("{:.0}", info.meta.hmd.ipd_m * 1000.0)) " mm between the eyes (" (info.meta.hmd.source) ")"
                 }
                 dt { "trace" } dd {
                     "checksum " (info.trace.checksum) ", " (info.frames) @if info.frames == 1 { " frame" } @else { " frames" } ", "
                     (thousands(info.quads)) " quads, " (thousands(info.footprints)) " footprints, "
-                    (info.textures) " textures, " (info.tiles[0]) "\u{d7}" (info.tiles[1]) " tiles an eye"
+                    (info.textures) " textures, " (info.tiles[0]) "\u{d7}" (info.tiles[1]) " tiles per eye"
                 }
                 dt { "captured by" } dd { (info.meta.tool) ", " (info.meta.backend) ", " (info.meta.driver) ", seed " (info.meta.seed) }
                 dt { "command" } dd { code { (info.meta.command_line.join(" ")) } }
@@ -134,7 +134,7 @@ fn runs(report: &PaperReport) -> Markup {
     }
 }
 
-/// Left and right half-angles of the left eye, and up and down.
+/// Left and right half-angles of the left eye, then up and down.
 fn fov(info: &TraceInfo) -> String {
     let degrees = |tangent: f32| f64::from(tangent).atan().to_degrees();
     let fov = &info.meta.hmd.fov[0];
@@ -179,9 +179,9 @@ fn table_2(report: &PaperReport) -> Markup {
 fn as_the_paper_counts(table: &Table) -> Markup {
     html! {
         p {
-            "The same frames on the machine of " code { "--preset z2-paper" } ": a thread stops at its first miss, and rates are of first "
-            "look-ups, where lines in flight are misses, too. Merged requests never leave the chip, so the product of these rates is "
-            "no traffic; what memory sends stands to the right. The settings were found by search."
+            "The same frames on the machine of " code { "--preset z2-paper" } ": a thread stops at its first miss. Rates are of first "
+            "look-ups and count lines in flight as misses. Merged requests cause no memory traffic, so the product of these rates is "
+            "not a traffic figure; the traffic is in the columns on the right. The settings were found by search."
         }
         (table.markup())
         dl.note {
@@ -200,7 +200,7 @@ fn bandwidth(report: &PaperReport) -> Result<Markup, PlotError> {
         .collect::<Result<Vec<_>, PlotError>>()?;
     Ok(html! {
         (figures(&charts))
-        p.note { "The paper's text gives no absolute traffic; a mark is its ratio to Morton times our Morton, for scenes that stand for one of its own." }
+        p.note { "The paper's text gives no absolute traffic. A mark is its ratio to Morton times the measured Morton traffic, for scenes that stand for one of the paper's." }
     })
 }
 
@@ -235,7 +235,7 @@ fn bounds(report: &PaperReport) -> Markup {
     html! {
         (tables::bounds(report).markup())
         h3 { "Conservation" }
-        p { "Every order replays the same multiset of accesses, by an order-independent hash:" }
+        p { "Every order replays the same multiset of accesses, according to an order-independent hash:" }
         ul {
             @for c in &report.conservation {
                 li {
@@ -260,9 +260,9 @@ fn orders(report: &PaperReport) -> Result<Markup, PlotError> {
         maps.push((plots::path(order, seed, grid).steps().svg()?, String::new()));
     }
     Ok(html! {
-        p { "On 32 tiles an eye, as in the paper's Fig. 3; the numbers are steps." }
+        p { "On 32 tiles per eye, as in the paper's Fig. 3; the numbers are steps." }
         (figures(&examples))
-        p { "On the grid of the traces, " (grid[0]) "\u{d7}" (grid[1]) " tiles an eye:" }
+        p { "On the grid of the traces, " (grid[0]) "\u{d7}" (grid[1]) " tiles per eye:" }
         (figures(&maps))
     })
 }
@@ -278,7 +278,7 @@ fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
                 .filter_map(|d| plots::heat_map(info, d, measure))
                 .take(if depends_on_order { usize::MAX } else { 1 })
                 .collect();
-            // Orders are compared on one scale.
+            // All orders share one scale.
             let high = maps.iter().map(|m| m.largest()).fold(0.0, f64::max);
             for map in &mut maps {
                 map.high = Some(high);
@@ -337,7 +337,7 @@ fn configuration(report: &PaperReport) -> Markup {
     html! {
         p {
             "Mode " (mode) "; varied: orders " (orders.join(", ")) "; L1/L2 " (caches.join(", ")) " KiB. "
-            "Everything else as below. Written by " (TOOL) "."
+            "All other settings as below. Written by " (TOOL) "."
         }
         (folded("full configuration (TOML)", &text))
     }

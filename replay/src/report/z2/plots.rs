@@ -1,4 +1,4 @@
-//! The experiment's plots, made of the rows and details of the report.
+//! The experiment's plots, built from the rows and details of the report.
 
 use super::model::{PaperReport, TraceInfo};
 use super::tables::busiest;
@@ -26,7 +26,7 @@ fn style(order: Order) -> SeriesStyle {
     }
 }
 
-/// Bars of a figure over cache configurations, one series an order.
+/// Bars of a figure over cache configurations, one series per order.
 fn by_caches(
     report: &PaperReport,
     scene: &str,
@@ -61,13 +61,13 @@ fn by_caches(
         groups,
         mark_name: marked.then(|| mark_name.to_owned()),
         reference: None,
-        // Three digits tell neighbours apart.
+        // Three digits distinguish neighbouring values.
         decimals: Some(if largest < 10.0 { 2 } else { 1 }),
     }
 }
 
-/// Fig. 5: external traffic. The paper gives no absolute numbers in its text, so its marks are its
-/// ratios to Morton, applied to our Morton.
+/// Fig. 5: external traffic. The paper's text gives no absolute numbers, so its marks are its ratios to
+/// Morton times the measured Morton traffic.
 #[must_use]
 pub fn bandwidth(report: &PaperReport, scene: &str) -> BarChart {
     let key = "external_mb_per_frame";
@@ -105,7 +105,7 @@ pub fn rates(report: &PaperReport, scene: &str) -> Vec<BarChart> {
     .collect()
 }
 
-/// Rates of first look-ups of every row on the paper's utilisation surface.
+/// Every row's rates of first look-ups on the paper's utilisation surface.
 ///
 /// # Errors
 /// See [`ContourChart::svg`].
@@ -152,7 +152,7 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
     .svg()
 }
 
-/// Simulated utilisation against the closed form; `None` without the machine of the preset.
+/// Simulated utilisation against the closed form; `None` without rows of the preset's machine.
 #[must_use]
 pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
     let mut series: Vec<LineSeries> = report
@@ -204,7 +204,7 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
         title: "Simulated TMU utilisation against the closed form".to_owned(),
         x: Axis {
             range: Some(ends),
-            ..Axis::linear("closed form of our miss rates, %")
+            ..Axis::linear("closed form of the measured miss rates, %")
         },
         y: Axis {
             range: Some((ends.0 - 2.0, ends.1 + 2.0)),
@@ -214,7 +214,7 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
     })
 }
 
-/// Miss rates and traffic by mip level, one series an order.
+/// Miss rates and traffic by mip level, one series per order.
 #[must_use]
 pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
     let Some(first) = details.first() else {
@@ -273,10 +273,10 @@ pub fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
     columns.zip(titles).map(chart).collect()
 }
 
-/// What a tile map can show.
+/// Quantities of a tile map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TileMeasure {
-    /// Covered lanes over pixels.
+    /// Covered lanes per pixel.
     Overdraw,
     /// Footprints.
     Footprints,
@@ -314,7 +314,7 @@ impl TileMeasure {
     }
 }
 
-/// Both eyes' tiles of one run; `None` when the run has no maps of the two eyes.
+/// Both eyes' tiles of one run; `None` if the run has no maps of both eyes.
 #[must_use]
 pub fn heat_map(info: &TraceInfo, detail: &ResultRow, measure: TileMeasure) -> Option<HeatMap> {
     let (title, value_label) = measure.titles();
@@ -367,8 +367,8 @@ pub fn path(order: Order, seed: u64, tiles: [u32; 2]) -> PathPlot {
     let alternates = stops.windows(2).take(1).any(|w| w[0].eye != w[1].eye);
     let note = match (pairs, alternates) {
         (true, _) => "a pair of tiles is one step on one core",
-        (false, true) => "left and right tile in turn",
-        (false, false) => "the whole left view, then the right",
+        (false, true) => "left and right tiles alternate",
+        (false, false) => "the whole left view, then the whole right view",
     };
     PathPlot {
         title: order.title().to_owned(),
@@ -385,12 +385,12 @@ mod tests {
     use crate::report::plots::testing::text_at;
 
     #[test]
-    fn a_stand_ins_marks_are_the_papers_ratios_on_our_morton() {
+    fn marks_are_the_papers_ratios_times_the_measured_morton_traffic() {
         with_report(|report| {
             let chart = bandwidth(report, "crytek-sponza");
             let group = &chart.groups[3];
             assert_eq!(group.label, "16/256");
-            // Our rows are the paper's, so bars and marks coincide.
+            // The report holds the paper's own rates, so bars and marks coincide.
             let (bar, mark) = (group.values[2].unwrap(), group.marks[2].unwrap());
             assert!((bar - mark).abs() < 0.01, "{bar} {mark}");
             assert_eq!(group.marks[0], None);

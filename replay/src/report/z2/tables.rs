@@ -1,4 +1,4 @@
-//! The experiment's tables: the same cells for the terminal and the page.
+//! The experiment's tables, for the terminal and the page.
 
 use super::model::{Average, PaperReport};
 use crate::experiment::ResultRow;
@@ -6,8 +6,8 @@ use crate::report::columns::{Column, Row, pick};
 use crate::report::table::Table;
 use crate::result::Part;
 
-/// Table 2 of the paper with our figures, and the paper's to the right of the scenes that stand
-/// for its own.
+/// Table 2 of the paper with measured figures, and the paper's figures on the right for scenes that stand
+/// for one of its own.
 #[must_use]
 pub fn table_2(report: &PaperReport) -> Table {
     let columns = pick::<ResultRow>(&[
@@ -31,7 +31,7 @@ pub fn table_2(report: &PaperReport) -> Table {
     table.without_empty_columns()
 }
 
-/// The machine of `--preset z2-paper` beside Table 2; none where it was not replayed.
+/// Results of the `--preset z2-paper` machine next to those of Table 2; `None` if it was not replayed.
 #[must_use]
 pub fn as_the_paper_counts(report: &PaperReport) -> Option<Table> {
     let columns = pick::<ResultRow>(&[
@@ -64,7 +64,7 @@ pub fn averages(averages: &[Average]) -> Table {
     table.without_empty_columns()
 }
 
-/// Functional mode against timed mode; none where functional mode was not run.
+/// Functional mode against timed mode; `None` if functional mode was not replayed.
 #[must_use]
 pub fn modes(report: &PaperReport) -> Option<Table> {
     let columns = pick::<ResultRow>(&[
@@ -84,7 +84,7 @@ pub fn modes(report: &PaperReport) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// External traffic beside the infinite cache's.
+/// External traffic and that of an infinite cache.
 #[must_use]
 pub fn bounds(report: &PaperReport) -> Table {
     let columns = pick::<ResultRow>(&[
@@ -98,8 +98,7 @@ pub fn bounds(report: &PaperReport) -> Table {
     Table::new(&columns, &report.rows).grouped_by(2)
 }
 
-/// The parts of a scene's traffic with the most external traffic, each part under the orders of
-/// `details` side by side.
+/// The parts of a scene with the most external traffic. Each part has one column per order of `details`.
 #[must_use]
 pub fn parts<'a>(
     details: &'a [&ResultRow],
@@ -131,8 +130,8 @@ pub fn parts<'a>(
     Table::new(&columns, &busiest(first, most))
 }
 
-/// Indices of the parts with the most external traffic, or all of them in their own order when
-/// they are not more than `most`.
+/// Indices of the `most` parts with the most external traffic, or all parts in their own order if there are
+/// no more.
 #[must_use]
 pub fn busiest(parts: &[Part], most: usize) -> Vec<usize> {
     let mut index: Vec<usize> = (0..parts.len()).collect();
@@ -186,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn the_busiest_parts_come_first_and_few_parts_keep_their_order() {
+    fn the_parts_with_most_traffic_come_first_and_few_parts_keep_their_order() {
         with_report(|report| {
             let result = report.rows[0].result;
             assert_eq!(busiest(&result.by_texture, 20).len(), 20);

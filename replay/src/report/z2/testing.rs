@@ -15,7 +15,7 @@ use crate::stream::testing::tables;
 
 const TILES: [u32; 2] = [60, 68];
 
-/// Two scenes that replay exactly as the paper's table says, in both modes.
+/// Two scenes whose results equal the paper's table, in both modes.
 pub(crate) fn with_report<T>(check: impl FnOnce(&PaperReport) -> T) -> T {
     with_edited(|_, _| (), check)
 }
@@ -139,7 +139,7 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
     }
 }
 
-/// A bump that sits a little further left in the right eye.
+/// A peak that is further left in the right eye.
 fn map(pass: u32) -> TileMap {
     let value = |x: u32, y: u32| {
         let dx = f64::from(x) - 30.0 + 4.0 * f64::from(pass);

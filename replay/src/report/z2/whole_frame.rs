@@ -1,5 +1,5 @@
-//! Where the traffic of whole frames goes: a stacked bar of clients for each order, and what they need at the frame rates of
-//! displays.
+//! Breakdown of whole frames' traffic: a stacked bar of clients for each order, and the bandwidth at the
+//! frame rates of displays.
 
 use super::model::PaperReport;
 use crate::experiment::ResultRow;
@@ -16,7 +16,7 @@ use maud::html;
 /// Frame rates of headsets, Hz.
 const RATES_HZ: [u32; 3] = [72, 90, 120];
 
-/// Parts of a bar from the bottom up; a theme has eight colours.
+/// Parts of a bar, from bottom to top; the theme has eight colours.
 const PARTS: [(&str, &[Client]); 8] = [
     ("textures", &[Client::Texture]),
     ("indices and vertices", &[Client::Index, Client::Vertex]),
@@ -28,7 +28,7 @@ const PARTS: [(&str, &[Client]); 8] = [
     ("composition and warp", &[Client::Composition]),
 ];
 
-/// The section of a page; none where whole frames were not counted.
+/// The section of a page; `None` if whole frames were not counted.
 ///
 /// # Errors
 /// A chart that cannot be drawn.
@@ -48,11 +48,11 @@ pub(super) fn section(report: &PaperReport) -> Result<Option<Section>, PlotError
     let table = Table::new(&columns(), rows).grouped_by(2);
     let body = html! {
         (figures(&charts))
-        p.note { "Bars are those of the first cache configuration. An order changes what textures and shaded vertices read, nothing else." }
+        p.note { "Bars show the first cache configuration. An order changes only the reads of textures and shaded vertices." }
         (table.without_empty_columns().markup())
-        p.note { "GB/s are 10\u{2079} bytes per second, reads and writes of all clients together. mW are what these bytes take in the DRAM of the configuration (LPDDR4 where it has none): writes count as reads, every second burst opens a row, standing by and refresh are left out." }
+        p.note { "GB/s are 10\u{2079} bytes per second, reads and writes of all clients together. mW are the power of this traffic in the DRAM of the configuration (LPDDR4 by default): writes count as reads, every second burst opens a row, standby and refresh are left out." }
     };
-    Ok(Some(Section::new("Where the traffic goes", body)))
+    Ok(Some(Section::new("Traffic by client", body)))
 }
 
 fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {
@@ -159,7 +159,7 @@ mod tests {
         ] {
             assert!(text.contains(expected), "{expected}");
         }
-        // Parts that nothing uses have no entry.
+        // Unused parts have no legend entry.
         assert!(!text.contains("G-buffer") && !text.contains("primitive lists"));
     }
 }

@@ -2,12 +2,12 @@
 
 use super::{Decision, PixelClass};
 use crate::sgrt::frame::SKY;
-use crate::sgrt::place::{Offset, Place};
+use crate::sgrt::place::{Offset, RightSample};
 use formats::view::Eye;
 
 /// Intersects the right-eye ray with the triangles of the candidate and of its neighbours. The decision
 /// becomes the nearest hit, or bad if there is none.
-pub fn retest(at: Place, offsets: &'static [Offset], decision: &mut Decision) {
+pub fn retest(at: RightSample, offsets: &'static [Offset], decision: &mut Decision) {
     let frame = at.frame;
     let eye = frame.tables.camera(Eye::Right);
     let direction = eye.direction(frame.position_px(at.index));

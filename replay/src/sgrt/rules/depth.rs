@@ -2,7 +2,7 @@
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::Sample;
-use crate::sgrt::place::{FOUR, Place};
+use crate::sgrt::place::{FOUR, RightSample};
 use crate::sgrt::reads::{Around, Reads};
 
 pub static RULE: RuleKind = RuleKind {
@@ -23,8 +23,9 @@ struct Depth {
 }
 
 impl Test for Depth {
-    fn rejects(&self, at: Place, _: &Sample) -> bool {
-        let behind = |n: Place| at.candidate().depth > n.candidate().depth * (1.0 + self.share);
+    fn rejects(&self, at: RightSample, _: &Sample) -> bool {
+        let behind =
+            |n: RightSample| at.candidate().depth > n.candidate().depth * (1.0 + self.share);
         at.arrived_neighbours(&FOUR).any(behind)
     }
 }

@@ -15,7 +15,7 @@ mod triangle;
 mod triangles;
 
 use super::frame::{Frame, Sample};
-use super::place::{Offset, Place};
+use super::place::{Offset, RightSample};
 use super::reads::Reads;
 use super::reproject::Reprojection;
 use serde::{Deserialize, Serialize};
@@ -60,10 +60,10 @@ pub struct RuleKind {
 pub trait Test: Sync {
     /// True if `hit`, the left sample to be reused, must be rejected. After a re-test, `hit` is the sample
     /// whose triangle was hit, otherwise the candidate's.
-    fn rejects(&self, at: Place, hit: &Sample) -> bool;
+    fn rejects(&self, at: RightSample, hit: &Sample) -> bool;
 
     /// True if the shadow rays of a pixel that reuses the left sample `source` must be traced again.
-    fn retraces_shadows(&self, _at: Place, _source: u32) -> bool {
+    fn retraces_shadows(&self, _at: RightSample, _source: u32) -> bool {
         false
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::Sample;
-use crate::sgrt::place::{FOUR, Place};
+use crate::sgrt::place::{FOUR, RightSample};
 use crate::sgrt::reads::{Around, Reads};
 
 pub static RULE: RuleKind = RuleKind {
@@ -21,8 +21,8 @@ pub static RULE: RuleKind = RuleKind {
 struct Object;
 
 impl Test for Object {
-    fn rejects(&self, at: Place, _: &Sample) -> bool {
-        let same = |n: Place| n.source().object == at.source().object;
+    fn rejects(&self, at: RightSample, _: &Sample) -> bool {
+        let same = |n: RightSample| n.source().object == at.source().object;
         !at.arrived_neighbours(&FOUR).any(same)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::{Frame, Sample};
-use crate::sgrt::place::Place;
+use crate::sgrt::place::RightSample;
 use crate::sgrt::reads::{Around, Reads};
 
 /// An object has one material, so reading its number suffices.
@@ -25,7 +25,7 @@ struct Opaque<'a> {
 }
 
 impl Test for Opaque<'_> {
-    fn rejects(&self, _: Place, hit: &Sample) -> bool {
+    fn rejects(&self, _: RightSample, hit: &Sample) -> bool {
         let material = self.frame.tables.materials.get(hit.material as usize);
         !hit.is_sky() && material.is_some_and(|m| m.alpha_masked)
     }

@@ -2,7 +2,7 @@
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::{Frame, Sample};
-use crate::sgrt::place::Place;
+use crate::sgrt::place::RightSample;
 use crate::sgrt::reads::{Around, Reads};
 use crate::sgrt::reproject::Reprojection;
 
@@ -31,7 +31,7 @@ struct Row {
 }
 
 impl Test for Row {
-    fn rejects(&self, at: Place, _: &Sample) -> bool {
+    fn rejects(&self, at: RightSample, _: &Sample) -> bool {
         at.candidate().depth > self.nearest[at.index] * (1.0 + self.share)
     }
 }

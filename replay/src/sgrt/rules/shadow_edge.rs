@@ -2,7 +2,7 @@
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::{Frame, Sample};
-use crate::sgrt::place::{EIGHT, Place};
+use crate::sgrt::place::{EIGHT, RightSample};
 use crate::sgrt::reads::{Around, Reads};
 
 pub static RULE: RuleKind = RuleKind {
@@ -31,13 +31,13 @@ impl ShadowEdge<'_> {
 }
 
 impl Test for ShadowEdge<'_> {
-    fn rejects(&self, _: Place, _: &Sample) -> bool {
+    fn rejects(&self, _: RightSample, _: &Sample) -> bool {
         false
     }
 
-    fn retraces_shadows(&self, at: Place, source: u32) -> bool {
+    fn retraces_shadows(&self, at: RightSample, source: u32) -> bool {
         let own = self.outcomes(source);
-        let other = |n: Place| self.outcomes(n.candidate().source) != own;
+        let other = |n: RightSample| self.outcomes(n.candidate().source) != own;
         at.arrived_neighbours(&EIGHT).any(other)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::Sample;
-use crate::sgrt::place::{EIGHT, Place};
+use crate::sgrt::place::{EIGHT, RightSample};
 use crate::sgrt::reads::{Around, Reads};
 
 pub static RULE: RuleKind = RuleKind {
@@ -21,9 +21,9 @@ pub static RULE: RuleKind = RuleKind {
 struct Silhouette;
 
 impl Test for Silhouette {
-    fn rejects(&self, at: Place, _: &Sample) -> bool {
+    fn rejects(&self, at: RightSample, _: &Sample) -> bool {
         let other =
-            |n: Place| n.candidate().is_missing() || n.source().object != at.source().object;
+            |n: RightSample| n.candidate().is_missing() || n.source().object != at.source().object;
         at.neighbours(&EIGHT).any(other)
     }
 }

@@ -1,7 +1,8 @@
-//! The DRAM model beside Ramulator 1 (Kim, Yang and Mutlu, CAL 2015): the same reads at the same clocks, DDR4-2400R, one channel.
+//! Compares the DRAM model with Ramulator 1 (Kim, Yang and Mutlu, CAL 2015): the same reads at the same
+//! clocks, DDR4-2400R, one channel.
 //!
-//! Prints a CSV of row hits and mean latencies; exits with 1 where row hits differ by more than 1 % of the reads or mean
-//! latencies by more than 3 %.
+//! Prints row hits and mean latencies as CSV. Exits with 1 if row hits differ by more than 1 % of the
+//! reads, or mean latencies by more than 3 %.
 
 #[allow(dead_code)]
 #[path = "../../../../replay/src/memory/dram/mod.rs"]
@@ -11,11 +12,11 @@ use dram::{Dram, DramConfig, DramPreset};
 use ramulator_wrapper::RamulatorWrapper;
 use std::process::{Command, ExitCode};
 
-/// Reads of a stream.
+/// Number of reads in a stream.
 const READS: usize = 100_000;
-/// The peer's queue; its scheduler sees as much.
+/// Queue length of both simulators.
 const QUEUE: u32 = 512;
-/// Ramulator's file of what it simulates.
+/// Ramulator's configuration file.
 const CONFIG: &str = "standard = DDR4\nchannels = 1\nranks = 1\nspeed = DDR4_2400R\norg = DDR4_4Gb_x8\n\
     record_cmd_trace = off\nprint_cmd_trace = off\ncpu_tick = 8\nmem_tick = 3\nearly_exit = on\n\
     expected_limit_insts = 200000000\nwarmup_insts = 100000000\ncache = no\ntranslation = None\naddr_mapping = RoBaRaCoCh\n";
@@ -23,14 +24,14 @@ const CONFIG: &str = "standard = DDR4\nchannels = 1\nranks = 1\nspeed = DDR4_240
 /// A request: number of its burst, clock of its arrival, and whether it writes.
 type Request = (u32, u64, bool);
 
-/// What a simulator counted.
+/// Counts of a simulator.
 struct Counted {
     row_hits: f64,
     /// Clocks from arrival to last data.
     latency: f64,
 }
 
-/// Xorshift64*: the same streams everywhere.
+/// Xorshift64*, which gives the same streams on every machine.
 struct Random(u64);
 
 impl Random {
@@ -45,7 +46,7 @@ impl Random {
 /// Bursts of 1 GiB.
 const BURSTS: u32 = 1 << 24;
 
-/// Bursts that follow each other, a read every so many clocks.
+/// Sequential bursts, one read every `clocks` clocks.
 fn follow(clocks: u64) -> Vec<Request> {
     (0..READS as u32)
         .map(|i| (i, clocks * u64::from(i), false))
@@ -56,12 +57,12 @@ fn sequential() -> Vec<Request> {
     follow(10)
 }
 
-/// Close to the 6 clocks between reads of a bank group: what queues up behind a refresh takes long to go.
+/// Close to the 6 clocks between reads of a bank group, so the queue after a refresh takes long to drain.
 fn backlog() -> Vec<Request> {
     follow(8)
 }
 
-/// Bursts anywhere, a read every 16 clocks.
+/// Random bursts, one read every 16 clocks.
 fn random() -> Vec<Request> {
     let mut random = Random(1);
     (0..READS as u64)
@@ -69,8 +70,8 @@ fn random() -> Vec<Request> {
         .collect()
 }
 
-/// Runs of 1 to 16 bursts from anywhere, as a tile's textures give them: a read every other clock, then a pause that leaves
-/// the data bus half idle.
+/// Runs of 1 to 16 bursts at random positions, like those of a tile's textures: one read every other clock,
+/// then a pause that leaves the data bus half idle.
 fn runs() -> Vec<Request> {
     let mut random = Random(2);
     let (mut reads, mut clock) = (Vec::new(), 0);
@@ -85,14 +86,14 @@ fn runs() -> Vec<Request> {
     reads
 }
 
-/// Strides of three rows' length: every read opens a row.
+/// Strides of three rows, so that every read opens a row.
 fn strided() -> Vec<Request> {
     (0..READS as u32)
         .map(|i| (i * 384 % BURSTS, 24 * u64::from(i), false))
         .collect()
 }
 
-/// As [`runs`], with every third run written: tiles that are done between the textures of others.
+/// As [`runs`], with every third run written, like finished tiles between textures of others.
 fn written_runs() -> Vec<Request> {
     let mut runs = runs();
     let (mut run, mut last) = (0, None);
@@ -103,7 +104,7 @@ fn written_runs() -> Vec<Request> {
     runs
 }
 
-/// A write every fourth request, anywhere, a request every 24 clocks.
+/// Random bursts, one request every 24 clocks, every fourth one a write.
 fn random_writes() -> Vec<Request> {
     let mut random = Random(3);
     (0..READS as u64)
@@ -116,14 +117,14 @@ fn ours(reads: &[Request]) -> Counted {
         preset: DramPreset::Ddr4,
         channels: 1,
         queue: QUEUE,
-        // A cycle is a clock.
+        // One cycle is one clock.
         core_mhz: 1_000,
         ..DramConfig::default()
     };
     let device = config.preset.device();
     let mut dram = Dram::new(&config, device.burst_bytes);
     for (burst, clock, write) in reads {
-        // The first cycle of 1 ns that is not before the clock: rounding down gives the clock again.
+        // The first cycle of 1 ns that is not before the clock; rounding it down gives the clock again.
         let cycle = (clock * u64::from(device.clock_ps)).div_ceil(1_000);
         let bytes = u64::from(device.burst_bytes);
         dram.request(u64::from(*burst) * bytes, bytes, *write, Some(cycle));
@@ -149,7 +150,7 @@ fn theirs(reads: &[Request], name: &str) -> Counted {
         }
         peer.send(u64::from(*burst) * 64, *write);
     }
-    // Writes are not answered.
+    // Writes have no response.
     let wanted = reads.iter().filter(|(.., write)| !write).count();
     while answered < wanted {
         while peer.ret_available() {
@@ -158,7 +159,7 @@ fn theirs(reads: &[Request], name: &str) -> Counted {
         }
         peer.cycle();
     }
-    // Its statistics are written when it goes.
+    // Ramulator writes its statistics when it is destroyed.
     drop(peer);
     let text = std::fs::read_to_string(&stats).expect("Ramulator's statistics");
     std::fs::remove_dir_all(&folder).expect("a temporary folder");
@@ -175,12 +176,12 @@ fn theirs(reads: &[Request], name: &str) -> Counted {
     };
     Counted {
         row_hits: value(".row_hits_channel_0_core"),
-        // A request is seen one clock after its arrival.
+        // Ramulator receives a request one clock after its arrival.
         latency: value("read_latency_sum_0") / wanted as f64 - 1.0,
     }
 }
 
-/// A stream by name.
+/// A named stream.
 type Stream = (&'static str, fn() -> Vec<Request>);
 
 const STREAMS: [Stream; 7] = [
@@ -193,11 +194,12 @@ const STREAMS: [Stream; 7] = [
     ("backlog", backlog),
 ];
 
-/// Shown without a bound: the peer serves at most 16 reads of a row before older requests, so it does not take turns at two
-/// rows of a backlog.
+/// Reported without a limit: the peer serves at most 16 reads of a row before older requests, so it handles
+/// two rows of a backlog differently.
 const UNBOUND: &str = "backlog";
 
-/// Runs the peer in a process of its own: its statistics are global, and a second simulation would write over the first.
+/// Runs the peer in its own process, because its statistics are global and a second simulation would
+/// overwrite them.
 fn theirs_apart(name: &str) -> Counted {
     let program = std::env::current_exe().expect("this program's path");
     let output = Command::new(program).arg(name).output().expect("a process");
