@@ -15,6 +15,7 @@ mod order_arg;
 mod orders;
 mod paper;
 mod parquet_arg;
+mod readings;
 mod report;
 mod reproject;
 mod run;
@@ -94,6 +95,8 @@ enum Command {
     Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
+    /// Set every reading of the SGRT paper's figure 3 beside the paper.
+    Readings(Box<readings::ReadingsArgs>),
     #[command(flatten)]
     Documents(Documents),
 }
@@ -120,6 +123,7 @@ pub fn main() -> ExitCode {
             Command::Orders(args) => orders::run(&args),
             Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
+            Command::Readings(args) => readings::run(&args),
             Command::Documents(documents) => documents.run::<Cli>(),
         },
     )

@@ -10,6 +10,7 @@ use crate::result::{TOOL, TraceId, scene_name};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use crate::sgrt::loaded::{LoadedTrace, RuleRun};
+use crate::sgrt::presets::{self, Preset};
 use crate::sgrt::result::{Config, Report, SCHEMA};
 use crate::sgrt::rules::{self, Rule};
 use crate::sgrt::variations::curve_rules;
@@ -26,6 +27,7 @@ use std::process::ExitCode;
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:
   replay reproject teapot.raytrace
+  replay reproject teapot.raytrace --preset sgrt-paper
   replay reproject teapot.raytrace --rule none --image plain.png --json
   replay reproject *.raytrace --html out/reprojection.html
   replay reproject chess.raytrace --curve --sensitivity --html chess.html")]
@@ -33,11 +35,13 @@ pub struct ReprojectArgs {
     /// Ray traces
     #[arg(value_name = "FILE", required_unless_present = "print_config")]
     files: Vec<PathBuf>,
-    #[arg(long, value_name = "RULE", default_value = DEFAULT_RULE, help = rules::help())]
-    rule: Rule,
-    /// Values that a reprojected pixel reuses
-    #[arg(long, value_enum, default_value_t = Reuse::Primary)]
-    reuse: Reuse,
+    #[arg(long, value_name = "NAME", help = presets::help(), value_parser = preset)]
+    preset: Option<&'static Preset>,
+    #[arg(long, value_name = "RULE", help = rule_help())]
+    rule: Option<Rule>,
+    /// Values that a reprojected pixel reuses [default: primary]
+    #[arg(long, value_enum)]
+    reuse: Option<Reuse>,
     /// TOML file with model parameters; others keep their defaults
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
@@ -72,17 +76,41 @@ pub struct ReprojectArgs {
     threads: shell::Threads,
 }
 
+fn rule_help() -> String {
+    format!("{} [default: {DEFAULT_RULE}]", rules::help())
+}
+
+/// The preset of a name.
+fn preset(name: &str) -> Result<&'static Preset, String> {
+    let names = || presets::PRESETS.map(|preset| preset.name).join(" or ");
+    presets::find(name).ok_or_else(|| format!("expected {}", names()))
+}
+
+impl ReprojectArgs {
+    /// The rule: the user's, else the preset's, else the default.
+    fn rule(&self) -> anyhow::Result<Rule> {
+        let named = self.preset.map_or(DEFAULT_RULE, |preset| preset.rule);
+        self.rule.clone().map_or_else(|| Ok(named.parse()?), Ok)
+    }
+
+    /// What is reused: the user's, else the preset's, else primary hits.
+    fn reuse(&self) -> Reuse {
+        let named = self.preset.map_or(Reuse::Primary, |preset| preset.reuse);
+        self.reuse.unwrap_or(named)
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// A file that cannot be read, invalid parameters, or an output that cannot be written.
 pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     args.threads.start()?;
-    let config = read_config(args.config.as_deref())?;
+    let config = read_config(args.preset, args.config.as_deref())?;
     if args.print_config {
-        let text = match args.config {
-            None => DEFAULT_TOML.to_owned(),
-            Some(_) => toml::to_string(&config)?,
+        let text = match (args.preset, &args.config) {
+            (None, None) => DEFAULT_TOML.to_owned(),
+            _ => toml::to_string(&config)?,
         };
         super::print(&text)?;
         return Ok(ExitCode::SUCCESS);
@@ -138,23 +166,27 @@ fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
     )
 }
 
-fn read_config(path: Option<&Path>) -> anyhow::Result<SgrtConfig> {
+/// The parameters: the defaults, the preset's over them, the file's over both.
+pub fn read_config(
+    preset: Option<&'static Preset>,
+    path: Option<&Path>,
+) -> anyhow::Result<SgrtConfig> {
+    let named = preset.map_or("", |preset| preset.parameters);
     let Some(path) = path else {
-        return Ok(SgrtConfig::default());
+        return Ok(SgrtConfig::from_overrides(named)?);
     };
     let text = shell::read_settings(path)?;
-    SgrtConfig::from_overrides(&text).with_context(|| path.display().to_string())
+    SgrtConfig::from_layers(&[named, &text]).with_context(|| path.display().to_string())
 }
 
 fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
     let file = Raytrace::open(path)?;
     let in_file = || path.display().to_string();
     let loaded = LoadedTrace::load(&file).with_context(in_file)?;
-    let ours = loaded
-        .run(&args.rule, args.reuse, config)
-        .with_context(in_file)?;
+    let (rule, reuse) = (args.rule()?, args.reuse());
+    let ours = loaded.run(&rule, reuse, config).with_context(in_file)?;
     let plain = loaded
-        .run(&Rule::default(), args.reuse, config)
+        .run(&Rule::default(), reuse, config)
         .with_context(in_file)?;
     if let Some(image) = &args.image {
         write_atomically(image, &png::encode(&triptych(&ours))?)?;
@@ -170,8 +202,8 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         eye_size_px: loaded.frame().size_px,
         rows: loaded.rows().summary,
         config: Config {
-            rule: args.rule.clone(),
-            reuse: args.reuse,
+            rule,
+            reuse,
             cache_misses: loaded.cache_misses().to_owned(),
             model: config.clone(),
         },
@@ -185,7 +217,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         },
         sensitivity: if args.sensitivity {
             loaded
-                .sensitivity(&ours, args.reuse, config)
+                .sensitivity(&ours, reuse, config)
                 .with_context(in_file)?
         } else {
             Vec::new()
@@ -256,7 +288,11 @@ mod tests {
         let source = trace(&scene, View::default());
         let direct = LoadedTrace::load(&source)
             .expect("loads")
-            .run(&args.rule, args.reuse, &SgrtConfig::default())
+            .run(
+                &args.rule().expect("a rule"),
+                args.reuse(),
+                &SgrtConfig::default(),
+            )
             .expect("runs");
         assert_eq!(entry.report.result, direct.outcome);
         assert!(entry.report.result.reuse_pct > 80.0);
@@ -303,7 +339,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("p.toml");
         std::fs::write(&path, "[tni]\nunits = 0\n").expect("written");
-        let error = read_config(Some(&path)).unwrap_err();
+        let error = read_config(None, Some(&path)).unwrap_err();
         let text = format!("{error:#}");
         assert!(
             text.contains("p.toml") && text.contains("tni.units"),

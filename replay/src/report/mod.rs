@@ -15,6 +15,7 @@ pub mod orders;
 pub mod parquet;
 pub mod picture;
 pub mod plots;
+pub mod readings;
 pub mod run;
 pub mod sgrt;
 pub mod sweep;

@@ -11,7 +11,7 @@ use crate::sgrt::result::Report;
 use maud::{Markup, html};
 use serde::Serialize;
 
-pub use tables::{csv, rows};
+pub use tables::{csv, reuse_name, rows};
 
 /// Longest edge of a picture on the page.
 pub const THUMBNAIL_PX: u32 = 560;

@@ -4,8 +4,9 @@
 //! the left eye's view-independent radiance, and view-dependent radiance that is still traced for the right
 //! eye. The trace has the latter for the right eye's true hit. There are three cases:
 //!
-//! - The re-test found the true triangle and only the primary hit is reused. Everything after the hit is
-//!   traced, so the colour is the traced one. This also applies to visible sky.
+//! - The re-test found the true triangle, and the shadows are those of the right eye's own hit: their rays are
+//!   traced, or the reused outcomes are the same. Shading then gives the traced colour. This also applies to
+//!   visible sky.
 //! - The reused hit is on the same surface as the true one (same object, within a pixel). The colour is the
 //!   left view-independent part plus the right view-dependent part. With `primary` reuse this approximates
 //!   shading at the left hit, with the shadows and texels of the left pixel.
@@ -43,11 +44,13 @@ pub enum Reuse {
     Shadow,
     /// Also the final colour, if the material looks the same from everywhere.
     Color,
+    /// The final colour, reflections and refractions included.
+    Pixel,
 }
 
 impl Reuse {
     /// All levels, in increasing order.
-    pub const ALL: [Self; 3] = [Self::Primary, Self::Shadow, Self::Color];
+    pub const ALL: [Self; 4] = [Self::Primary, Self::Shadow, Self::Color, Self::Pixel];
 }
 
 /// Maximum distance between the reused and the true hit to count as the same spot, in pixels.
@@ -60,14 +63,23 @@ pub fn compose(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<[f32;
     decisions
         .par_iter()
         .zip(&frame.right().samples)
-        .map(|(decision, truth)| {
+        .enumerate()
+        .map(|(index, (decision, truth))| {
             if !decision.class.is_reused() {
                 return truth.color();
             }
             let left = &frame.left().samples[decision.source as usize];
             let same_hit = decision.primitive == truth.primitive
                 && (decision.exact.is_some() || truth.is_sky());
-            if same_hit && (reuse == Reuse::Primary || truth.is_sky()) {
+            if reuse == Reuse::Pixel && !truth.is_sky() {
+                return left.color();
+            }
+            let outcomes = |eye: usize, at: usize| frame.eyes[eye].work[at].shadow_outcomes();
+            let true_shadows = reuse == Reuse::Primary
+                || decision.retraces_shadows
+                || (reuse == Reuse::Shadow
+                    && outcomes(0, decision.source as usize) == outcomes(1, index));
+            if same_hit && (true_shadows || truth.is_sky()) {
                 return truth.color();
             }
             let same_spot = left.object == truth.object

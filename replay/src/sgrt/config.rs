@@ -126,6 +126,12 @@ pub struct Srp {
     pub detect_cycles: f64,
     /// Cycles per right pixel reused.
     pub reuse_cycles: f64,
+    /// Cycles per left pixel of its row that a right pixel is tested against; 0 if detection looks only at what the
+    /// reproject kernel scattered into the right pixel.
+    pub row_test_cycles: f64,
+    /// True if an inspector compacts pixels by kernel (inspector-executor), so that no lane idles; false if each warp
+    /// runs the kernels of all its pixels.
+    pub compaction: bool,
 }
 
 /// Bytes of the fields of a G-buffer record.
@@ -144,6 +150,22 @@ pub struct Gbuffer {
     pub object_bytes: u32,
     /// Triangle number, part of the record if error detection reads it.
     pub triangle_bytes: u32,
+    /// Outcomes of the shadow rays, part of the record if error detection reads them.
+    pub shadow_bytes: u32,
+    /// Position in the copy that error detection reads: three coordinates, or a depth, as the pixel gives the direction.
+    pub detect_position_bytes: u32,
+    /// Where that copy waits for the right eye.
+    pub rows: RowStorage,
+}
+
+/// Where the fields that error detection reads of left pixels wait for the right eye.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RowStorage {
+    /// In DRAM: written once per left pixel, fetched by DMA for each band of right tiles (paper, section III).
+    Dram,
+    /// On chip: the left eye's bands of tiles alternate with the right eye's, so that only the rows of a few bands are alive.
+    Chip,
 }
 
 /// Energy per operation and per byte.
@@ -211,8 +233,18 @@ impl SgrtConfig {
     /// # Errors
     /// [`ConfigError`] names the key and what was expected.
     pub fn from_overrides(text: &str) -> Result<Self, ConfigError> {
+        Self::from_layers(&[text])
+    }
+
+    /// The defaults, overridden by each text in turn.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the key and what was expected.
+    pub fn from_layers(texts: &[&str]) -> Result<Self, ConfigError> {
         let mut table: toml::Table = toml::from_str(DEFAULT_TOML)?;
-        overlay(&mut table, toml::from_str(text)?);
+        for text in texts {
+            overlay(&mut table, toml::from_str(text)?);
+        }
         let config: Self = table.try_into()?;
         config.check()?;
         Ok(config)

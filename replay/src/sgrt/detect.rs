@@ -46,6 +46,8 @@ pub struct Decision {
     pub exact: Option<[f32; 3]>,
     /// Triangles that the ray was intersected with.
     pub tests: u8,
+    /// True if the rule wants the shadow rays of a reused pixel traced again, whatever is reused.
+    pub retraces_shadows: bool,
 }
 
 /// Decides on every right sample.
@@ -74,6 +76,11 @@ pub fn decide(frame: &Frame, arrived: &Reprojection, rule: &Rule) -> Vec<Decisio
                     }
                 }
             }
+            if decision.class.is_reused() {
+                let retraces =
+                    |test: &Box<dyn Test + '_>| test.retraces_shadows(at, decision.source);
+                decision.retraces_shadows = tests.iter().any(retraces);
+            }
             decision
         })
         .collect()
@@ -94,6 +101,7 @@ fn candidate(at: RightSample) -> Decision {
         primitive,
         exact: None,
         tests: 0,
+        retraces_shadows: false,
     }
 }
 

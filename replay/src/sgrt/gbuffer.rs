@@ -4,9 +4,9 @@
 //! reproject and reuse kernels read. Only error detection needs other tiles. The fields it reads of every
 //! left pixel are written to DRAM once, and DMA fetches the rows for each band of tiles, once per band.
 //! With a whole-screen G-buffer, every record is written to DRAM, each kernel reads it back, and detection
-//! reads the same rows.
+//! reads the same rows. With rows on chip, the copy that detection reads stays in row buffers instead.
 
-use super::config::Gbuffer;
+use super::config::{Gbuffer, RowStorage};
 use super::reads::Reads;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +37,8 @@ pub struct RightTile {
     pub reused: u64,
     /// The tile's share of the bytes fetched for its band.
     pub fetched_bytes: u64,
+    /// Bytes that tests against whole rows read from the row buffers.
+    pub row_read_bytes: u64,
 }
 
 /// Traffic of a left tile: shading writes its records, the reproject kernel reads the fields that detection
@@ -46,6 +48,10 @@ pub fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Tr
     let record = pixels * reads.record_bytes(g);
     let row = pixels * reads.pixel_bytes(g);
     match keeping {
+        Keeping::Tile if g.rows == RowStorage::Chip => Traffic {
+            on_chip_bytes: record + 2 * row,
+            dram_bytes: 0,
+        },
         Keeping::Tile => Traffic {
             on_chip_bytes: record + row,
             dram_bytes: row,
@@ -62,8 +68,13 @@ pub fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Tr
 #[must_use]
 pub fn right_tile(tile: &RightTile, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
     let records = (tile.reused + tile.tested) * reads.record_bytes(g);
-    let rows_on_chip = tile.fetched_bytes + tile.tested * reads.looked_up_bytes(g);
+    let searched = tile.row_read_bytes + tile.tested * reads.looked_up_bytes(g);
+    let rows_on_chip = tile.fetched_bytes + searched;
     match keeping {
+        Keeping::Tile if g.rows == RowStorage::Chip => Traffic {
+            on_chip_bytes: records + searched,
+            dram_bytes: 0,
+        },
         Keeping::Tile => Traffic {
             on_chip_bytes: records + rows_on_chip,
             dram_bytes: tile.fetched_bytes,
@@ -88,6 +99,7 @@ mod tests {
             tested: 1000,
             reused: 900,
             fetched_bytes: 12_500,
+            row_read_bytes: 0,
         };
         let both = |keeping| {
             let left = left_tile(1000, keeping, reads, &g);

@@ -89,6 +89,9 @@ impl Comparison {
     }
 }
 
+/// Pixels of a warp: two rows of a tile.
+const WARP_PIXELS: usize = 32;
+
 /// Work of a tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TileWork {
@@ -107,12 +110,19 @@ pub fn tile_work(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<Til
         .into_par_iter()
         .map(|tile| {
             let mut work = TileWork::default();
-            for i in frame.tile_samples(tile) {
+            let mut warp = [0u64; 2];
+            for (at, i) in frame.tile_samples(tile).enumerate() {
                 work.left.add_traced(&frame.left().work[i]);
                 work.left.reprojected += 1;
                 work.right_full.add_traced(&frame.right().work[i]);
                 add_right(frame, &decisions[i], i, reuse, &mut work.right);
+                if at % WARP_PIXELS == 0 {
+                    let [traced, reused] = std::mem::take(&mut warp);
+                    work.right.add_warp(traced, reused);
+                }
+                warp[usize::from(decisions[i].class.is_reused())] += 1;
             }
+            work.right.add_warp(warp[0], warp[1]);
             work
         })
         .collect()
@@ -121,6 +131,7 @@ pub fn tile_work(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<Til
 fn add_right(frame: &Frame, decision: &Decision, i: usize, reuse: Reuse, batch: &mut BatchWork) {
     let pixel = &frame.right().work[i];
     batch.detected += 1;
+    batch.row_tests += u64::from(frame.size_px[0]);
     batch.retest_rays += u64::from(decision.tests > 0);
     batch.retest_tests += u64::from(decision.tests);
     if !decision.class.is_reused() {
@@ -136,7 +147,12 @@ fn add_right(frame: &Frame, decision: &Decision, i: usize, reuse: Reuse, batch: 
     let left = &frame.left().samples[decision.source as usize];
     let material = frame.tables.materials.get(left.material as usize);
     let looks_alike = !left.is_sky() && material.is_some_and(|m| !m.view_dependent());
-    if !(reuse == Reuse::Color && looks_alike) {
+    let is_shaded = match reuse {
+        Reuse::Primary | Reuse::Shadow => true,
+        Reuse::Color => !looks_alike,
+        Reuse::Pixel => false,
+    };
+    if is_shaded {
         batch.shaded += 1 + u64::from(pixel.secondary_shaded);
     }
 }
@@ -146,8 +162,8 @@ fn is_traced(decision: &Decision, class: RayClass, reuse: Reuse) -> bool {
     match class {
         _ if !decision.class.is_reused() => true,
         RayClass::Primary => false,
-        RayClass::Shadow => reuse == Reuse::Primary,
-        RayClass::Secondary => true,
+        RayClass::Shadow => reuse == Reuse::Primary || decision.retraces_shadows,
+        RayClass::Secondary => reuse != Reuse::Pixel,
     }
 }
 
@@ -263,6 +279,7 @@ pub fn compare(
             tested: work.right.detected,
             reused: work.right.reused,
             fetched_bytes: reads.fetched_bytes(g, band, band_and_beside, u64::from(width)),
+            row_read_bytes: row_read_bytes(&work.right, config),
         };
         let plain_left = BatchWork {
             reprojected: 0,
@@ -298,6 +315,16 @@ pub fn compare(
         whole_screen,
         right_full_tni_cycles: right_full,
         right_tni_cycles: right,
+    }
+}
+
+/// Bytes that tests against whole rows read from the row buffers: a warp reads each left pixel once for all its lanes.
+fn row_read_bytes(work: &BatchWork, config: &SgrtConfig) -> u64 {
+    if config.srp.row_test_cycles > 0.0 {
+        work.row_tests * u64::from(config.gbuffer.detect_position_bytes)
+            / u64::from(config.srp.lanes_per_core)
+    } else {
+        0
     }
 }
 

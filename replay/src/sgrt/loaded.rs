@@ -2,7 +2,7 @@
 
 use super::accuracy::count_errors;
 use super::compose::{Reuse, compose};
-use super::config::SgrtConfig;
+use super::config::{RowStorage, SgrtConfig};
 use super::detect::{Decision, decide};
 use super::frame::{Frame, FrameError, RaySource};
 use super::hardware::{
@@ -121,7 +121,13 @@ impl<'a> LoadedTrace<'a> {
             ssim: ssim::ssim(&self.truth, &picture),
         };
         Ok(RuleRun {
-            outcome: Outcome::new(&accuracy, &comparison, &error, reads),
+            outcome: Outcome::new(
+                &accuracy,
+                &comparison,
+                &error,
+                reads,
+                self.detection_sram_bytes(reads, config),
+            ),
             decisions,
             picture,
             flip,
@@ -129,6 +135,18 @@ impl<'a> LoadedTrace<'a> {
             work,
             misses,
         })
+    }
+
+    /// Bytes of the row buffers: with rows in DRAM the rows of one band, with rows on chip all rows that are alive.
+    fn detection_sram_bytes(&self, reads: Reads, config: &SgrtConfig) -> u64 {
+        let g = &config.gbuffer;
+        let width = u64::from(self.frame.size_px[0]);
+        match g.rows {
+            RowStorage::Dram => self.rows.largest_band(reads, g, width),
+            RowStorage::Chip => {
+                self.rows.rows_on_chip(reads.has_neighbour_rows()) * width * reads.pixel_bytes(g)
+            }
+        }
     }
 
     pub(super) fn compare(

@@ -9,7 +9,7 @@
 //! the saved work is known for each ray. [`hardware`] combines cycles ([`tni`], [`srp`]), bytes ([`dram`])
 //! and energy ([`energy`]). The share of [`gbuffer`] follows from the fields that a rule [`reads`] and from
 //! the [`rows`] that hold them. [`loaded`] runs one rule on a trace, [`variations`] many rules or
-//! parameters.
+//! parameters, [`readings`] every reading of the paper. [`presets`] name whole settings.
 
 pub mod accuracy;
 pub mod cache;
@@ -24,6 +24,8 @@ pub mod hardware;
 pub mod loaded;
 pub mod picture;
 pub mod place;
+pub mod presets;
+pub mod readings;
 pub mod reads;
 pub mod reproject;
 pub mod result;

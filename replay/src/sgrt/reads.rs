@@ -47,6 +47,9 @@ pub struct Reads {
     pub object: Option<Around>,
     /// Triangle number.
     pub triangle: Option<Around>,
+    /// Outcomes of the shadow rays.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shadow: Option<Around>,
 }
 
 impl Reads {
@@ -55,6 +58,7 @@ impl Reads {
         position: None,
         object: None,
         triangle: None,
+        shadow: None,
     };
 
     /// The reads of every rule: positions along the row determine which pixel arrives.
@@ -70,24 +74,33 @@ impl Reads {
             position: self.position.max(other.position),
             object: self.object.max(other.object),
             triangle: self.triangle.max(other.triangle),
+            shadow: self.shadow.max(other.shadow),
         }
     }
 
     /// Bytes and pixels of each field.
     fn fields(self, g: &Gbuffer) -> impl Iterator<Item = (u64, Around)> {
         [
-            (g.position_bytes, self.position),
+            (g.detect_position_bytes, self.position),
             (g.object_bytes, self.object),
             (g.triangle_bytes, self.triangle),
+            (g.shadow_bytes, self.shadow),
         ]
         .into_iter()
         .filter_map(|(bytes, around)| Some((u64::from(bytes), around?)))
     }
 
-    /// Bytes per left pixel that detection reads, and that go through DRAM.
+    /// Bytes per left pixel that detection reads: through DRAM, or kept on chip.
     #[must_use]
     pub fn pixel_bytes(self, g: &Gbuffer) -> u64 {
         self.fields(g).map(|(bytes, _)| bytes).sum()
+    }
+
+    /// True if detection reads rows above and below a pixel's.
+    #[must_use]
+    pub fn has_neighbour_rows(self) -> bool {
+        let all = [self.position, self.object, self.triangle, self.shadow];
+        all.into_iter().flatten().any(Around::has_neighbour_rows)
     }
 
     /// Bytes that DMA fetches for a band of rows. The band's arrivals come from `rows` left rows, and those
@@ -120,6 +133,7 @@ impl Reads {
         let numbers = [
             (g.object_bytes, self.object),
             (g.triangle_bytes, self.triangle),
+            (g.shadow_bytes, self.shadow),
         ];
         let read = numbers.into_iter().filter(|(_, around)| around.is_some());
         [

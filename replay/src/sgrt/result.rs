@@ -125,8 +125,10 @@ pub struct Outcome {
     pub work: Work,
     /// The same with both eyes completely traced.
     pub reference_work: Work,
-    /// The fields that error detection reads through DRAM.
+    /// The fields that error detection reads of left pixels.
     pub detection_reads: Reads,
+    /// Row buffers that hold them: one band's rows if they come from DRAM, all live rows if they stay on chip.
+    pub detection_sram_bytes: u64,
     /// Bytes read from and written to the tile buffers.
     pub on_chip_bytes: u64,
     /// Bytes read from and written to external memory.
@@ -244,6 +246,7 @@ impl Outcome {
         comparison: &Comparison,
         error: &ImageError,
         reads: Reads,
+        detection_sram_bytes: u64,
     ) -> Self {
         let reused = accuracy.all_reused();
         let (reference, run) = (&comparison.reference, &comparison.reprojected);
@@ -291,6 +294,7 @@ impl Outcome {
             work: Work::of(run),
             reference_work: Work::of(reference),
             detection_reads: reads,
+            detection_sram_bytes,
             on_chip_bytes: run.on_chip_bytes,
             dram: run.dram,
             reference_dram: reference.dram,

@@ -5,7 +5,9 @@
 //! fields of view, the sources of a right row are spread over many left rows. DMA then fetches all of these
 //! rows for every band of tiles.
 
+use super::config::Gbuffer;
 use super::frame::Frame;
+use super::reads::Reads;
 use super::reproject::Reprojection;
 use formats::view::TILE_SIZE_PX;
 use serde::{Deserialize, Serialize};
@@ -24,6 +26,8 @@ pub struct RowNeeds {
     band: Vec<u64>,
     /// The same for the band and its adjacent rows.
     band_and_beside: Vec<u64>,
+    /// By band of tiles: first and last of these left rows, and of those with the adjacent rows.
+    spans: Vec<[Option<[u64; 2]>; 2]>,
     /// Properties of the eyes that follow from the rows.
     pub summary: RowSummary,
 }
@@ -66,6 +70,12 @@ impl RowNeeds {
             let union = |word: usize| rows.iter().skip(word).step_by(words).fold(0, |a, b| a | b);
             (0..words).map(|w| u64::from(union(w).count_ones())).sum()
         };
+        let span = |first: usize, end: usize| -> Option<[u64; 2]> {
+            let is_needed = |y: &usize| needs_row(&sources, words, first, end.min(height), *y);
+            let first = (0..height).find(is_needed)?;
+            let last = (0..height).rev().find(is_needed)?;
+            Some([first as u64, last as u64])
+        };
         let tile = TILE_SIZE_PX as usize;
         let bands = || (0..height).step_by(tile);
         let per_row: Vec<u64> = (0..height)
@@ -78,6 +88,12 @@ impl RowNeeds {
             band: bands().map(|y| count(y, y + tile)).collect(),
             band_and_beside: bands()
                 .map(|y| count(y.saturating_sub(1), y + tile + 1))
+                .collect(),
+            spans: bands()
+                .map(|y| {
+                    let beside = span(y.saturating_sub(1), y + tile + 1);
+                    [span(y, y + tile), beside]
+                })
                 .collect(),
             summary: RowSummary {
                 other_row_pct: 100.0 * elsewhere as f64 / seen.max(1) as f64,
@@ -93,6 +109,45 @@ impl RowNeeds {
         let band = (tile / frame.tables.tiles()[0]) as usize;
         [self.band[band], self.band_and_beside[band]]
     }
+
+    /// Bytes of the largest band of rows that detection fetches, of `row_px` pixels each.
+    #[must_use]
+    pub fn largest_band(&self, reads: Reads, g: &Gbuffer, row_px: u64) -> u64 {
+        let bands = self.band.iter().zip(&self.band_and_beside);
+        let bytes = bands.map(|(&band, &beside)| reads.fetched_bytes(g, band, beside, row_px));
+        bytes.max().unwrap_or(0)
+    }
+
+    /// Left rows alive at most if they stay on chip and bands of left and right tiles alternate: a band of right tiles
+    /// follows the last band of left tiles that it needs, and keeps every row that it or a later band needs.
+    #[must_use]
+    pub fn rows_on_chip(&self, with_adjacent_rows: bool) -> u64 {
+        let tile = u64::from(TILE_SIZE_PX);
+        let mut most = 0;
+        // By band: the oldest row that it or a later one needs.
+        let mut needed_from: Vec<u64> = Vec::with_capacity(self.spans.len());
+        let mut later = u64::MAX;
+        for spans in self.spans.iter().rev() {
+            if let Some([first, _]) = spans[usize::from(with_adjacent_rows)] {
+                later = later.min(first);
+            }
+            needed_from.push(later);
+        }
+        needed_from.reverse();
+        let mut traced = 0;
+        for (spans, from) in self.spans.iter().zip(needed_from) {
+            if let Some([_, last]) = spans[usize::from(with_adjacent_rows)] {
+                traced = traced.max((last / tile + 1) * tile);
+                most = most.max(traced.saturating_sub(from));
+            }
+        }
+        most
+    }
+}
+
+/// True if any right row from `first` to `end` needs a left row.
+fn needs_row(sources: &[u64], words: usize, first: usize, end: usize, left: usize) -> bool {
+    (first..end).any(|right| sources[right * words + left / 64] >> (left % 64) & 1 == 1)
 }
 
 #[cfg(test)]
@@ -117,6 +172,9 @@ mod tests {
         // 40 rows form two whole bands and half a band.
         let bands = [0, 1, 2].map(|band| needs.of_tile(&frame, band * tiles_a_band));
         assert_eq!(bands, [[16, 17], [16, 18], [8, 9]]);
+        // Without adjacent rows, a band's own; with them, the next band and the last row of the one before.
+        assert_eq!(needs.rows_on_chip(false), 16);
+        assert_eq!(needs.rows_on_chip(true), 33);
     }
 
     #[test]

@@ -58,13 +58,16 @@ impl SrpCycles {
 #[must_use]
 pub fn cycles(work: &BatchWork, config: &SgrtConfig) -> SrpCycles {
     let srp = &config.srp;
+    let idle = |lanes: u64| if srp.compaction { 0 } else { lanes };
     SrpCycles {
-        generation: (work.rays() + work.retest_rays) as f64 * srp.ray_generation_cycles,
+        generation: (work.rays() + work.retest_rays + idle(work.idle_traced_lanes)) as f64
+            * srp.ray_generation_cycles,
         shading: work.shaded as f64 * srp.shading_cycles
             + work.alpha_tests() as f64 * srp.alpha_test_cycles,
         reproject: work.reprojected as f64 * srp.reproject_cycles,
-        detect: work.detected as f64 * srp.detect_cycles,
-        reuse: work.reused as f64 * srp.reuse_cycles,
+        detect: work.detected as f64 * srp.detect_cycles
+            + work.row_tests as f64 * srp.row_test_cycles,
+        reuse: (work.reused + idle(work.idle_reused_lanes)) as f64 * srp.reuse_cycles,
         lanes: f64::from(srp.cores) * f64::from(srp.lanes_per_core),
     }
 }

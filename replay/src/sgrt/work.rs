@@ -1,6 +1,6 @@
 //! The cost of rays by class: the input of the cycle and energy models.
 
-use formats::raytrace::{NO_PARENT, RayKind, RayRecord};
+use formats::raytrace::{NO_PARENT, Outcome, RayKind, RayRecord};
 
 /// Classes of rays that reuse treats differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +61,9 @@ pub struct PixelWork {
     pub by_class: [RayWork<u32>; 3],
     /// Reflection and refraction rays. Each ends in a shading kernel.
     pub secondary_shaded: u32,
+    /// Outcomes of the primary hit's shadow rays, one bit per ray in their order: 1 if blocked. Rays beyond the
+    /// 64th fold onto the first bits.
+    pub shadows_blocked: u64,
 }
 
 impl PixelWork {
@@ -75,11 +78,21 @@ impl PixelWork {
             w.steps = w.steps.saturating_add(ray.steps);
             w.triangle_tests = w.triangle_tests.saturating_add(ray.triangle_tests);
             w.alpha_tests = w.alpha_tests.saturating_add(ray.alpha_tests);
+            if class == RayClass::Shadow && ray.outcome == Outcome::Occluded {
+                work.shadows_blocked ^= 1u64.rotate_left(w.rays - 1);
+            }
             if class == RayClass::Secondary && ray.kind != RayKind::Shadow {
                 work.secondary_shaded = work.secondary_shaded.saturating_add(1);
             }
         }
         work
+    }
+
+    /// Outcomes of the primary hit's shadow rays, and their number.
+    #[must_use]
+    pub fn shadow_outcomes(&self) -> (u64, u32) {
+        let rays = self.by_class[RayClass::Shadow as usize].rays;
+        (self.shadows_blocked, rays)
     }
 }
 
@@ -100,6 +113,12 @@ pub struct BatchWork {
     pub detected: u64,
     /// Right pixels reused.
     pub reused: u64,
+    /// Left pixels that detection tests if it tests each right pixel against its whole row.
+    pub row_tests: u64,
+    /// Lanes without work while a warp runs the kernels of its traced pixels, if pixels are not compacted.
+    pub idle_traced_lanes: u64,
+    /// The same for the kernel of its reused pixels.
+    pub idle_reused_lanes: u64,
 }
 
 impl BatchWork {
@@ -130,6 +149,17 @@ impl BatchWork {
         self.reprojected += other.reprojected;
         self.detected += other.detected;
         self.reused += other.reused;
+        self.row_tests += other.row_tests;
+        self.idle_traced_lanes += other.idle_traced_lanes;
+        self.idle_reused_lanes += other.idle_reused_lanes;
+    }
+
+    /// Adds the idle lanes of a warp with these numbers of traced and reused pixels.
+    pub fn add_warp(&mut self, traced: u64, reused: u64) {
+        if traced > 0 && reused > 0 {
+            self.idle_traced_lanes += reused;
+            self.idle_reused_lanes += traced;
+        }
     }
 
     /// Rays traced.

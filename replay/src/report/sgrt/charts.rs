@@ -73,6 +73,7 @@ pub fn curve(report: &Report) -> Result<Markup, PlotError> {
         Reuse::Primary => "primary hits reused",
         Reuse::Shadow => "and shadow rays",
         Reuse::Color => "and diffuse colour",
+        Reuse::Pixel => "and reflections",
     };
     let series = |reuse, index, x: &dyn Fn(&crate::sgrt::result::CurvePoint) -> f64| {
         let mut points: Vec<(f64, f64)> = report

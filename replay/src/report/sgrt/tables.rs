@@ -67,11 +67,14 @@ pub fn row_notes(entries: &[Entry]) -> Vec<String> {
         .collect()
 }
 
-fn reuse_name(reuse: Reuse) -> &'static str {
+/// Name of a level of reuse, as on the command line.
+#[must_use]
+pub fn reuse_name(reuse: Reuse) -> &'static str {
     match reuse {
         Reuse::Primary => "primary",
         Reuse::Shadow => "shadow",
         Reuse::Color => "color",
+        Reuse::Pixel => "pixel",
     }
 }
 
@@ -236,6 +239,9 @@ impl Row for RuleRow<'_> {
                     reads.pixel_bytes(&r.report.config.model.gbuffer)
                 }
             }),
+            Column::real("detection_sram_kib", "row buffers", "KiB", 0, |r: &Self| {
+                r.outcome.detection_sram_bytes as f64 / 1024.0
+            }),
             millions("on_chip_bytes", "tile buffers", "MB", |o| o.on_chip_bytes),
             millions("gbuffer_dram_bytes", "G-buffer in DRAM", "MB", |o| {
                 o.dram.gbuffer_bytes
@@ -320,6 +326,7 @@ pub fn work(entries: &[Entry]) -> Table {
 pub fn traffic(entries: &[Entry]) -> Table {
     let keys = [
         "detection_bytes",
+        "detection_sram_kib",
         "on_chip_bytes",
         "gbuffer_dram_bytes",
         "dram_bytes",

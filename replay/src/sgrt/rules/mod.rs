@@ -9,6 +9,7 @@ mod depth;
 mod object;
 mod opaque;
 mod row;
+mod shadow_edge;
 mod silhouette;
 mod triangle;
 mod triangles;
@@ -22,7 +23,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// All rules, in the order in which combinations are printed.
-pub static RULES: [&RuleKind; 7] = [
+pub static RULES: [&RuleKind; 8] = [
     &depth::RULE,
     &row::RULE,
     &object::RULE,
@@ -30,6 +31,7 @@ pub static RULES: [&RuleKind; 7] = [
     &silhouette::RULE,
     &triangle::RULE,
     &triangles::RULE,
+    &shadow_edge::RULE,
 ];
 
 /// Creates the test of a frame from its arrivals and the rule's share.
@@ -59,13 +61,18 @@ pub trait Test: Sync {
     /// True if `hit`, the left sample to be reused, must be rejected. After a re-test, `hit` is the sample
     /// whose triangle was hit, otherwise the candidate's.
     fn rejects(&self, at: RightSample, hit: &Sample) -> bool;
+
+    /// True if the shadow rays of a pixel that reuses the left sample `source` must be traced again.
+    fn retraces_shadows(&self, _at: RightSample, _source: u32) -> bool {
+        false
+    }
 }
 
 /// Default depth share of rules that take one.
 pub const DEFAULT_DEPTH_SHARE: f32 = 0.02;
 
-/// The rules of error detection: a combination of [`RULES`], each at most once. The empty one is the
-/// paper's plain reuse.
+/// The rules of error detection: a combination of [`RULES`], each at most once. The empty one
+/// reuses every arrival.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Rule(Vec<Part>);
@@ -142,8 +149,8 @@ fn synopsis() -> String {
 /// Describes the choices of `--rule`.
 #[must_use]
 pub fn help() -> String {
-    let mut text = "Which reprojected pixels are rejected and traced: `none` (the paper's plain \
-                    reuse), or some of these joined by `+`:"
+    let mut text = "Which reprojected pixels are rejected and traced: `none` (every \
+                    arrival is reused), or some of these joined by `+`:"
         .to_owned();
     for kind in RULES {
         let share = if kind.takes_share { "[=SHARE]" } else { "" };
@@ -249,7 +256,9 @@ mod tests {
             let error = text.parse::<Rule>().unwrap_err().to_string();
             assert!(
                 error.starts_with("rule: expected none, or depth[=SHARE], row[=SHARE], object")
-                    && error.contains("silhouette, triangle, triangles joined by '+'; found"),
+                    && error.contains(
+                        "silhouette, triangle, triangles, shadow-edge joined by '+'; found"
+                    ),
                 "{error}"
             );
         }

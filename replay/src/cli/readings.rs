@@ -1,0 +1,194 @@
+//! `replay readings`: the SGRT paper's figure 3 under every reading of what it measures.
+
+use super::reproject::read_config;
+use crate::files::{self, write_atomically};
+use crate::paper::sgrt as paper;
+use crate::report::readings::{ReadingsReport, SceneReadings};
+use crate::result::{TraceId, scene_name};
+use crate::sgrt::loaded::LoadedTrace;
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use formats::raytrace::Raytrace;
+use shell::{Output, Progress};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `replay readings`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:
+  replay readings teapot.raytrace chess.raytrace car.raytrace
+  replay readings *.raytrace --calibrate teapot,chess,car --html readings.html")]
+pub struct ReadingsArgs {
+    /// Ray traces.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// Scenes that the closest reading is chosen by, comma-separated; the other scenes judge it [default: every second
+    /// one of those beside a scene of the paper].
+    #[arg(long, value_name = "LABELS", value_delimiter = ',')]
+    calibrate: Option<Vec<String>>,
+    /// Model parameters (TOML) that differ from the defaults.
+    #[arg(long, value_name = "TOML")]
+    config: Option<PathBuf>,
+    /// Scene of the paper to set beside: SCENE for every trace, or LABEL=SCENE; `none` for none
+    /// [default: the scene that a built-in one of the paper's stands for].
+    #[arg(long = "as", value_name = "SCENE")]
+    paper_scenes: Vec<String>,
+    /// Prints JSON (schema replay.readings/1).
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Prints CSV: a row per reading and trace.
+    #[arg(long)]
+    csv: bool,
+    /// Writes a page with charts.
+    #[arg(long, value_name = "HTML")]
+    html: Option<PathBuf>,
+    #[command(flatten)]
+    threads: shell::Threads,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A file that cannot be read, parameters that cannot be used, an output that cannot be written.
+pub fn run(args: &ReadingsArgs) -> Result<ExitCode> {
+    args.threads.start()?;
+    let config = read_config(None, args.config.as_deref())?;
+    // A wrong --as is refused before the work.
+    paper::values("", "", &args.paper_scenes)?;
+    let prints = check_outputs(args)?;
+    let progress = Progress::new("reading", args.files.len() as u64, "traces");
+    let mut scenes = Vec::new();
+    for path in &args.files {
+        let file = Raytrace::open(path)?;
+        let in_file = || path.display().to_string();
+        let loaded = LoadedTrace::load(&file).with_context(in_file)?;
+        let meta = &loaded.frame().tables.meta;
+        let label = scene_name(&meta.trace.scene).to_owned();
+        scenes.push(SceneReadings {
+            trace: TraceId::new(path, &meta.trace, file.content_checksum()),
+            eye_size_px: loaded.frame().size_px,
+            paper: paper::values(&meta.trace.scene, &label, &args.paper_scenes)?,
+            calibrates: false,
+            readings: loaded.readings(&config).with_context(in_file)?,
+            label,
+        });
+        progress.advance(1);
+    }
+    drop(progress);
+    mark_calibration(&mut scenes, args.calibrate.as_deref())?;
+    let report = ReadingsReport::new(scenes, config);
+    if let Some(path) = &args.html {
+        write_atomically(path, report.page()?.as_bytes())?;
+    }
+    let text = if args.json {
+        report.json()?
+    } else if args.csv {
+        report.rows().csv()
+    } else {
+        report.text()
+    };
+    if prints {
+        super::print(&text)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn check_outputs(args: &ReadingsArgs) -> Result<bool> {
+    let outputs = [
+        args.html.as_deref().map(|p| Output::text("--html", p)),
+        args.json.then(|| Output::result("--json")),
+        args.csv.then(|| Output::result("--csv")),
+    ];
+    let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
+    let inputs = args.files.iter().chain(&args.config);
+    files::check_outputs(&outputs, inputs.map(PathBuf::as_path))
+}
+
+/// Marks the scenes that the closest reading is chosen by.
+fn mark_calibration(scenes: &mut [SceneReadings], labels: Option<&[String]>) -> Result<()> {
+    let Some(labels) = labels else {
+        let beside_paper = scenes.iter_mut().filter(|scene| scene.paper.is_some());
+        beside_paper
+            .step_by(2)
+            .for_each(|scene| scene.calibrates = true);
+        return Ok(());
+    };
+    for label in labels {
+        let known: Vec<&str> = scenes.iter().map(|s| s.label.as_str()).collect();
+        let known = known.join(", ");
+        let mut of_label: Vec<&mut SceneReadings> = scenes
+            .iter_mut()
+            .filter(|scene| scene.label == *label)
+            .collect();
+        ensure!(
+            !of_label.is_empty(),
+            "--calibrate: expected labels of {known}, found '{label}'"
+        );
+        ensure!(
+            of_label.iter().all(|scene| scene.paper.is_some()),
+            "--calibrate {label}: expected a scene beside one of the paper (see --as)"
+        );
+        of_label
+            .iter_mut()
+            .for_each(|scene| scene.calibrates = true);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sgrt::synthetic::{View, globe, trace, wall};
+    use clap::Parser;
+    use std::path::Path;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        args: ReadingsArgs,
+    }
+
+    fn run_with(list: &[&str]) -> Result<ExitCode> {
+        let words = std::iter::once("readings").chain(list.iter().copied());
+        run(&Cli::try_parse_from(words).expect("valid arguments").args)
+    }
+
+    fn trace_file(folder: &Path) -> String {
+        let path = folder.join("a.raytrace");
+        let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
+        scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
+        std::fs::write(&path, trace(&scene, View::default()).to_bytes()).expect("written");
+        path.display().to_string()
+    }
+
+    #[test]
+    fn a_page_names_every_reading_and_the_papers_figures() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = trace_file(folder.path());
+        let page = folder.path().join("r.html");
+        let html = page.display().to_string();
+        run_with(&[&file, "--as", "teapot", "--html", &html, "--csv"]).expect("runs");
+        let page = std::fs::read_to_string(page).expect("a page");
+        assert!(
+            page.contains("1.64") && page.contains("whole-row"),
+            "{page}"
+        );
+    }
+
+    #[test]
+    fn labels_to_calibrate_on_must_exist_and_have_published_figures() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = trace_file(folder.path());
+        let error = |list: &[&str]| format!("{:#}", run_with(list).unwrap_err());
+        let unknown = error(&[&file, "--calibrate", "teapot"]);
+        assert!(
+            unknown.contains("expected labels of synthetic, found 'teapot'"),
+            "{unknown}"
+        );
+        let unpublished = error(&[&file, "--calibrate", "synthetic"]);
+        assert!(
+            unpublished.contains("--calibrate synthetic"),
+            "{unpublished}"
+        );
+    }
+}

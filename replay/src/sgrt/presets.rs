@@ -1,0 +1,74 @@
+//! Named settings of `replay reproject`: a rule, what is reused, and parameters that differ from the defaults.
+
+use super::compose::Reuse;
+
+/// Named settings. A rule, a level of reuse or a parameter that the user gives replaces the preset's.
+#[derive(Debug)]
+pub struct Preset {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What it stands for, briefly.
+    pub title: &'static str,
+    /// The rule of error detection.
+    pub rule: &'static str,
+    /// What a reused pixel takes from the left one.
+    pub reuse: Reuse,
+    /// Parameters that differ from the defaults, as TOML.
+    pub parameters: &'static str,
+}
+
+/// The reading of the SGRT paper that comes closest to its figure 3 on the scenes that `replay readings` calibrates on.
+static SGRT_PAPER: Preset = Preset {
+    name: "sgrt-paper",
+    title: "the reading of the SGRT paper that is closest to its figure 3: every arrival is reused, with its colour where the material \
+            looks the same from everywhere",
+    rule: "none",
+    reuse: Reuse::Color,
+    parameters: "",
+};
+
+/// Error detection without DRAM traffic. Its records are packed: a depth instead of a position, and an object number of 16 bits.
+static ON_CHIP: Preset = Preset {
+    name: "on-chip",
+    title: "detection that pays: the default rule with shadow outcomes reused except at shadow edges, packed records, rows kept on chip",
+    rule: "depth=0.02+row=0.02+object+opaque+triangles+shadow-edge",
+    reuse: Reuse::Shadow,
+    parameters: "[gbuffer]\nobject_bytes = 2\ndetect_position_bytes = 4\nrows = \"chip\"\n",
+};
+
+/// All presets.
+pub static PRESETS: [&Preset; 2] = [&SGRT_PAPER, &ON_CHIP];
+
+/// The preset of a name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Preset> {
+    PRESETS.into_iter().find(|preset| preset.name == name)
+}
+
+/// Describes the choices of `--preset`.
+#[must_use]
+pub fn help() -> String {
+    let mut text = "Named settings; --rule, --reuse and --config replace parts of them:".to_owned();
+    for preset in PRESETS {
+        text += &format!("\n  {}: {}", preset.name, preset.title);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::config::SgrtConfig;
+    use super::super::rules::Rule;
+    use super::*;
+
+    #[test]
+    fn every_preset_has_a_rule_and_parameters_that_exist() {
+        for preset in PRESETS {
+            let rule: Result<Rule, _> = preset.rule.parse();
+            assert_eq!(rule.expect(preset.name).to_string(), preset.rule);
+            SgrtConfig::from_overrides(preset.parameters).expect(preset.name);
+            assert!(std::ptr::eq(find(preset.name).expect("found"), preset));
+        }
+        assert!(find("sgrt").is_none());
+    }
+}
