@@ -12,6 +12,8 @@ use formats::view::Eye;
 pub struct Parts {
     /// What it holds.
     pub kind: Kind,
+    /// Major version.
+    pub major: u16,
     /// Minor version that it needs.
     pub minor: u16,
     /// Tag and bytes of each chunk.
@@ -38,6 +40,7 @@ impl Parts {
         let entries = container.directory().iter();
         Ok(Self {
             kind: container.kind(),
+            major: container.version().0,
             minor: container.version().1,
             chunks: entries
                 .map(|entry| Ok((entry.tag.0, chunk(entry.tag)?)))
@@ -168,6 +171,7 @@ impl Parts {
             let _twice = writer.chunk(ChunkTag(*tag), bytes);
         }
         let mut bytes = writer.into_bytes().expect("in memory");
+        bytes[8..10].copy_from_slice(&self.major.to_le_bytes());
         bytes[10..12].copy_from_slice(&self.minor.to_le_bytes());
         repair_header(&mut bytes);
         bytes

@@ -24,11 +24,13 @@ use std::fmt;
 
 /// First eight bytes of every trace file.
 pub const MAGIC: [u8; 8] = *b"PLXTRACE";
-/// Readers refuse another major version.
-pub const VERSION_MAJOR: u16 = 1;
-/// The latest minor version. A file says the earliest that has all that is in it: 1 where a trace has
-/// layers, else 0. Readers accept a later one, which may only add.
-pub const VERSION_MINOR: u16 = 1;
+/// Latest minor version of each major version that readers know. A file says the earliest that has all that is in it;
+/// readers accept a later minor version, which may only add, and refuse another major one.
+pub const VERSIONS: [(u16, u16); 2] = [(1, 2), (2, 0)];
+/// Major version of scenes' traces.
+pub(crate) const MAJOR_1: u16 = 1;
+/// Major version of `.textrace` files with their tables behind the tiles: programs' traces.
+pub(crate) const MAJOR_2: u16 = 2;
 /// Chunks start at multiples of this many bytes.
 pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;
 

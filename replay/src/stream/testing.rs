@@ -48,6 +48,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
             surfaces: None,
             origin_m: [0.0; 3],
             techniques: None,
+            program: None,
         },
         textures: sizes
             .iter()
@@ -74,6 +75,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
                         sampler: 0,
                         layer: 0,
                         offset: [0; 2],
+                        level: Default::default(),
                     })
                     .collect(),
             }],
