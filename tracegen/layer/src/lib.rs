@@ -1,0 +1,3 @@
+//! A Vulkan layer that records the texture samples of an unmodified program.
+
+pub mod inject;
