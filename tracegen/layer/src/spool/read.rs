@@ -1,0 +1,155 @@
+//! Reading what the processes of a captured program left behind.
+
+use super::{EVENTS, Event, RECORDS, Span, file};
+use crate::inject::{RAW_BYTES, RawSample};
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why a capture's files cannot be read.
+#[derive(Debug, Error)]
+pub enum ReadError {
+    /// The system refuses.
+    #[error("{file}: {source}")]
+    Io {
+        /// The file.
+        file: String,
+        /// Its reason.
+        source: std::io::Error,
+    },
+    /// A line that is no event.
+    #[error("{file}: line {line}: expected an event, found {found}")]
+    Event {
+        /// The file.
+        file: String,
+        /// Number from 1.
+        line: usize,
+        /// What the parser says.
+        found: String,
+    },
+    /// Records that an event names are not there.
+    #[error("{file}: expected records {first} to {end}, found fewer")]
+    Records {
+        /// The file.
+        file: String,
+        /// First.
+        first: u64,
+        /// End.
+        end: u64,
+    },
+}
+
+/// The files of one process.
+#[derive(Clone, Debug)]
+pub struct Process {
+    pub(super) events: PathBuf,
+    records: PathBuf,
+}
+
+impl Process {
+    /// The processes of a capture, by the names of their files.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn all(folder: &Path) -> Result<Vec<Self>, ReadError> {
+        let io = |source| io_error(folder, source);
+        let mut found = Vec::new();
+        for entry in fs::read_dir(folder).map_err(io)? {
+            let path = entry.map_err(io)?.path();
+            if path.extension().is_some_and(|e| e == EVENTS)
+                && let Some(name) = path.file_stem().and_then(|name| name.to_str())
+            {
+                found.push(Self {
+                    records: file(folder, name, RECORDS),
+                    events: path,
+                });
+            }
+        }
+        found.sort_by(|a, b| a.events.cmp(&b.events));
+        Ok(found)
+    }
+
+    /// All events, up to the line that a killed process did not finish.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a line that is no event.
+    pub fn events(&self) -> Result<Vec<Event>, ReadError> {
+        let open = File::open(&self.events).map_err(|e| io_error(&self.events, e))?;
+        let mut lines = BufReader::new(open);
+        let mut events = Vec::new();
+        let mut line = String::new();
+        loop {
+            line.clear();
+            let read = lines.read_line(&mut line);
+            if read.map_err(|e| io_error(&self.events, e))? == 0 || !line.ends_with('\n') {
+                return Ok(events);
+            }
+            let event = serde_json::from_str(&line).map_err(|e| ReadError::Event {
+                file: self.events.display().to_string(),
+                line: events.len() + 1,
+                found: e.to_string(),
+            })?;
+            events.push(event);
+        }
+    }
+
+    /// Its records.
+    ///
+    /// # Errors
+    /// A file that cannot be opened.
+    pub fn records(&self) -> Result<Reader, ReadError> {
+        let file = File::open(&self.records).map_err(|e| io_error(&self.records, e))?;
+        Ok(Reader {
+            file,
+            name: self.records.clone(),
+        })
+    }
+}
+
+/// Reads spans of records.
+#[derive(Debug)]
+pub struct Reader {
+    file: File,
+    name: PathBuf,
+}
+
+impl Reader {
+    /// Appends the records of a span.
+    ///
+    /// # Errors
+    /// Records that are not there.
+    pub fn read(&mut self, span: Span, into: &mut Vec<RawSample>) -> Result<(), ReadError> {
+        let short = || ReadError::Records {
+            file: self.name.display().to_string(),
+            first: span.first,
+            end: span.first.saturating_add(span.count),
+        };
+        let length = self
+            .file
+            .metadata()
+            .map_err(|e| io_error(&self.name, e))?
+            .len();
+        let end = span
+            .first
+            .checked_add(span.count)
+            .and_then(|end| end.checked_mul(RAW_BYTES));
+        if end.is_none_or(|end| end > length) {
+            return Err(short());
+        }
+        let start = into.len();
+        let count = usize::try_from(span.count).map_err(|_| short())?;
+        into.resize(start + count, RawSample::default());
+        let at = SeekFrom::Start(span.first * RAW_BYTES);
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut into[start..]);
+        let read = self.file.seek(at).and_then(|_| self.file.read_exact(bytes));
+        read.map_err(|e| io_error(&self.name, e))
+    }
+}
+
+fn io_error(file: &Path, source: std::io::Error) -> ReadError {
+    ReadError::Io {
+        file: file.display().to_string(),
+        source,
+    }
+}
