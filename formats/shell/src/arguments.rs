@@ -53,6 +53,12 @@ pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<S
         .into_iter()
         .map(|argument| argument.to_string_lossy().into_owned());
     while let Some(argument) = arguments.next() {
+        if argument == "--" {
+            // What follows is not this program's.
+            kept.push(argument);
+            kept.extend(arguments);
+            break;
+        }
         let (name, value) = match argument.split_once('=') {
             Some((name, value)) => (name, Some(value)),
             None => (argument.as_str(), None),
@@ -80,6 +86,13 @@ pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<S
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn arguments_of_another_program_are_all_recorded() {
+        let line = "app -o a -- program -o b --threads 2";
+        let kept = lasting_arguments(line.split(' ').map(OsString::from));
+        assert_eq!(kept, ["app", "--", "program", "-o", "b", "--threads", "2"]);
+    }
 
     #[test]
     fn output_paths_and_how_a_trace_was_made_are_not_recorded() {

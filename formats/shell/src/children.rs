@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io;
 use std::process::{Command, ExitStatus};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A child that has not ended so long after a signal is left alone.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -49,6 +49,65 @@ pub fn run_child(command: &mut Command) -> io::Result<ExitStatus> {
     }
     status
 }
+
+/// How a program that was watched ended.
+#[derive(Clone, Copy, Debug)]
+pub struct Ended {
+    /// Its status.
+    pub status: ExitStatus,
+    /// It was asked to end before it did by itself.
+    pub stopped: bool,
+}
+
+/// How often a program is looked at.
+const GLANCE: Duration = Duration::from_millis(20);
+
+/// Runs a program to its end, or until `enough` says so: then it is asked to end, and made to if it does not. Does not
+/// return when a signal ends this program.
+///
+/// # Errors
+/// It cannot be started or waited for.
+pub fn run_child_until(
+    command: &mut Command,
+    mut enough: impl FnMut() -> bool,
+) -> io::Result<Ended> {
+    let mut now = children();
+    if now.ending {
+        drop(now);
+        wait_for_the_end();
+    }
+    let mut child = command.spawn()?;
+    now.running.insert(child.id());
+    drop(now);
+    let mut stopped: Option<Instant> = None;
+    let status = loop {
+        if let Some(status) = child.try_wait()? {
+            break status;
+        }
+        match stopped {
+            None if enough() => {
+                send(child.id(), TERMINATE);
+                stopped = Some(Instant::now());
+            }
+            Some(since) if since.elapsed() > PATIENCE => child.kill()?,
+            _ => std::thread::sleep(GLANCE),
+        }
+    };
+    let mut now = children();
+    now.running.remove(&child.id());
+    ONE_ENDED.notify_all();
+    if now.ending {
+        drop(now);
+        wait_for_the_end();
+    }
+    Ok(Ended {
+        status,
+        stopped: stopped.is_some(),
+    })
+}
+
+/// The signal that asks a program to end.
+const TERMINATE: i32 = signal_hook::consts::SIGTERM;
 
 /// The thread that received the signal ends the program.
 fn wait_for_the_end() -> ! {

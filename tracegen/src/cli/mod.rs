@@ -1,5 +1,6 @@
 //! The command line, one file a subcommand.
 
+pub mod app;
 mod cache_args;
 pub mod lens_args;
 mod objective_args;
@@ -28,6 +29,7 @@ Examples:
   tracegen scenes model.gltf --json
   tracegen raster atrium -o atrium.textrace --image atrium.png
   tracegen raster sponza.gltf --camera gallery --shadows -o sponza.textrace
+  tracegen app -o program.textrace --frames 10..13 -- ./program --stereo
   tracegen techniques atrium --path head -o atrium-techniques
   tracegen sweep captures.toml -o traces
   tracegen verify atrium --tiles 200 --colour
@@ -49,6 +51,8 @@ enum Command {
     Scenes(scenes::ScenesArgs),
     /// Render a stereo frame and capture its texture samples into a .textrace file.
     Raster(Box<raster::RasterArgs>),
+    /// Capture the texture samples of an unmodified Vulkan or OpenGL program into a .textrace file.
+    App(Box<app::AppArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
     Techniques(Box<techniques::TechniquesArgs>),
     /// Capture every combination of a manifest's scenes, cameras and displays; goes on where it stopped.
@@ -74,6 +78,7 @@ pub fn main() -> ExitCode {
             match cli.command {
                 Command::Scenes(args) => scenes::run(args)?,
                 Command::Raster(args) => raster::run(&args)?,
+                Command::App(args) => return app::run(&args),
                 Command::Techniques(args) => techniques::run(&args)?,
                 Command::Sweep(args) => sweep::run(&args)?,
                 Command::Verify(args) => return verify::run(&args),

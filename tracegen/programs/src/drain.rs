@@ -1,0 +1,280 @@
+//! Frames of a session into a trace.
+
+mod build;
+mod places;
+
+use crate::pairs::pair;
+use crate::session::{Executed, Session, SessionError, coverage_site};
+use crate::views::{self, DrawKey, Role, Rule, Views, ViewsError};
+use build::{Builder, Merged};
+use formats::textrace::{
+    LeftOut, Pass, PassKind, ProgramCapture, Surfaces, TextraceWriter, TraceMeta,
+};
+use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
+use parallax_layer::inject::RawSample;
+use parallax_layer::spool::FramesBy;
+use places::Placement;
+use record::{CaptureCounts, RecordError, Recording};
+use std::collections::HashMap;
+use std::io::{Seek, Write};
+use thiserror::Error;
+
+/// What becomes of a session.
+pub struct Job<'a> {
+    /// Frames to take, ascending.
+    pub frames: &'a [u32],
+    /// Rule by which both eyes are told apart; none for the first that fits.
+    pub eyes: Option<Rule>,
+    /// What told frames apart.
+    pub frames_by: FramesBy,
+    /// Name of the program.
+    pub program: String,
+    /// Tool and version.
+    pub tool: String,
+    /// Its arguments without outputs.
+    pub command_line: Vec<String>,
+    /// Records that one submission could hold.
+    pub capacity: u64,
+}
+
+/// What was made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Drained {
+    /// Frames.
+    pub frames: usize,
+    /// Rule that told both eyes apart.
+    pub rule: Option<Rule>,
+    /// Pixels of an eye's picture.
+    pub size_px: [u32; 2],
+    /// Draws of the trace.
+    pub draws: usize,
+    /// Textures of the trace.
+    pub textures: usize,
+    /// What was recorded.
+    pub counts: CaptureCounts,
+    /// What the trace lacks.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// Why no trace was made.
+#[derive(Debug, Error)]
+pub enum DrainError {
+    /// Of the session.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// No eyes.
+    #[error(transparent)]
+    Views(#[from] ViewsError),
+    /// The frames have pictures of different sizes.
+    #[error(
+        "frame {frame}: expected pictures of {expected:?} pixels as in the frames before, found {found:?}"
+    )]
+    Size {
+        /// Frame.
+        frame: u32,
+        /// Width and height before.
+        expected: [u32; 2],
+        /// Width and height.
+        found: [u32; 2],
+    },
+    /// Of the trace.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+impl From<parallax_layer::spool::ReadError> for DrainError {
+    fn from(error: parallax_layer::spool::ReadError) -> Self {
+        Self::Session(error.into())
+    }
+}
+
+/// Takes frames of a session into a trace, which is yet to be finished.
+///
+/// # Errors
+/// Frames without two eyes, records that were lost, and errors of reading and writing.
+pub fn drain<W: Write + Seek>(
+    session: &mut Session,
+    job: &Job<'_>,
+    writer: TextraceWriter<W>,
+) -> Result<(TextraceWriter<W>, Drained), DrainError> {
+    let mut builder = Builder::new(Recording::new(writer));
+    let mut drained = Drained::default();
+    let mut triangles = 0;
+    for &number in job.frames {
+        let Some(frame) = session.frames.get(&number).cloned() else {
+            continue;
+        };
+        if frame.lost > 0 {
+            return Err(DrainError::Session(SessionError::Lost {
+                frame: number,
+                lost: frame.lost,
+                capacity: job.capacity,
+            }));
+        }
+        let records = session.records(number)?;
+        let weights: Vec<u64> = frame
+            .draws
+            .iter()
+            .map(|draw| weight(session, draw, &records))
+            .collect();
+        // Every frame is told by the rule that told the first one.
+        let views = views::find(session, &frame, &weights, job.eyes.or(drained.rule))?;
+        drained.rule = Some(views.rule);
+        let placements = views.eyes.map(Placement::new);
+        let size_px = places::both(placements);
+        if drained.frames > 0 && drained.size_px != size_px {
+            return Err(DrainError::Size {
+                frame: number,
+                expected: drained.size_px,
+                found: size_px,
+            });
+        }
+        drained.size_px = size_px;
+        drained.frames += 1;
+        let merged = merge(session, &frame.draws, &views);
+        triangles = builder.frame(session, number, &merged, &records, placements, size_px)?;
+        builder.count_ignored(session, &frame.draws, &views, &weights);
+    }
+    drained.counts = builder.counts;
+    drained.left_out = builder.left_out();
+    let rule = drained.rule.map_or("", Rule::name);
+    let meta = meta(
+        session,
+        job,
+        &drained,
+        rule,
+        triangles,
+        builder.not_opaque(),
+    );
+    let writer = builder.finish(meta)?;
+    drained.draws = writer.tables().draws.len();
+    drained.textures = writer.tables().textures.len();
+    Ok((writer, drained))
+}
+
+/// Fragments of an executed draw.
+pub(crate) fn weight(
+    session: &Session,
+    executed: &Executed,
+    records: &HashMap<u32, Vec<RawSample>>,
+) -> u64 {
+    let site = session
+        .draw(executed.draw)
+        .and_then(|draw| coverage_site(session.shader_of(draw)?));
+    match (site, records.get(&executed.draw)) {
+        (Some(site), Some(records)) => {
+            let of = records.iter().filter(|record| record.site() == site);
+            of.map(|record| u64::from(record.lanes().count_ones()))
+                .sum()
+        }
+        _ => executed.occlusion.unwrap_or(0),
+    }
+}
+
+/// What makes two draws the same for a trace: their textures, too.
+fn key(session: &Session, draw: u32) -> Option<(DrawKey, String)> {
+    let info = session.draw(draw)?;
+    Some((DrawKey::of(info), format!("{:?}", info.textures)))
+}
+
+/// The draws of a frame, those of both eyes joined, in an order that is that of each eye.
+fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<Merged> {
+    let with = |wanted: Role| -> Vec<Executed> {
+        let both = draws.iter().zip(&views.roles);
+        both.filter(|(_, role)| **role == wanted)
+            .map(|(draw, _)| *draw)
+            .collect()
+    };
+    let mut merged: Vec<Merged> = with(Role::Shadow).into_iter().map(Merged::Shadow).collect();
+    let layers = views.layers;
+    merged.extend(
+        with(Role::Multiview)
+            .into_iter()
+            .map(|draw| Merged::Multiview(draw, layers)),
+    );
+    merged.extend(with(Role::Seen(None)).into_iter().map(Merged::Mono));
+    let [left, right] = [Eye::Left, Eye::Right].map(|eye| with(Role::Seen(Some(eye))));
+    let keys =
+        |of: &[Executed]| -> Vec<_> { of.iter().map(|draw| key(session, draw.draw)).collect() };
+    let pairs = pair(&keys(&left), &keys(&right));
+    merged.extend(
+        pairs
+            .into_iter()
+            .map(|(l, r)| Merged::Eyes([l.map(|l| left[l]), r.map(|r| right[r])])),
+    );
+    merged
+}
+
+fn meta(
+    session: &Session,
+    job: &Job<'_>,
+    drained: &Drained,
+    rule: &str,
+    triangles: u64,
+    not_opaque: Vec<[u32; 2]>,
+) -> TraceMeta {
+    // Nothing is known of the program's cameras.
+    let straight = FovTangents {
+        left: 1.0,
+        right: 1.0,
+        up: 1.0,
+        down: 1.0,
+    };
+    let frames = job
+        .frames
+        .iter()
+        .filter(|frame| session.frames.contains_key(frame));
+    let frames_by = match job.frames_by {
+        FramesBy::Auto | FramesBy::Present => "presents",
+        FramesBy::Readback => "readbacks",
+        FramesBy::Launcher => "the launcher",
+    };
+    TraceMeta {
+        tool: job.tool.clone(),
+        command_line: job.command_line.clone(),
+        scene: job.program.clone(),
+        scene_triangles: triangles,
+        camera: "program".to_owned(),
+        backend: "layer".to_owned(),
+        driver: session.driver.clone(),
+        seed: 0,
+        hmd: Hmd {
+            name: "unknown".to_owned(),
+            source: "a program's viewports".to_owned(),
+            eye_size_px: drained.size_px,
+            fov: [straight; 2],
+            ipd_m: 0.0,
+            cant_deg: 0.0,
+        },
+        frames: frames
+            .map(|frame| FrameViews {
+                frame: *frame,
+                eyes: [EyeView::default(); 2],
+            })
+            .collect(),
+        surfaces: Some(Surfaces {
+            depth_tested: true,
+            not_opaque,
+        }),
+        origin_m: [0.0; 3],
+        techniques: None,
+        program: Some(ProgramCapture {
+            cameras_known: false,
+            frames_by: frames_by.to_owned(),
+            views_by: rule.to_owned(),
+            left_out: drained.left_out.clone(),
+        }),
+    }
+}
+
+/// A pass of a trace.
+pub(crate) fn pass(frame: u32, kind: PassKind, eye: Option<Eye>, size_px: [u32; 2]) -> Pass {
+    Pass {
+        frame,
+        kind,
+        eye,
+        layer: 0,
+        size_px,
+        tiles: size_px.map(|size| size.div_ceil(TILE_SIZE_PX)),
+    }
+}

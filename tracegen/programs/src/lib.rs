@@ -1,0 +1,23 @@
+//! From a program to a trace.
+//!
+//! ```text
+//! launch: the program under the layer -> a folder of events and records (layer::spool)
+//!   -> session: frames, passes, draws -> views: which draw shows which eye
+//!   -> drain: records of draws -> quads and their groups -> record::Recording -> .textrace
+//! ```
+
+mod check;
+mod drain;
+mod groups;
+mod lanes;
+mod launch;
+mod pairs;
+mod session;
+mod texture;
+mod views;
+
+pub use check::{Check, Difference, check};
+pub use drain::{DrainError, Drained, Job, drain};
+pub use launch::{Launch, LaunchError};
+pub use session::{Executed, Frame, Session, SessionError};
+pub use views::{Role, Rule, View, Views, ViewsError};
