@@ -110,6 +110,7 @@ impl Capture {
 
     fn end_frame(&self) {
         self.counted.fetch_add(1, Ordering::SeqCst);
+        self.control.count();
         self.note_frames();
     }
 

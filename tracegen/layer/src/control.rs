@@ -18,6 +18,8 @@ enum Word {
     Frame = 0,
     /// Frames of interest that have ended.
     Ended = 1,
+    /// Frames that programs ended.
+    Counted = 2,
 }
 
 /// The shared page.
@@ -60,6 +62,17 @@ impl Control {
     /// Counts a frame.
     pub fn set_frame(&self, frame: u32) {
         self.word(Word::Frame).store(frame, Ordering::SeqCst);
+    }
+
+    /// Frames that programs ended, of all processes.
+    #[must_use]
+    pub fn counted(&self) -> u32 {
+        self.word(Word::Counted).load(Ordering::SeqCst)
+    }
+
+    /// A program ended a frame.
+    pub fn count(&self) {
+        self.word(Word::Counted).fetch_add(1, Ordering::SeqCst);
     }
 
     /// Frames of interest that have ended, of all processes.

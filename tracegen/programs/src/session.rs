@@ -32,18 +32,18 @@ pub enum SessionError {
     },
     /// None of the frames was rendered.
     #[error(
-        "{program} rendered none of the frames {first} to {last} to their end{so_far}; how it ended: {ended}"
+        "{program}: frames {first} to {last} were asked for, and it ended {counted} frames (--frames, --frames-by); {ended}"
     )]
-    NoFrames {
+    TooFew {
         /// The program.
         program: String,
         /// First frame that was asked for.
         first: u32,
         /// Last one.
         last: u32,
-        /// What it did instead.
-        so_far: String,
-        /// How it ended.
+        /// Frames that it ended.
+        counted: u32,
+        /// How it ended itself.
         ended: String,
     },
     /// Records were lost.

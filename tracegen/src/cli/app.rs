@@ -129,7 +129,7 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
     for trouble in &session.troubles {
         warn(trouble);
     }
-    let frames = ended_frames(args, &session, &program, &ended)?;
+    let frames = ended_frames(args, &session, &program, &ended, launch.control.counted())?;
     let job = Job {
         frames: &frames,
         eyes: args.eyes.map(Eyes::rule),
@@ -202,28 +202,23 @@ fn ended_frames(
     session: &Session,
     program: &str,
     ended: &Ended,
+    counted: u32,
 ) -> anyhow::Result<Vec<u32>> {
     let frames: Vec<u32> = args.frames.clone().collect();
     let complete = |frame: &u32| session.frames.get(frame).is_some_and(|frame| frame.ended);
-    let there = frames.iter().filter(|frame| complete(frame)).count();
-    if there == frames.len() {
+    if frames.iter().all(complete) {
         return Ok(frames);
     }
-    let so_far = match session.frames.keys().next_back() {
-        Some(_) if there > 0 => format!(", but {there} of them"),
-        Some(last) => format!(", but a part of frame {last}"),
-        None => ": it may render fewer, or end them in another way (--frames-by)".to_owned(),
-    };
     let how = match (ended.stopped, ended.status.code()) {
         (true, _) => "it was asked to end".to_owned(),
-        (false, Some(code)) => format!("exit code {code}"),
-        (false, None) => format!("{}", ended.status),
+        (false, Some(code)) => format!("it ended with exit code {code}"),
+        (false, None) => format!("it ended by {}", ended.status),
     };
-    Err(SessionError::NoFrames {
+    Err(SessionError::TooFew {
         program: program.to_owned(),
         first: args.frames.start,
         last: args.frames.end - 1,
-        so_far,
+        counted,
         ended: how,
     }
     .into())
