@@ -227,7 +227,7 @@ impl<W: Write + Seek> Builder<W> {
         let of_part = |executed: &Executed| -> &[RawSample] {
             records.get(&executed.draw).map_or(&[], Vec::as_slice)
         };
-        let mut used: BTreeSet<(u16, Option<u32>)> = BTreeSet::new();
+        let mut used: BTreeSet<SiteKey> = BTreeSet::new();
         let mut most = 0;
         for record in parts.iter().flat_map(|(executed, _)| of_part(executed)) {
             if let Some(site) = shader.sites.get(usize::from(record.site()))
@@ -293,7 +293,7 @@ impl<W: Write + Seek> Builder<W> {
         session: &Session,
         info: &DrawInfo,
         shader: &ShaderInfo,
-        used: &BTreeSet<(u16, Option<u32>)>,
+        used: &BTreeSet<SiteKey>,
         primitives: u32,
     ) -> Result<Declared, DrainError> {
         let mut declared = Declared {
@@ -459,12 +459,15 @@ fn place(record: &RawSample) -> u64 {
     u64::from(record.primitive) << 32 | u64::from(record.place)
 }
 
+/// A site, and the element of its binding's array where fragments choose it.
+type SiteKey = (u16, Option<u32>);
+
 /// The trace's draws of a draw.
 struct Declared {
     /// Index and first primitive.
     draws: Vec<(u32, u32)>,
     /// By site and element: which of the draws, and the group.
-    groups: HashMap<(u16, Option<u32>), (usize, Group)>,
+    groups: HashMap<SiteKey, (usize, Group)>,
     replay: DepthReplay,
 }
 
@@ -505,7 +508,7 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
     let mut records = Vec::new();
     // Lanes that sample something in the first draw, whose records tell what is covered.
     let mut sampled = 0;
-    let mut fragments: BTreeMap<(u16, Option<u32>), Vec<(u8, &RawSample)>> = BTreeMap::new();
+    let mut fragments: BTreeMap<SiteKey, Vec<(u8, &RawSample)>> = BTreeMap::new();
     for sample in of {
         let Some(site) = sites.shader.sites.get(usize::from(sample.site())) else {
             continue;
