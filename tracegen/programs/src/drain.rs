@@ -15,7 +15,7 @@ use parallax_layer::inject::RawSample;
 use parallax_layer::spool::FramesBy;
 use places::Placement;
 use record::{CaptureCounts, RecordError, Recording};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 use thiserror::Error;
 
@@ -27,6 +27,8 @@ pub struct Job<'a> {
     pub eyes: Option<Rule>,
     /// What told frames apart.
     pub frames_by: FramesBy,
+    /// Eyes of frames, where the program told them.
+    pub cameras: BTreeMap<u32, [EyeView; 2]>,
     /// Name of the program.
     pub program: String,
     /// Tool and version.
@@ -101,9 +103,8 @@ pub fn drain<W: Write + Seek>(
     let mut drained = Drained::default();
     let mut triangles = 0;
     for &number in job.frames {
-        let Some(frame) = session.frames.get(&number).cloned() else {
-            continue;
-        };
+        let frame = session.frames.get(&number).cloned();
+        let frame = frame.ok_or(SessionError::NotDrawn(number))?;
         if frame.lost > 0 {
             return Err(DrainError::Session(SessionError::Lost {
                 frame: number,
@@ -213,17 +214,15 @@ fn meta(
     triangles: u64,
     not_opaque: Vec<[u32; 2]>,
 ) -> TraceMeta {
-    // Nothing is known of the program's cameras.
-    let straight = FovTangents {
-        left: 1.0,
-        right: 1.0,
-        up: 1.0,
-        down: 1.0,
-    };
-    let frames = job
+    let cameras_known = job
         .frames
         .iter()
-        .filter(|frame| session.frames.contains_key(frame));
+        .all(|frame| job.cameras.contains_key(frame));
+    let first = job.frames.first().and_then(|frame| job.cameras.get(frame));
+    let (fov, ipd_m) = match first.filter(|_| cameras_known) {
+        Some(eyes) => (eyes.map(|eye| fov(&eye)), distance_m(eyes)),
+        None => ([STRAIGHT; 2], 0.0),
+    };
     let frames_by = match job.frames_by {
         FramesBy::Auto | FramesBy::Present => "presents",
         FramesBy::Readback => "readbacks",
@@ -239,17 +238,17 @@ fn meta(
         driver: session.driver.clone(),
         seed: 0,
         hmd: Hmd {
-            name: "unknown".to_owned(),
+            name: if cameras_known { "emulated" } else { "unknown" }.to_owned(),
             source: "a program's viewports".to_owned(),
             eye_size_px: drained.size_px,
-            fov: [straight; 2],
-            ipd_m: 0.0,
+            fov,
+            ipd_m,
             cant_deg: 0.0,
         },
-        frames: frames
+        frames: (job.frames.iter())
             .map(|frame| FrameViews {
                 frame: *frame,
-                eyes: [EyeView::default(); 2],
+                eyes: job.cameras.get(frame).copied().unwrap_or_default(),
             })
             .collect(),
         surfaces: Some(Surfaces {
@@ -259,12 +258,41 @@ fn meta(
         origin_m: [0.0; 3],
         techniques: None,
         program: Some(ProgramCapture {
-            cameras_known: false,
+            cameras_known,
             frames_by: frames_by.to_owned(),
             views_by: rule.to_owned(),
             left_out: drained.left_out.clone(),
         }),
     }
+}
+
+/// A field of view where nothing is known of it.
+const STRAIGHT: FovTangents = FovTangents {
+    left: 1.0,
+    right: 1.0,
+    up: 1.0,
+    down: 1.0,
+};
+
+/// Tangents to the edges of a projection's picture.
+fn fov(eye: &EyeView) -> FovTangents {
+    let m = &eye.eye_to_clip;
+    let edge = |axis: usize, side: f32| (1.0 + side * m[2][axis]) / m[axis][axis];
+    FovTangents {
+        left: edge(0, -1.0),
+        right: edge(0, 1.0),
+        up: edge(1, 1.0),
+        down: edge(1, -1.0),
+    }
+}
+
+/// Distance between two eyes.
+fn distance_m(eyes: &[EyeView; 2]) -> f32 {
+    let [a, b] = [eyes[0].position, eyes[1].position];
+    let squared: f32 = (0..3)
+        .map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis]))
+        .sum();
+    squared.sqrt()
 }
 
 /// A pass of a trace.

@@ -95,6 +95,15 @@ impl Launch {
         &self.library
     }
 
+    /// Lets a program run on lavapipe, without the layer.
+    pub fn prepare_driver(&self, command: &mut Command) {
+        if let Some(driver) = &self.driver {
+            command
+                .env("VK_DRIVER_FILES", driver)
+                .env("VK_ICD_FILENAMES", driver);
+        }
+    }
+
     /// Lets a program run under the layer; OpenGL through Mesa's zink if asked for.
     pub fn prepare(&self, command: &mut Command, opengl: bool) {
         command
@@ -104,11 +113,7 @@ impl Launch {
                 with("VK_INSTANCE_LAYERS", LAYER_NAME.into()),
             )
             .env("VK_LAYER_PATH", with("VK_LAYER_PATH", self.folder().into()));
-        if let Some(driver) = &self.driver {
-            command
-                .env("VK_DRIVER_FILES", driver)
-                .env("VK_ICD_FILENAMES", driver);
-        }
+        self.prepare_driver(command);
         if opengl {
             command
                 .env("GALLIUM_DRIVER", "zink")

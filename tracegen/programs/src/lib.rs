@@ -6,6 +6,7 @@
 //!   -> drain: records of draws -> quads and their groups -> record::Recording -> .textrace
 //! ```
 
+pub mod browser;
 mod check;
 mod drain;
 mod groups;

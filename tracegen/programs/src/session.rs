@@ -46,6 +46,9 @@ pub enum SessionError {
         /// How it ended itself.
         ended: String,
     },
+    /// A frame without a draw.
+    #[error("frame {0}: nothing was drawn")]
+    NotDrawn(u32),
     /// Records were lost.
     #[error(
         "frame {frame}: {lost} records found no room among {capacity}; raise --records or leave out frames"

@@ -4,9 +4,11 @@ pub mod app;
 mod cache_args;
 pub mod lens_args;
 mod objective_args;
+pub mod page;
 mod path_args;
 pub mod precision;
 mod prepared;
+mod program_args;
 pub mod raster;
 mod raster_auto;
 mod raster_summary;
@@ -53,6 +55,8 @@ enum Command {
     Raster(Box<raster::RasterArgs>),
     /// Capture the texture samples of an unmodified Vulkan or OpenGL program into a .textrace file.
     App(Box<app::AppArgs>),
+    /// Capture the texture samples of a page of WebGL or WebXR in Chromium into a .textrace file.
+    Page(Box<page::PageArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
     Techniques(Box<techniques::TechniquesArgs>),
     /// Capture every combination of a manifest's scenes, cameras and displays; goes on where it stopped.
@@ -79,6 +83,7 @@ pub fn main() -> ExitCode {
                 Command::Scenes(args) => scenes::run(args)?,
                 Command::Raster(args) => raster::run(&args)?,
                 Command::App(args) => return app::run(&args),
+                Command::Page(args) => return page::run(&args),
                 Command::Techniques(args) => techniques::run(&args)?,
                 Command::Sweep(args) => sweep::run(&args)?,
                 Command::Verify(args) => return verify::run(&args),
