@@ -384,7 +384,10 @@ fn programs_that_end_too_early_or_never_end_a_frame_leave_no_trace() {
     refused(
         &["--frames", "1", "--records", "4KiB"],
         &[],
-        &["records found no room among 64; raise --records"],
+        &[
+            "expected records of 4096 bytes or less in a submission",
+            "raise --records",
+        ],
     );
     refused(
         &["--frames", "1", "--eyes", "targets"],

@@ -1,6 +1,6 @@
 //! Records of draws against occlusion queries of the driver.
 
-use crate::session::{Session, coverage_site, survival_site};
+use crate::session::{Session, coverage_group, survival_group};
 use parallax_layer::inject::{DepthTests, RawSample};
 use parallax_layer::spool::ReadError;
 use std::collections::{BTreeMap, HashMap};
@@ -84,12 +84,12 @@ fn recorded(
     if shader.tests == DepthTests::Late {
         return Err("shaders that are tested for depth after they ran".to_owned());
     }
-    let started = coverage_site(shader).ok_or("no site that every fragment passes")?;
-    let survived = survival_site(shader).unwrap_or(started);
+    let started = coverage_group(shader).ok_or("no site that every fragment passes")?;
+    let survived = survival_group(shader).unwrap_or(started);
     let of = records.get(&draw).map_or(&[][..], Vec::as_slice);
-    let fragments = |site: u16| {
-        let of_site = of.iter().filter(|record| record.site() == site);
-        of_site
+    let fragments = |group: u16| {
+        let of_group = of.iter().filter(|record| record.group() == group);
+        of_group
             .map(|record| u64::from(record.lanes().count_ones()))
             .sum()
     };

@@ -4,7 +4,7 @@ mod build;
 mod places;
 
 use crate::pairs::pair;
-use crate::session::{Executed, Session, SessionError, coverage_site};
+use crate::session::{Executed, Session, SessionError, coverage_group};
 use crate::views::{self, DrawKey, Role, Rule, Views, ViewsError};
 use build::{Builder, Merged};
 use formats::textrace::{
@@ -35,8 +35,8 @@ pub struct Job<'a> {
     pub tool: String,
     /// Its arguments without outputs.
     pub command_line: Vec<String>,
-    /// Records that one submission could hold.
-    pub capacity: u64,
+    /// Bytes of room for the records of one submission.
+    pub record_bytes: u64,
 }
 
 /// What was made.
@@ -105,11 +105,11 @@ pub fn drain<W: Write + Seek>(
     for &number in job.frames {
         let frame = session.frames.get(&number).cloned();
         let frame = frame.ok_or(SessionError::NotDrawn(number))?;
-        if frame.lost > 0 {
+        if frame.lost_bytes > 0 {
             return Err(DrainError::Session(SessionError::Lost {
                 frame: number,
-                lost: frame.lost,
-                capacity: job.capacity,
+                lost: frame.lost_bytes,
+                room: job.record_bytes,
             }));
         }
         let records = session.records(number)?;
@@ -159,12 +159,12 @@ pub(crate) fn weight(
     executed: &Executed,
     records: &HashMap<u32, Vec<RawSample>>,
 ) -> u64 {
-    let site = session
+    let group = session
         .draw(executed.draw)
-        .and_then(|draw| coverage_site(session.shader_of(draw)?));
-    match (site, records.get(&executed.draw)) {
-        (Some(site), Some(records)) => {
-            let of = records.iter().filter(|record| record.site() == site);
+        .and_then(|draw| coverage_group(session.shader_of(draw)?));
+    match (group, records.get(&executed.draw)) {
+        (Some(group), Some(records)) => {
+            let of = records.iter().filter(|record| record.group() == group);
             of.map(|record| u64::from(record.lanes().count_ones()))
                 .sum()
         }

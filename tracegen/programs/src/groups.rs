@@ -21,8 +21,6 @@ pub struct Bound {
 /// What a group's records are made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
-    /// Site whose records are the group's.
-    pub site: u16,
     /// Element of the binding's array, where fragments choose it.
     pub element: Option<u32>,
     /// Number among the draw's groups; the operands' is one less.
@@ -39,25 +37,23 @@ pub struct Group {
 pub type LeftOut = String;
 
 impl Group {
-    /// Makes the group of a site and of those that follow it. `bound` tells the texture of a site.
+    /// Makes the group of the sites of a shader's coordinate group. `bound` tells the texture of a site.
     ///
     /// # Errors
     /// What its records cannot be.
     pub fn new(
         shader: &ShaderInfo,
-        site: u16,
+        coordinates: u16,
         element: Option<u32>,
         first_number: u8,
         bound: impl Fn(&TextureSite) -> Result<Bound, LeftOut>,
     ) -> Result<(Self, Vec<UvGroup>), LeftOut> {
-        let members = (0_u16..)
-            .zip(&shader.sites)
-            .filter(|(number, of)| *number == site || of.leader == Some(site));
+        let members = (shader.sites.iter()).filter(|site| site.group == coordinates);
         let mut group: Option<Self> = None;
         let mut samples = Vec::new();
         let mut extent = [1; 2];
         let mut reason = "a site without a texture".to_owned();
-        for (_, of) in members {
+        for of in members {
             let What::Texture(texture) = &of.what else {
                 continue;
             };
@@ -70,7 +66,6 @@ impl Group {
             };
             let operands = needs_operands(texture, of.form);
             let of_group = group.get_or_insert(Self {
-                site,
                 element,
                 number: first_number + u8::from(operands),
                 operands,
@@ -222,7 +217,7 @@ mod tests {
     use super::*;
     use parallax_layer::inject::{Binding, DepthTests, Site};
 
-    fn site(form: Form, leader: Option<u16>, shape: Shape, access: Access, lod: Lod) -> Site {
+    fn site(form: Form, group: u16, shape: Shape, access: Access, lod: Lod) -> Site {
         let binding = Binding {
             set: 0,
             binding: 0,
@@ -238,7 +233,7 @@ mod tests {
                 offset: [1, 0],
             }),
             form,
-            leader,
+            group,
             unconditional: true,
         }
     }
@@ -266,16 +261,16 @@ mod tests {
 
     #[test]
     fn sites_that_follow_share_the_group_and_its_extent() {
-        let flat = |leader| {
+        let flat = |group| {
             site(
                 Form::Quad,
-                leader,
+                group,
                 Shape::Flat,
                 Access::Sample,
                 Lod::Derivatives,
             )
         };
-        let (group, groups) = made(vec![flat(None), flat(Some(0))]);
+        let (group, groups) = made(vec![flat(0), flat(0), flat(1)]);
         assert_eq!((group.number, group.operands), (3, false));
         let [of] = &groups[..] else {
             panic!("{groups:?}");
@@ -292,7 +287,7 @@ mod tests {
     fn a_level_or_layer_of_its_own_takes_operands_before_it() {
         let array = site(
             Form::Fragment,
-            None,
+            0,
             Shape::Array,
             Access::Sample,
             Lod::Bias(None),
@@ -313,7 +308,7 @@ mod tests {
     fn a_fetched_texel_is_the_middle_of_its_coordinates_at_its_level() {
         let fetch = site(
             Form::Quad,
-            None,
+            0,
             Shape::Flat,
             Access::Fetch,
             Lod::Explicit(Some(2.0)),
@@ -338,7 +333,7 @@ mod tests {
         let sky = |lod| {
             made(vec![site(
                 Form::Fragment,
-                None,
+                0,
                 Shape::Cube,
                 Access::Sample,
                 lod,

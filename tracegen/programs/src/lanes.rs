@@ -77,19 +77,8 @@ fn visit<'a>(lanes: impl Iterator<Item = &'a (u8, LaneSample)>) -> Visit {
     let lanes = [0, 1, 2, 3].map(at);
     Visit {
         mask,
-        uv: quad(lanes.map(|lane| lane.uv)),
-        operands: quad(lanes.map(|lane| [lane.lod, lane.layer])),
-    }
-}
-
-/// A quad by the values of its lanes.
-fn quad([a, b, c, d]: [[f32; 2]; 4]) -> RawQuad {
-    let axes = |f: fn(f32, f32, f32, f32) -> f32| [0, 1].map(|i| f(a[i], b[i], c[i], d[i]));
-    RawQuad {
-        uv: a,
-        dx: axes(|a, b, _, _| b - a),
-        dy: axes(|a, _, c, _| c - a),
-        cross: axes(|a, b, c, d| (d - c) - (b - a)),
+        uv: RawQuad::of(lanes.map(|lane| lane.uv)),
+        operands: RawQuad::of(lanes.map(|lane| [lane.lod, lane.layer])),
     }
 }
 

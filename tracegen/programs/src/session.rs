@@ -1,6 +1,6 @@
 //! What a captured program did: its frames, passes and draws.
 
-use parallax_layer::inject::{Form, RawSample, What};
+use parallax_layer::inject::{Form, RawSample, Site, What};
 use parallax_layer::spool::{
     DrawInfo, Event, ImageInfo, PassInfo, Process, ReadError, Reader, ShaderInfo, Span,
 };
@@ -51,15 +51,15 @@ pub enum SessionError {
     NotDrawn(u32),
     /// Records were lost.
     #[error(
-        "frame {frame}: {lost} records found no room among {capacity}; raise --records or leave out frames"
+        "frame {frame}: expected records of {room} bytes or less in a submission, found {lost} bytes more; raise --records"
     )]
     Lost {
         /// Frame.
         frame: u32,
-        /// Records.
+        /// Bytes without room.
         lost: u64,
-        /// Room.
-        capacity: u64,
+        /// Bytes of room.
+        room: u64,
     },
 }
 
@@ -84,7 +84,7 @@ pub struct Frame {
     /// Where its records are.
     spans: Vec<Span>,
     /// Records that found no room.
-    pub lost: u64,
+    pub lost_bytes: u64,
     /// The program went on to the next frame.
     pub ended: bool,
 }
@@ -173,13 +173,13 @@ impl Session {
                 frame,
                 draws,
                 records,
-                lost,
+                lost_bytes,
                 occlusion,
             } => {
                 let counted: HashMap<u32, u64> = occlusion.into_iter().collect();
                 let of = self.frames.entry(frame).or_default();
                 of.frame = frame;
-                of.lost += lost;
+                of.lost_bytes += lost_bytes;
                 of.spans.push(records);
                 of.draws
                     .extend(draws.into_iter().map(|[draw, pass]| Executed {
@@ -241,39 +241,30 @@ impl Session {
         let Some(reader) = &mut self.records else {
             return Ok(by_draw);
         };
-        let mut all = Vec::new();
         for span in spans {
-            all.clear();
-            reader.read(*span, &mut all)?;
-            for record in &all {
-                by_draw.entry(record.draw).or_default().push(*record);
-            }
+            reader.read(*span, |record| {
+                by_draw.entry(record.draw).or_default().push(record);
+            })?;
         }
         Ok(by_draw)
     }
 }
 
-/// Site whose records tell every fragment of a shader that starts.
+/// Coordinate group whose records tell every fragment of a shader that starts.
 #[must_use]
-pub fn coverage_site(shader: &ShaderInfo) -> Option<u16> {
-    let covers = |site: &parallax_layer::inject::Site| {
-        site.unconditional && site.leader.is_none() && site.form == Form::Quad
-    };
+pub fn coverage_group(shader: &ShaderInfo) -> Option<u16> {
+    let covers = |site: &&Site| site.unconditional && site.form == Form::Quad;
+    let sites = &shader.sites;
     // The site that was made for it has the depth as well.
-    let own = shader
-        .sites
-        .iter()
-        .position(|site| site.what == What::Coverage);
-    let found = own.or_else(|| shader.sites.iter().position(covers));
-    found.and_then(|site| u16::try_from(site).ok())
+    let own = sites.iter().find(|site| site.what == What::Coverage);
+    let found = own.or_else(|| sites.iter().find(covers));
+    found.map(|site| site.group)
 }
 
-/// Site whose records tell every fragment that was not discarded, where any may be.
+/// Coordinate group whose records tell every fragment that was not discarded, where any may be.
 #[must_use]
-pub fn survival_site(shader: &ShaderInfo) -> Option<u16> {
-    let found = shader
-        .sites
-        .iter()
-        .position(|site| site.what == What::Survival);
-    found.and_then(|site| u16::try_from(site).ok())
+pub fn survival_group(shader: &ShaderInfo) -> Option<u16> {
+    let mut sites = shader.sites.iter();
+    let found = sites.find(|site| site.what == What::Survival);
+    found.map(|site| site.group)
 }

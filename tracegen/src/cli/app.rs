@@ -61,7 +61,7 @@ impl From<FrameEnd> for FramesBy {
 /// Wrong use, a program that cannot be captured, and outputs that cannot be written.
 pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
     args.capture.check_outputs(None)?;
-    let settings = args.capture.settings(args.frames_by.into());
+    let settings = args.capture.settings(args.frames_by.into())?;
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let program = program_name(&args.program);

@@ -101,7 +101,7 @@ pub fn run(args: &PageArgs) -> anyhow::Result<ExitCode> {
         "--settle: expected 0 to 60 s, found {}",
         args.settle
     );
-    let settings = args.capture.settings(FramesBy::Launcher);
+    let settings = args.capture.settings(FramesBy::Launcher)?;
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let page = page(args)?;

@@ -1,10 +1,10 @@
 //! What `app` and `page` do alike: options of a capture, and the trace that it becomes.
 
 use super::raster::{TileEncoding, parse_bytes};
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 use formats::textrace::TextraceWriter;
 use formats::view::EyeView;
-use parallax_layer::inject::RAW_BYTES;
 use parallax_layer::spool::{FramesBy, Settings};
 use programs::{Check, Drained, Job, Rule, Session, check, drain};
 use shell::{Output, check_outputs, lasting_arguments, note, warn};
@@ -31,6 +31,9 @@ pub struct ProgramArgs {
     /// Memory for the records of one submission. What is not used takes none.
     #[arg(long, value_name = "SIZE", default_value = "768MiB", value_parser = parse_bytes)]
     records: u64,
+    /// Folder for the fragment shaders: as the program gave them, and as they record.
+    #[arg(long, value_name = "FOLDER")]
+    modules: Option<PathBuf>,
     /// How the trace's tiles are packed.
     #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
     encoding: TileEncoding,
@@ -94,15 +97,23 @@ impl ProgramArgs {
     }
 
     /// What the layer is asked for.
-    pub fn settings(&self, frames_by: FramesBy) -> Settings {
-        let capacity = (self.records / RAW_BYTES).clamp(1, u64::from(u32::MAX)) as u32;
-        Settings {
+    ///
+    /// # Errors
+    /// A folder that cannot be made.
+    pub fn settings(&self, frames_by: FramesBy) -> anyhow::Result<Settings> {
+        let absolute = |folder: &PathBuf| {
+            std::fs::create_dir_all(folder)
+                .and_then(|()| folder.canonicalize())
+                .with_context(|| format!("cannot make {}", folder.display()))
+        };
+        Ok(Settings {
             records: true,
             frames: [self.frames.start, self.frames.end],
             frames_by,
             occlusion: self.check,
-            capacity,
-        }
+            record_bytes: self.records,
+            modules: self.modules.as_ref().map(absolute).transpose()?,
+        })
     }
 
     /// Makes the trace, and tells of it on stderr.
@@ -128,7 +139,7 @@ impl ProgramArgs {
             program,
             tool: super::tool(),
             command_line: lasting_arguments(std::env::args_os().skip(1)),
-            capacity: settings.capacity.into(),
+            record_bytes: settings.record_bytes,
         };
         let writer = TextraceWriter::create_growing(&self.output)?;
         let writer = writer.with_encoding(self.encoding.encoding());

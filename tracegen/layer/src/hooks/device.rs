@@ -207,7 +207,7 @@ unsafe fn follow(
         .then(|| format!("{name} is not lavapipe, on which alone programs are recorded"));
     let mut recorder = None;
     if capture.settings.records && refused.is_none() {
-        match RecordBuffer::new(capture.settings.capacity) {
+        match RecordBuffer::new(capture.settings.record_bytes) {
             Ok(buffer) => {
                 recorder = Some(DeviceRecorder {
                     buffer,

@@ -3,7 +3,7 @@
 use super::api::{find, slice};
 use super::device::{Device, DeviceRecorder, RecordingShader};
 use super::pipeline_state;
-use crate::capture::lock;
+use crate::capture::{capture, lock};
 use crate::inject::{DepthTests, What, instrument};
 use crate::spool::ShaderInfo;
 use crate::track::{Layout, Pipeline, Recorded};
@@ -372,16 +372,34 @@ fn recording_shader(
     }))
     .unwrap_or(Err(crate::inject::InjectError::Malformed("a panic")))
     .map_err(|error| error.to_string())
-    .map(|recording| RecordingShader {
-        words: recording.words.into(),
-        info: Arc::new(ShaderInfo {
-            shader: known.tracker().pipelines.next_shader(),
-            tests: recording.tests,
-            sites: recording.sites,
-        }),
+    .map(|recording| {
+        let shader = known.tracker().pipelines.next_shader();
+        keep_module(shader, "program", &key.0);
+        keep_module(shader, "recording", &recording.words);
+        RecordingShader {
+            words: recording.words.into(),
+            info: Arc::new(ShaderInfo {
+                shader,
+                tests: recording.tests,
+                sites: recording.sites,
+            }),
+        }
     });
     lock(&recorder.shaders).insert(key, made.clone());
     made
+}
+
+/// Writes a module to the folder that the launcher named, if any.
+fn keep_module(shader: u32, of: &str, words: &[u32]) {
+    let folder = capture().and_then(|capture| capture.settings.modules.as_ref());
+    if let Some(folder) = folder {
+        let name = format!("{}-{shader}-{of}.spv", std::process::id());
+        if let Err(error) =
+            std::fs::write(folder.join(name), bytemuck::cast_slice::<u32, u8>(words))
+        {
+            eprintln!("parallax: {}: {error}", folder.display());
+        }
+    }
 }
 
 #[cfg(test)]

@@ -178,7 +178,7 @@ unsafe fn take(known: &Device, frame: u32, items: &[Executed], numbers: &[u32]) 
         .map_or_else(Vec::new, |queries| unsafe {
             queries.results(known.handle, numbers, &known.next)
         });
-    let (records, lost) = match &known.recorder {
+    let (records, lost_bytes) = match &known.recorder {
         Some(recorder) => recorder.buffer.take(|records, lost| {
             let span = capture.write(|writer| writer.records(records));
             (span.unwrap_or_default(), lost)
@@ -193,7 +193,7 @@ unsafe fn take(known: &Device, frame: u32, items: &[Executed], numbers: &[u32]) 
         frame,
         draws: items.iter().map(draw).collect(),
         records,
-        lost,
+        lost_bytes,
         occlusion,
     });
 }

@@ -196,18 +196,29 @@ fn draw_number(
     let offset = literal(target.push_constant_bytes);
     let class = Operand::StorageClass(StorageClass::PushConstant);
     let globals = &shader.module.types_global_values;
-    // An entry point uses one block at most; a module of several entry points may have more.
-    let own = globals.iter().filter(|global| {
-        global.class.opcode == Op::Variable
-            && global.operands.first() == Some(&class)
-            && global.result_id.is_some_and(|id| is_used(shader, id))
-    });
-    let own: Vec<_> = own.collect();
-    let [variable] = own[..] else {
-        if own.len() > 1 {
-            return Err(InjectError::Malformed("several blocks of push constants"));
-        }
-        // A type of its own: see `functions`.
+    let variables: Vec<_> = globals
+        .iter()
+        .filter(|global| {
+            global.class.opcode == Op::Variable && global.operands.first() == Some(&class)
+        })
+        .filter_map(|global| global.result_id)
+        .collect();
+    // An entry point uses one block at most; a module of several entry points may have more. Drivers accept but one in
+    // an entry point's list, used or not.
+    let listed = |variable: &Word| {
+        let entry = shader.module.entry_points[shader.entry].operands.iter();
+        entry.skip(3).any(|of| of.id_ref_any() == Some(*variable))
+    };
+    let used = variables.iter().filter(|v| is_used(shader, **v)).count();
+    let own = match used {
+        0 => (variables.iter().find(|v| listed(v)))
+            .or(variables.first())
+            .copied(),
+        1 => variables.into_iter().find(|v| is_used(shader, *v)),
+        _ => return Err(InjectError::Malformed("several blocks of push constants")),
+    };
+    let Some(variable) = own else {
+        // A type of its own: see `writer`.
         let block = builder.id();
         let definition = Instruction::new(Op::TypeStruct, None, Some(block), vec![id(u32_type)]);
         builder.module_mut().types_global_values.push(definition);
@@ -227,7 +238,6 @@ fn draw_number(
         return Ok((variable, 0));
     };
     let malformed = || InjectError::Malformed("push constants that are no block");
-    let variable = variable.result_id.ok_or_else(malformed)?;
     let block = shader
         .type_of(variable)
         .and_then(|pointer| pointer.operands.get(1)?.id_ref_any());

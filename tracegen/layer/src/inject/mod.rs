@@ -1,7 +1,7 @@
 //! SPIR-V words in, recording SPIR-V words out.
 //!
-//! Before each instruction that reads texels a fragment shader calls a function that appends a record to a buffer: where
-//! the quad is, what it belongs to, its coordinates. The buffer's address is a constant of the shader, so that neither
+//! Before instructions that read texels a fragment shader calls a function that appends a record to a buffer: where the
+//! quad is, what it belongs to, its coordinates at one or several of them. The buffer's address is a constant of the shader, so that neither
 //! descriptor sets nor their layouts change. The number of the draw is a push constant.
 
 mod buffer;
@@ -14,8 +14,10 @@ mod recorder;
 mod rewrite;
 mod shader;
 mod site;
+mod sites;
+mod writer;
 
-pub use buffer::{COUNTER_BYTES, FRAGMENT_LANES_SHIFT, RAW_BYTES, RawFragment, RawQuad, RawSample};
+pub use buffer::{COUNTER_BYTES, RawFragment, RawQuad, RawSample, UNIT_BYTES, Unit, unpack};
 pub use site::{Access, Binding, Form, Lod, Shape, Site, TextureSite, What};
 
 use rspirv::spirv::{BuiltIn, ExecutionMode, Op, StorageClass};

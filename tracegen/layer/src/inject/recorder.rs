@@ -1,12 +1,13 @@
 //! Calls of the functions that append records, with what they are called with.
 
 use super::declare::{self, Input, Inputs, Types, id, literal};
-use super::functions;
+use super::functions::Functions;
 use super::rewrite::put;
 use super::shader::Shader;
 use super::{InjectError, Target};
 use rspirv::dr::{Builder, Instruction, Module, Operand};
 use rspirv::spirv::{Op, Word};
+use std::collections::HashMap;
 
 /// Adds to a module what its calls need.
 pub(super) struct Recorder {
@@ -15,32 +16,29 @@ pub(super) struct Recorder {
     frag_coord: Input,
     zero: Word,
     uzero: Word,
-    /// `void quad(uint site, vec2 at)`
-    quad: Word,
-    /// `void fragment(uint site, uint element, vec3 at, float lod, vec3 dx, vec3 dy)`
-    fragment: Word,
+    functions: Functions,
+    /// `void quads(uint group, vec2 at[n])` by the number of coordinates.
+    quads: HashMap<usize, Word>,
+    /// `void fragment(uint group, uint element, vec3 at, float lod, vec3 dx, vec3 dy)`
+    fragment: Option<Word>,
 }
 
 impl Recorder {
-    /// Declares the functions that record.
+    /// Declares what functions that record need.
     pub fn new(shader: &Shader, target: &Target) -> Result<Self, InjectError> {
         let mut builder = declare::builder(shader, target);
         let vulkan_memory = declare::use_addresses(&mut builder)?;
         let types = Types::new(&mut builder);
         let inputs = Inputs::new(&mut builder, shader, target, types)?;
-        let frag_coord = inputs.frag_coord;
-        let zero = builder.constant_bit32(types.f32, 0);
-        let uzero = builder.constant_bit32(types.u32, 0);
-        let [quad, fragment] =
-            functions::declare(&mut builder, types, &inputs, target, vulkan_memory)?;
         Ok(Self {
-            builder,
             types,
-            frag_coord,
-            zero,
-            uzero,
-            quad,
-            fragment,
+            frag_coord: inputs.frag_coord,
+            zero: builder.constant_bit32(types.f32, 0),
+            uzero: builder.constant_bit32(types.u32, 0),
+            functions: Functions::new(&mut builder, types, inputs, target, vulkan_memory),
+            quads: HashMap::new(),
+            fragment: None,
+            builder,
         })
     }
 
@@ -49,50 +47,81 @@ impl Recorder {
         self.builder.module()
     }
 
-    /// Records the coordinates of a quad's lanes that come by.
-    pub fn record_quad(&mut self, site: u16, at: &[Word], out: &mut Vec<Instruction>) {
-        let parts = [0, 1].map(|axis| id(at.get(axis).copied().unwrap_or(self.zero)));
-        let at = self.put(out, Op::CompositeConstruct, self.types.vec2, parts.to_vec());
-        self.call_quad(site, at, out);
+    /// Records the lanes of a quad that come by, with coordinates.
+    pub fn record_quads(
+        &mut self,
+        group: u16,
+        all: &[Vec<Word>],
+        out: &mut Vec<Instruction>,
+    ) -> Result<(), InjectError> {
+        let function = match self.quads.get(&all.len()) {
+            Some(function) => *function,
+            None => {
+                let made = (self.functions).quads(&mut self.builder, all.len() as u32)?;
+                self.quads.insert(all.len(), made);
+                made
+            }
+        };
+        let mut arguments = vec![function, self.group(group)];
+        for at in all {
+            let parts = [0, 1].map(|axis| id(at.get(axis).copied().unwrap_or(self.zero)));
+            arguments.push(self.put(out, Op::CompositeConstruct, self.types.vec2, parts.to_vec()));
+        }
+        self.call(arguments, out);
+        Ok(())
     }
 
     /// Records lanes, with their depth as coordinate u.
-    pub fn record_depth(&mut self, site: u16, out: &mut Vec<Instruction>) {
+    pub fn record_depth(
+        &mut self,
+        group: u16,
+        out: &mut Vec<Instruction>,
+    ) -> Result<(), InjectError> {
         let Input { variable, of } = self.frag_coord;
         let place = self.put(out, Op::Load, of, vec![id(variable)]);
         let depth = self.extracted(place, 2, out);
-        self.record_quad(site, &[depth], out);
+        self.record_quads(group, &[vec![depth]], out)
     }
 
     /// Records that lanes come by.
-    pub fn record_presence(&mut self, site: u16, out: &mut Vec<Instruction>) {
-        self.record_quad(site, &[], out);
+    pub fn record_presence(
+        &mut self,
+        group: u16,
+        out: &mut Vec<Instruction>,
+    ) -> Result<(), InjectError> {
+        self.record_quads(group, &[], out)
     }
 
     /// Records the coordinates of a fragment, with level and derivatives where it has any.
     pub fn record_fragment(
         &mut self,
-        site: u16,
+        group: u16,
         element: Option<Word>,
         at: &[Word],
         lod: Option<Word>,
         gradients: Option<[Vec<Word>; 2]>,
         out: &mut Vec<Instruction>,
-    ) {
+    ) -> Result<(), InjectError> {
+        let function = match self.fragment {
+            Some(function) => function,
+            None => *(self.fragment).insert(self.functions.fragment(&mut self.builder)?),
+        };
         let at = self.vec3(at, out);
         let [dx, dy] = gradients.unwrap_or_default().map(|of| self.vec3(&of, out));
-        let site = self.builder.constant_bit32(self.types.u32, site.into());
-        let arguments = [
-            self.fragment,
-            site,
-            element.unwrap_or(self.uzero),
-            at,
-            lod.unwrap_or(self.zero),
-            dx,
-            dy,
-        ];
-        let arguments = arguments.map(id).to_vec();
-        self.put(out, Op::FunctionCall, self.types.void, arguments);
+        let element = element.unwrap_or(self.uzero);
+        let lod = lod.unwrap_or(self.zero);
+        let arguments = vec![function, self.group(group), element, at, lod, dx, dy];
+        self.call(arguments, out);
+        Ok(())
+    }
+
+    fn group(&mut self, group: u16) -> Word {
+        self.builder.constant_bit32(self.types.u32, group.into())
+    }
+
+    fn call(&mut self, function_and_arguments: Vec<Word>, out: &mut Vec<Instruction>) {
+        let operands = function_and_arguments.into_iter().map(id).collect();
+        self.put(out, Op::FunctionCall, self.types.void, operands);
     }
 
     /// Derivatives of coordinates, which the lanes of a quad tell each other.
@@ -179,12 +208,6 @@ impl Recorder {
     fn extracted(&mut self, of: Word, place: u32, out: &mut Vec<Instruction>) -> Word {
         let operands = vec![id(of), literal(place)];
         self.put(out, Op::CompositeExtract, self.types.f32, operands)
-    }
-
-    fn call_quad(&mut self, site: u16, at: Word, out: &mut Vec<Instruction>) {
-        let site = self.builder.constant_bit32(self.types.u32, site.into());
-        let arguments = vec![id(self.quad), id(site), id(at)];
-        self.put(out, Op::FunctionCall, self.types.void, arguments);
     }
 
     fn put(

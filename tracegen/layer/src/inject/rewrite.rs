@@ -1,16 +1,14 @@
 //! Inserts the calls that record, and the declarations that they need.
 
-use super::find::{Found, find};
-use super::flow::unconditional;
-use super::numbers::{Number, Numbers};
+use super::find::Found;
 use super::recorder::Recorder;
 use super::shader::Shader;
 use super::site::{Form, Lod, Site, What};
+use super::sites::{Batch, Sites, stays_first};
 use super::{DepthTests, InjectError, Target};
 use rspirv::binary::Assemble;
 use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{ExecutionMode, Op, Word};
-use std::collections::{HashMap, HashSet};
 
 /// The recording module, and its sites.
 pub(super) fn rewrite(
@@ -36,23 +34,21 @@ pub(super) fn rewrite(
             let body = &mut recorder.builder.module_mut().functions[function].blocks[block];
             let old = std::mem::take(&mut body.instructions);
             let mut new = Vec::with_capacity(2 * old.len());
-            let mut entry_site = sites.entry_site.filter(|_| is_main && block == 0);
+            let mut entry = sites.entry.filter(|_| is_main && block == 0);
             for (place, instruction) in old.into_iter().enumerate() {
-                if !matches!(
-                    instruction.class.opcode,
-                    Op::Variable | Op::Line | Op::NoLine | Op::Phi
-                ) && let Some(site) = entry_site.take()
+                if !stays_first(&instruction)
+                    && let Some(group) = entry.take()
                 {
-                    recorder.record_depth(site, &mut new);
+                    recorder.record_depth(group, &mut new)?;
                 }
-                if let Some((site, found)) = sites.by_place.remove(&(function, block, place)) {
-                    record(&mut recorder, &shader, site, &found, &mut new);
+                if let Some(batch) = sites.batches.remove(&(function, block, place)) {
+                    record(&mut recorder, &shader, &batch, &mut new)?;
                 }
                 if instruction.class.opcode == Op::Return
                     && is_main
-                    && let Some(site) = sites.end_site
+                    && let Some(group) = sites.end
                 {
-                    recorder.record_depth(site, &mut new);
+                    recorder.record_depth(group, &mut new)?;
                 }
                 new.push(instruction);
             }
@@ -62,136 +58,36 @@ pub(super) fn rewrite(
     Ok((recorder.finish().assemble(), sites.sites))
 }
 
-/// The sites of a shader, and where they are.
-struct Sites {
-    sites: Vec<Site>,
-    /// Position of the entry point's function.
-    main: usize,
-    /// By function, block and instruction: the sites that have records of their own.
-    by_place: HashMap<(usize, usize, usize), (u16, Found)>,
-    /// Records every fragment that starts, where no other site does, or where depths are needed.
-    entry_site: Option<u16>,
-    /// Records every fragment that ends.
-    end_site: Option<u16>,
-}
-
-impl Sites {
-    fn new(shader: &Shader, tests: DepthTests) -> Result<Self, InjectError> {
-        let mut all = Self {
-            sites: Vec::new(),
-            main: 0,
-            by_place: HashMap::new(),
-            entry_site: None,
-            end_site: None,
-        };
-        for &number in &shader.functions {
-            let function = &shader.module.functions[number];
-            let is_main = function.def.as_ref().and_then(|d| d.result_id) == Some(shader.main);
-            if is_main {
-                all.main = number;
-            }
-            let mut numbers = Numbers::default();
-            let always = if is_main {
-                unconditional(function)
-            } else {
-                HashSet::new()
-            };
-            let mut demoted = false;
-            // Lanes are the same within a block, and in all blocks that every fragment executes.
-            let (mut of_all, mut of_block) = (HashMap::new(), HashMap::new());
-            for (block, body) in function.blocks.iter().enumerate() {
-                numbers.forget();
-                of_block.clear();
-                let unconditional = always.contains(&block) && !demoted;
-                let leaders: &mut HashMap<Number, u16> = if always.contains(&block) {
-                    &mut of_all
-                } else {
-                    &mut of_block
-                };
-                for (place, instruction) in body.instructions.iter().enumerate() {
-                    if let Some(found) = find(shader, instruction) {
-                        let leads = numbers.of(found.coordinate);
-                        let site =
-                            all.add(found, unconditional, (number, block, place), |plain| {
-                                plain.then(|| leaders.get(&leads).copied()).flatten()
-                            })?;
-                        if let Some(site) = site {
-                            leaders.entry(leads).or_insert(site);
-                        }
-                    }
-                    demoted |= instruction.class.opcode == Op::DemoteToHelperInvocation;
-                    numbers.take(shader, instruction);
-                }
-            }
-        }
-        let is_covered = all
-            .sites
-            .iter()
-            .any(|site| site.unconditional && site.leader.is_none() && site.form == Form::Quad);
-        let discards = tests == DepthTests::EarlyLateWrite;
-        if discards || !is_covered {
-            all.entry_site = Some(all.push(What::Coverage, true)?);
-        }
-        if discards {
-            all.end_site = Some(all.push(What::Survival, false)?);
-        }
-        Ok(all)
-    }
-
-    /// Adds an instruction. Tells its site where others with the same coordinates may share its records.
-    fn add(
-        &mut self,
-        found: Found,
-        unconditional: bool,
-        place: (usize, usize, usize),
-        leader: impl FnOnce(bool) -> Option<u16>,
-    ) -> Result<Option<u16>, InjectError> {
-        let number = self.next()?;
-        // All that is recorded of it is its coordinates.
-        let plain = found.form == Form::Quad && found.divisor.is_none();
-        let plain = plain && matches!(found.what, What::Texture(_));
-        let leader = leader(plain);
-        self.sites.push(Site {
-            what: found.what.clone(),
-            form: found.form,
-            leader,
-            unconditional,
-        });
-        if leader.is_none() {
-            self.by_place.insert(place, (number, found));
-        }
-        Ok((plain && leader.is_none()).then_some(number))
-    }
-
-    fn push(&mut self, what: What, unconditional: bool) -> Result<u16, InjectError> {
-        let number = self.next()?;
-        self.sites.push(Site {
-            what,
-            form: Form::Quad,
-            leader: None,
-            unconditional,
-        });
-        Ok(number)
-    }
-
-    fn next(&self) -> Result<u16, InjectError> {
-        let sites = self.sites.len();
-        u16::try_from(sites).map_err(|_| InjectError::TooManySites(sites))
-    }
-}
-
-/// Records an instruction before it is executed.
+/// Records coordinate groups before an instruction is executed.
 fn record(
     recorder: &mut Recorder,
     shader: &Shader,
-    site: u16,
+    batch: &Batch,
+    out: &mut Vec<Instruction>,
+) -> Result<(), InjectError> {
+    match &batch.of[..] {
+        [found] if matches!(found.what, What::LeftOut(_)) => {
+            recorder.record_presence(batch.group, out)
+        }
+        [found] if found.form == Form::Fragment => {
+            record_fragment(recorder, shader, batch.group, found, out)
+        }
+        all => {
+            let at: Vec<Vec<Word>> = (all.iter())
+                .map(|found| coordinates(recorder, shader, found, out))
+                .collect();
+            recorder.record_quads(batch.group, &at, out)
+        }
+    }
+}
+
+/// Coordinates as 32-bit floats, divided where the instruction does so.
+fn coordinates(
+    recorder: &mut Recorder,
+    shader: &Shader,
     found: &Found,
     out: &mut Vec<Instruction>,
-) {
-    if matches!(found.what, What::LeftOut(_)) {
-        recorder.record_presence(site, out);
-        return;
-    }
+) -> Vec<Word> {
     let mut at = recorder.floats(shader, found.coordinate, out);
     if let Some(divisor) = found.divisor
         && let Some(&q) = at.get(divisor as usize)
@@ -201,10 +97,17 @@ fn record(
             *part = recorder.divided(*part, q, out);
         }
     }
-    if found.form == Form::Quad {
-        recorder.record_quad(site, &at, out);
-        return;
-    }
+    at
+}
+
+fn record_fragment(
+    recorder: &mut Recorder,
+    shader: &Shader,
+    group: u16,
+    found: &Found,
+    out: &mut Vec<Instruction>,
+) -> Result<(), InjectError> {
+    let at = coordinates(recorder, shader, found, out);
     let lod = found.lod.map(|lod| recorder.float(shader, lod, out));
     let gradients = match (&found.what, found.gradients) {
         (_, Some(named)) => Some(named.map(|id| recorder.floats(shader, id, out))),
@@ -214,7 +117,7 @@ fn record(
         _ => None,
     };
     let element = found.element.map(|id| recorder.unsigned(shader, id, out));
-    recorder.record_fragment(site, element, &at, lod, gradients, out);
+    recorder.record_fragment(group, element, &at, lod, gradients, out)
 }
 
 /// Appends an instruction with a result, and tells its id.

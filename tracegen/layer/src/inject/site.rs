@@ -55,7 +55,7 @@ pub enum Lod {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
-    /// One for the lanes of a quad that come by at once: their coordinates lie in a plane.
+    /// One for the lanes of a quad that come by at once.
     Quad,
     /// One for each fragment, with a third coordinate, a level and derivatives of its own.
     Fragment,
@@ -99,8 +99,8 @@ pub struct Site {
     pub what: What,
     /// Form of its records.
     pub form: Form,
-    /// Site whose records are this one's too: the same coordinates in the same lanes. It has none of its own then.
-    pub leader: Option<u16>,
+    /// Coordinate group, which sites with the same coordinates in the same lanes share.
+    pub group: u16,
     /// Every fragment comes by, before any is discarded.
     pub unconditional: bool,
 }

@@ -118,7 +118,7 @@ fn a_plain_sample_is_one_quad_site_that_covers_its_fragments() {
     let [site] = &recording.sites[..] else {
         panic!("{:?}", recording.sites);
     };
-    assert!(site.unconditional && site.leader.is_none());
+    assert!(site.unconditional);
     assert_eq!(site.form, Form::Quad);
     let texture = TextureSite {
         access: Access::Sample,
@@ -132,7 +132,7 @@ fn a_plain_sample_is_one_quad_site_that_covers_its_fragments() {
 }
 
 #[test]
-fn textures_at_the_same_coordinates_share_the_records_of_the_first() {
+fn textures_at_the_same_coordinates_share_a_group() {
     let recording = instrumented(&shader(
         "var uv = in.uv * 2.0;
         let a = textureSample(color, linear, in.uv * 2.0);
@@ -142,9 +142,54 @@ fn textures_at_the_same_coordinates_share_the_records_of_the_first() {
         let d = textureSample(normals, linear, uv, vec2<i32>(1, -2));
         return a + b + c + d;",
     ));
-    let leaders: Vec<_> = recording.sites.iter().map(|site| site.leader).collect();
-    assert_eq!(leaders, [None, Some(0), None, Some(2)]);
+    assert_eq!(groups(&recording), [0, 0, 1, 1]);
+    assert_eq!(calls(&recording), 1);
     assert_eq!(textures(&recording)[3].offset, [1, -2]);
+}
+
+fn groups(recording: &Recording) -> Vec<u16> {
+    recording.sites.iter().map(|site| site.group).collect()
+}
+
+/// Calls of functions in a module, where its program has none of its own.
+fn calls(recording: &Recording) -> usize {
+    let module = rspirv::dr::load_words(&recording.words).expect("a module");
+    let all = module.all_inst_iter();
+    all.filter(|i| i.class.opcode == Op::FunctionCall).count()
+}
+
+#[test]
+fn lanes_that_stay_the_same_are_recorded_once_and_others_where_they_change() {
+    let text = |between: &str| {
+        shader(&format!(
+            "var c = textureSample(color, linear, in.uv);
+            {between}
+            return c + textureSample(color, linear, c.xy) + textureSample(normals, linear, in.uv);"
+        ))
+    };
+    let branch = "if in.number > 1u { c += textureSampleLevel(color, linear, in.uv * 3.0, 0.0); }";
+    let recording = instrumented(&text(branch));
+    // The branch has a record of its own; the rest is one of two groups.
+    assert_eq!(groups(&recording), [0, 2, 1, 0]);
+    assert_eq!(calls(&recording), 2);
+    // After fragments were discarded, fewer sample: the start, two records, the end.
+    let recording = instrumented(&text("if c.x > 0.5 { discard; }"));
+    assert_eq!(groups(&recording)[..3], [0, 1, 2]);
+    assert_eq!(calls(&recording), 4);
+}
+
+#[test]
+fn a_record_has_eight_groups_at_most() {
+    let samples = |count: u32| {
+        let one = |i| format!("c += textureSample(color, linear, in.uv * {i}.0);");
+        let all: String = (2..2 + count).map(one).collect();
+        shader(&format!("var c = vec4<f32>(0.0); {all} return c;"))
+    };
+    for (count, records) in [(8, 1), (9, 2), (17, 3)] {
+        let recording = instrumented(&samples(count));
+        assert_eq!(calls(&recording), records);
+        assert_eq!(groups(&recording), (0..count as u16).collect::<Vec<_>>());
+    }
 }
 
 #[test]
@@ -281,6 +326,28 @@ fn push_constants_of_the_shader_stay_where_they_are() {
     };
     let recording = instrumented(&module(&text(4)));
     assert_eq!(recording.sites.len(), 1);
+    assert_eq!(push_constants(&recording.words), 1);
+}
+
+/// Blocks of push constants: drivers refuse a second one.
+fn push_constants(words: &[u32]) -> usize {
+    use rspirv::{dr::Operand, spirv::StorageClass};
+    let class = Some(&Operand::StorageClass(StorageClass::PushConstant));
+    let module = rspirv::dr::load_words(words).expect("a module");
+    let globals = module.types_global_values.iter();
+    let of = globals.filter(|g| g.class.opcode == Op::Variable && g.operands.first() == class);
+    of.count()
+}
+
+#[test]
+fn push_constants_that_the_shader_does_not_use_get_the_number_too() {
+    let unused = "struct Constants { scale: vec4<f32> }
+        var<immediate> constants: Constants;
+        @vertex fn vertex() -> @builtin(position) vec4<f32> { return constants.scale; }
+        @fragment fn main() -> @location(0) vec4<f32> { return vec4<f32>(1.0); }";
+    let words = module(unused);
+    assert_eq!(push_constants(&words), 1);
+    assert_eq!(push_constants(&instrumented(&words).words), 1);
 }
 
 #[test]

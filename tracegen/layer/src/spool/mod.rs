@@ -34,8 +34,11 @@ pub struct Settings {
     pub frames_by: FramesBy,
     /// Every draw is counted by an occlusion query as well.
     pub occlusion: bool,
-    /// Records that the buffer of one submission holds.
-    pub capacity: u32,
+    /// Bytes for the records of one submission.
+    pub record_bytes: u64,
+    /// Folder for every module as the program gave it and as it records.
+    #[serde(default)]
+    pub modules: Option<std::path::PathBuf>,
 }
 
 /// What tells frames apart.
@@ -113,8 +116,8 @@ pub enum Event {
         draws: Vec<[u32; 2]>,
         /// Records of these draws, in the records' file.
         records: Span,
-        /// Records that found no room.
-        lost: u64,
+        /// Bytes of records that found no room.
+        lost_bytes: u64,
         /// Samples that each draw's occlusion query counted: number of the draw and count.
         occlusion: Vec<(u32, u64)>,
     },
@@ -135,9 +138,9 @@ pub enum Event {
 /// A run of records in the records' file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Span {
-    /// Number of the first one.
+    /// Its first unit of [`crate::inject::UNIT_BYTES`].
     pub first: u64,
-    /// How many.
+    /// How many units.
     pub count: u64,
 }
 

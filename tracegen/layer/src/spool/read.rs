@@ -1,7 +1,7 @@
 //! Reading what the processes of a captured program left behind.
 
 use super::{EVENTS, Event, RECORDS, Span, file};
-use crate::inject::{RAW_BYTES, RawSample};
+use crate::inject::{RawSample, UNIT_BYTES, Unit, unpack};
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -29,13 +29,21 @@ pub enum ReadError {
         found: String,
     },
     /// Records that an event names are not there.
-    #[error("{file}: expected records {first} to {end}, found fewer")]
-    Records {
+    #[error("{file}: expected records up to byte {end}, found {found} bytes")]
+    Short {
         /// The file.
         file: String,
-        /// First.
-        first: u64,
-        /// End.
+        /// End of what is named.
+        end: u64,
+        /// End of the file.
+        found: u64,
+    },
+    /// The last record does not end where the span does.
+    #[error("{file}: expected the end of a record at byte {end}, found the middle of one")]
+    Split {
+        /// The file.
+        file: String,
+        /// End of what is named.
         end: u64,
     },
 }
@@ -115,35 +123,34 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Appends the records of a span.
+    /// The records of a span, coordinate group by coordinate group.
     ///
     /// # Errors
-    /// Records that are not there.
-    pub fn read(&mut self, span: Span, into: &mut Vec<RawSample>) -> Result<(), ReadError> {
-        let short = || ReadError::Records {
-            file: self.name.display().to_string(),
-            first: span.first,
-            end: span.first.saturating_add(span.count),
+    /// Records that are not there, or not whole.
+    pub fn read(&mut self, span: Span, each: impl FnMut(RawSample)) -> Result<(), ReadError> {
+        let file = || self.name.display().to_string();
+        let io = |e| io_error(&self.name, e);
+        let found = self.file.metadata().map_err(io)?.len();
+        let end = span.first.saturating_add(span.count);
+        let end = end.saturating_mul(UNIT_BYTES);
+        let count = usize::try_from(span.count).ok().filter(|_| end <= found);
+        let Some(count) = count else {
+            return Err(ReadError::Short {
+                file: file(),
+                end,
+                found,
+            });
         };
-        let length = self
-            .file
-            .metadata()
-            .map_err(|e| io_error(&self.name, e))?
-            .len();
-        let end = span
-            .first
-            .checked_add(span.count)
-            .and_then(|end| end.checked_mul(RAW_BYTES));
-        if end.is_none_or(|end| end > length) {
-            return Err(short());
-        }
-        let start = into.len();
-        let count = usize::try_from(span.count).map_err(|_| short())?;
-        into.resize(start + count, RawSample::default());
-        let at = SeekFrom::Start(span.first * RAW_BYTES);
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut into[start..]);
+        let mut units = vec![Unit::default(); count];
+        let at = SeekFrom::Start(span.first * UNIT_BYTES);
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut units);
         let read = self.file.seek(at).and_then(|_| self.file.read_exact(bytes));
-        read.map_err(|e| io_error(&self.name, e))
+        read.map_err(|e| io_error(&self.name, e))?;
+        if unpack(&units, each) {
+            Ok(())
+        } else {
+            Err(ReadError::Split { file: file(), end })
+        }
     }
 }
 

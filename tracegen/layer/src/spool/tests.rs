@@ -1,12 +1,10 @@
 use super::*;
-use crate::inject::RawSample;
+use crate::inject::Unit;
 use std::io::Write as _;
 
-fn record(draw: u32) -> RawSample {
-    RawSample {
-        draw,
-        ..RawSample::default()
-    }
+/// A record without coordinates.
+fn record(draw: u32) -> Unit {
+    [1 << 16, draw, 0, 0]
 }
 
 #[test]
@@ -33,14 +31,18 @@ fn events_and_records_come_back_and_descriptions_once() {
     assert!(process_event && events.len() == 3, "{events:?}");
     assert_eq!(events[2], Event::Frame { frame: 3 });
     let mut reader = process.records().unwrap();
-    let mut read = Vec::new();
-    reader.read(spans[1], &mut read).unwrap();
-    reader.read(spans[0], &mut read).unwrap();
-    let draws: Vec<u32> = read.iter().map(|r| r.draw).collect();
+    let mut draws = Vec::new();
+    for span in [spans[1], spans[0]] {
+        reader.read(span, |record| draws.push(record.draw)).unwrap();
+    }
     assert_eq!(draws, [3, 1, 2]);
     let beyond = Span { first: 2, count: 2 };
-    let text = reader.read(beyond, &mut read).unwrap_err().to_string();
-    assert!(text.contains("expected records 2 to 4"), "{text}");
+    let text = reader.read(beyond, drop).unwrap_err().to_string();
+    assert!(text.contains("up to byte 64, found 48"), "{text}");
+    // A header that announces coordinates that are not there.
+    let span = writer.records(&[[1 << 20, 0, 0, 0]]).unwrap();
+    let text = reader.read(span, drop).unwrap_err().to_string();
+    assert!(text.contains("the middle of one"), "{text}");
 }
 
 #[test]
@@ -73,7 +75,8 @@ fn settings_come_back() {
         frames: [10, 13],
         frames_by: FramesBy::Present,
         occlusion: true,
-        capacity: 1 << 20,
+        record_bytes: 1 << 20,
+        modules: None,
     };
     settings.save(folder.path()).unwrap();
     assert_eq!(Settings::load(folder.path()).unwrap(), settings);

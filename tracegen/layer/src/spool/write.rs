@@ -1,7 +1,7 @@
 //! Writing a process's files.
 
 use super::{EVENTS, Event, RECORDS, Span, file};
-use crate::inject::RawSample;
+use crate::inject::Unit;
 use std::collections::HashSet;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
@@ -80,7 +80,7 @@ impl Writer {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn records(&mut self, records: &[RawSample]) -> io::Result<Span> {
+    pub fn records(&mut self, records: &[Unit]) -> io::Result<Span> {
         self.after_fork()?;
         self.records.write_all(bytemuck::cast_slice(records))?;
         let span = Span {

@@ -5,14 +5,14 @@ use super::pass;
 use super::places::Placement;
 use crate::groups::{Bound, Group};
 use crate::lanes::visits;
-use crate::session::{Executed, Session, coverage_site, survival_site};
+use crate::session::{Executed, Session, coverage_group, survival_group};
 use crate::texture::{FETCH, gathering, sampler, texture};
 use crate::views::{Role, Views, viewport};
 use ash::vk;
 use formats::textrace::{Draw, LeftOut, NO_GROUP, PassKind, Surfaces, TraceMeta, UvGroup};
 use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
 use formats::view::Eye;
-use parallax_layer::inject::{Access, Form, RawQuad, RawSample, TextureSite, What};
+use parallax_layer::inject::{Access, Form, RawQuad, RawSample, Site, TextureSite, What};
 use parallax_layer::spool::{DrawInfo, ShaderInfo, ViewInfo};
 use rayon::prelude::*;
 use record::{CaptureCounts, DepthReplay, RawDepth, RawRecord, RawRecords, Recording};
@@ -227,14 +227,12 @@ impl<W: Write + Seek> Builder<W> {
         let of_part = |executed: &Executed| -> &[RawSample] {
             records.get(&executed.draw).map_or(&[], Vec::as_slice)
         };
-        let mut used: BTreeSet<SiteKey> = BTreeSet::new();
+        let mut used: BTreeSet<GroupKey> = BTreeSet::new();
         let mut most = 0;
         for record in parts.iter().flat_map(|(executed, _)| of_part(executed)) {
-            if let Some(site) = shader.sites.get(usize::from(record.site()))
-                && let What::Texture(texture) = &site.what
-            {
+            if let Some((_, texture)) = texture_of(shader, record.group()) {
                 let own = texture.image.element.is_none();
-                used.insert((record.site(), own.then_some(record.element)));
+                used.insert((record.group(), own.then_some(record.element)));
             }
             most = most.max(record.primitive.saturating_add(1));
         }
@@ -276,13 +274,11 @@ impl<W: Write + Seek> Builder<W> {
     ) {
         let mut counts: BTreeMap<u16, u64> = BTreeMap::new();
         for record in records {
-            *counts.entry(record.site()).or_default() += u64::from(record.lanes().count_ones());
+            *counts.entry(record.group()).or_default() += u64::from(record.lanes().count_ones());
         }
-        for (site, fragments) in counts {
-            if let Some(What::LeftOut(what)) =
-                shader.sites.get(usize::from(site)).map(|site| &site.what)
-            {
-                self.leave_out(what, 1, fragments);
+        for site in &shader.sites {
+            if let (What::LeftOut(what), Some(fragments)) = (&site.what, counts.get(&site.group)) {
+                self.leave_out(what, 1, *fragments);
             }
         }
     }
@@ -293,7 +289,7 @@ impl<W: Write + Seek> Builder<W> {
         session: &Session,
         info: &DrawInfo,
         shader: &ShaderInfo,
-        used: &BTreeSet<SiteKey>,
+        used: &BTreeSet<GroupKey>,
         primitives: u32,
     ) -> Result<Declared, DrainError> {
         let mut declared = Declared {
@@ -302,10 +298,10 @@ impl<W: Write + Seek> Builder<W> {
             replay: replay(info),
         };
         let mut of_draws: Vec<Vec<UvGroup>> = vec![Vec::new()];
-        for &(site, element) in used {
+        for &(coordinates, element) in used {
             let last = of_draws.len() - 1;
             let first = of_draws[last].len();
-            let made = self.group(session, info, shader, site, element, first as u8);
+            let made = self.group(session, info, shader, (coordinates, element), first as u8);
             let (mut group, groups) = match made {
                 Ok(made) => made,
                 Err(why) => {
@@ -320,7 +316,9 @@ impl<W: Write + Seek> Builder<W> {
                 of_draws[last].extend(groups);
             }
             let draw = of_draws.len() - 1;
-            declared.groups.insert((site, element), (draw, group));
+            declared
+                .groups
+                .insert((coordinates, element), (draw, group));
         }
         for (number, groups) in of_draws.into_iter().enumerate() {
             let rest = if number == 0 {
@@ -348,14 +346,12 @@ impl<W: Write + Seek> Builder<W> {
         session: &Session,
         info: &DrawInfo,
         shader: &ShaderInfo,
-        site: u16,
-        element: Option<u32>,
+        (coordinates, element): GroupKey,
         first: u8,
     ) -> Result<(Group, Vec<UvGroup>), String> {
         let mut bound: HashMap<String, Result<Bound, String>> = HashMap::new();
-        let members = (0_u16..).zip(&shader.sites);
-        let members = members.filter(|(number, of)| *number == site || of.leader == Some(site));
-        for (_, of) in members {
+        let members = shader.sites.iter();
+        for of in members.filter(|site| site.group == coordinates) {
             if let What::Texture(texture) = &of.what {
                 let found = self.bound(session, info, texture, element);
                 bound.insert(format!("{texture:?}"), found);
@@ -365,7 +361,7 @@ impl<W: Write + Seek> Builder<W> {
             let found = bound.get(&format!("{texture:?}")).cloned();
             found.unwrap_or_else(|| Err("a texture that is not known".to_owned()))
         };
-        Group::new(shader, site, element, first, of)
+        Group::new(shader, coordinates, element, first, of)
     }
 
     /// The texture and sampler that a site reads.
@@ -436,8 +432,8 @@ impl<W: Write + Seek> Builder<W> {
         // Of one place in the order in which they were recorded.
         order.par_sort_unstable();
         let sites = Sites {
-            coverage: coverage_site(shader),
-            survival: survival_site(shader),
+            coverage: coverage_group(shader),
+            survival: survival_group(shader),
             shader,
         };
         let places: Vec<&[(u64, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
@@ -459,15 +455,24 @@ fn place(record: &RawSample) -> u64 {
     u64::from(record.primitive) << 32 | u64::from(record.place)
 }
 
-/// A site, and the element of its binding's array where fragments choose it.
-type SiteKey = (u16, Option<u32>);
+/// A coordinate group, and the element of its binding's array where fragments choose it.
+type GroupKey = (u16, Option<u32>);
+
+/// The first site of a coordinate group that reads a texture.
+fn texture_of(shader: &ShaderInfo, group: u16) -> Option<(&Site, &TextureSite)> {
+    let mut of = shader.sites.iter().filter(|site| site.group == group);
+    of.find_map(|site| match &site.what {
+        What::Texture(texture) => Some((site, texture)),
+        _ => None,
+    })
+}
 
 /// The trace's draws of a draw.
 struct Declared {
     /// Index and first primitive.
     draws: Vec<(u32, u32)>,
-    /// By site and element: which of the draws, and the group.
-    groups: HashMap<SiteKey, (usize, Group)>,
+    /// Which of the draws, and the group.
+    groups: HashMap<GroupKey, (usize, Group)>,
     replay: DepthReplay,
 }
 
@@ -500,24 +505,21 @@ fn record(draw: (u32, u32), primitive: u32, mask: u8, group: u8, at: &RawQuad) -
 /// Joins the records of a quad of a primitive.
 fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
     let primitive = of[0].primitive;
-    let lanes_of = |site: Option<u16>| {
-        let of = of.iter().filter(|record| Some(record.site()) == site);
+    let lanes_of = |group: Option<u16>| {
+        let of = of.iter().filter(|record| Some(record.group()) == group);
         of.fold(0, |mask, record| mask | record.lanes())
     };
     let covered = lanes_of(sites.coverage);
     let mut records = Vec::new();
     // Lanes that sample something in the first draw, whose records tell what is covered.
     let mut sampled = 0;
-    let mut fragments: BTreeMap<SiteKey, Vec<(u8, &RawSample)>> = BTreeMap::new();
+    let mut fragments: BTreeMap<GroupKey, Vec<(u8, &RawSample)>> = BTreeMap::new();
     for sample in of {
-        let Some(site) = sites.shader.sites.get(usize::from(sample.site())) else {
-            continue;
-        };
-        let What::Texture(texture) = &site.what else {
+        let Some((site, texture)) = texture_of(sites.shader, sample.group()) else {
             continue;
         };
         let element = texture.image.element.is_none().then_some(sample.element);
-        let key = (sample.site(), element);
+        let key = (sample.group(), element);
         let Some((draw, group)) = declared.groups.get(&key) else {
             continue;
         };
@@ -566,7 +568,7 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
     let survived = lanes_of(sites.survival);
     let depths = of
         .iter()
-        .find(|record| Some(record.site()) == sites.coverage);
+        .find(|record| Some(record.group()) == sites.coverage);
     if let Some(depths) = depths.map(|record| record.as_quad()) {
         let [z, dx, dy, cross] = [depths.uv, depths.dx, depths.dy, depths.cross].map(|v| v[0]);
         depth.depth = [z, z + dx, z + dy, z + dx + dy + cross];
