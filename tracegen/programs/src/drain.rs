@@ -5,7 +5,7 @@ mod places;
 
 use crate::pairs::pair;
 use crate::session::{Executed, Session, SessionError, coverage_group};
-use crate::views::{self, DrawKey, Role, Rule, Views, ViewsError};
+use crate::views::{self, DrawKey, Role, Rule, Views, ViewsError, Wanted};
 use build::{Builder, Merged};
 use formats::textrace::{
     LeftOut, Pass, PassKind, ProgramCapture, Surfaces, TextraceWriter, TraceMeta,
@@ -23,8 +23,8 @@ use thiserror::Error;
 pub struct Job<'a> {
     /// Frames to take, ascending.
     pub frames: &'a [u32],
-    /// Rule by which both eyes are told apart; none for the first that fits.
-    pub eyes: Option<Rule>,
+    /// What tells both eyes apart.
+    pub eyes: &'a Wanted,
     /// What told frames apart.
     pub frames_by: FramesBy,
     /// Eyes of frames, where the program told them.
@@ -119,7 +119,16 @@ pub fn drain<W: Write + Seek>(
             .map(|draw| weight(session, draw, &records))
             .collect();
         // Every frame is told by the rule that told the first one.
-        let views = views::find(session, &frame, &weights, job.eyes.or(drained.rule))?;
+        let known = drained
+            .rule
+            .filter(|rule| *rule != Rule::File)
+            .map(Wanted::Rule);
+        let views = views::find(
+            session,
+            &frame,
+            &weights,
+            known.as_ref().unwrap_or(job.eyes),
+        )?;
         drained.rule = Some(views.rule);
         let placements = views.eyes.map(Placement::new);
         let size_px = places::both(placements);

@@ -108,6 +108,9 @@ pub struct Session {
     passes: HashMap<u32, PassInfo>,
     images: HashMap<u32, ImageInfo>,
     shaders: HashMap<u32, ShaderInfo>,
+    /// Size of the picture of each pass that has one.
+    pictures: HashMap<u32, [u32; 2]>,
+    process: Option<Process>,
     records: Option<Reader>,
 }
 
@@ -119,6 +122,7 @@ impl Session {
     pub fn read(process: &Process) -> Result<Self, ReadError> {
         let mut session = Self {
             records: Some(process.records()?),
+            process: Some(process.clone()),
             ..Self::default()
         };
         for event in process.events()? {
@@ -156,7 +160,7 @@ impl Session {
         }
     }
 
-    fn take(&mut self, event: Event) {
+    pub(crate) fn take(&mut self, event: Event) {
         match event {
             Event::Process { command, .. } => self.command = command,
             Event::Device {
@@ -164,7 +168,12 @@ impl Session {
                 driver,
                 refused,
                 ..
-            } => (self.device, self.driver, self.refused) = (name, driver, refused),
+            } => {
+                // A program may have opened others before and after the one that it renders on.
+                if self.device.is_empty() || self.refused.is_some() {
+                    (self.device, self.driver, self.refused) = (name, driver, refused);
+                }
+            }
             Event::Shader(shader) => drop(self.shaders.insert(shader.shader, shader)),
             Event::Image(image) => drop(self.images.insert(image.image, image)),
             Event::Pass(pass) => drop(self.passes.insert(pass.pass, pass)),
@@ -193,6 +202,7 @@ impl Session {
                     of.ended = true;
                 }
             }
+            Event::Picture { pass, size } => drop(self.pictures.insert(pass, size)),
             Event::Trouble { what } => self.troubles.push(what),
             Event::Closed => {}
         }
@@ -208,6 +218,13 @@ impl Session {
     #[must_use]
     pub fn pass(&self, number: u32) -> Option<&PassInfo> {
         self.passes.get(&number)
+    }
+
+    /// Size and texels, red, green, blue and alpha, of the picture of a pass.
+    #[must_use]
+    pub fn picture(&self, pass: u32) -> Option<([u32; 2], Vec<u8>)> {
+        let size = *self.pictures.get(&pass)?;
+        Some((size, self.process.as_ref()?.picture(pass).ok()?))
     }
 
     /// An image.

@@ -3,12 +3,15 @@
 use super::raster::{TileEncoding, parse_bytes};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
+use formats::container::AtomicFile;
 use formats::textrace::TextraceWriter;
 use formats::view::EyeView;
 use parallax_layer::spool::{FramesBy, Settings};
-use programs::{Check, Drained, Job, Rule, Session, check, drain};
+use programs::list::List;
+use programs::{Check, Drained, Job, Rule, RuleFile, Session, Wanted, check, drain};
 use shell::{Output, check_outputs, lasting_arguments, note, warn};
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -17,14 +20,25 @@ use std::process::ExitCode;
 #[derive(Args, Debug)]
 pub struct ProgramArgs {
     /// The trace to write.
-    #[arg(short, long, value_name = "FILE.textrace")]
-    pub output: PathBuf,
+    #[arg(
+        short,
+        long,
+        value_name = "FILE.textrace",
+        required_unless_present = "list"
+    )]
+    output: Option<PathBuf>,
+    /// List the frames' passes, as a table on stdout and as a page with pictures, and write no trace.
+    #[arg(long, value_name = "PAGE.html", conflicts_with_all = ["output", "check"])]
+    list: Option<PathBuf>,
     /// Frames to capture, counted from 0: `10`, or `10..13` for 10, 11 and 12.
     #[arg(long, value_name = "FRAMES", default_value = "10", value_parser = parse_frames)]
     pub frames: Range<u32>,
     /// How it renders for two eyes; by default the first of these that fits.
     #[arg(long, value_enum, value_name = "RULE")]
     eyes: Option<Eyes>,
+    /// A file of rules that tell which draws show which eye, where none of the tool's own does.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "eyes")]
+    rules: Option<PathBuf>,
     /// Hold the records of every draw against an occlusion query of the driver; exit with 1 where they differ.
     #[arg(long)]
     check: bool,
@@ -89,10 +103,9 @@ impl ProgramArgs {
     /// # Errors
     /// Those.
     pub fn check_outputs(&self, more: Option<Output>) -> anyhow::Result<()> {
-        let outputs: Vec<Output> = [Output::binary("-o", &self.output)]
-            .into_iter()
-            .chain(more)
-            .collect();
+        let trace = (self.output.as_deref()).map(|path| Output::binary("-o", path));
+        let list = (self.list.as_deref()).map(|path| Output::text("--list", path));
+        let outputs: Vec<Output> = trace.into_iter().chain(list).chain(more).collect();
         check_outputs(&outputs, []).map(drop)
     }
 
@@ -110,8 +123,9 @@ impl ProgramArgs {
             records: true,
             frames: [self.frames.start, self.frames.end],
             frames_by,
-            occlusion: self.check,
+            occlusion: self.check || self.list.is_some(),
             record_bytes: self.records,
+            pictures: self.list.is_some(),
             modules: self.modules.as_ref().map(absolute).transpose()?,
         })
     }
@@ -131,9 +145,14 @@ impl ProgramArgs {
             warn(trouble);
         }
         let frames: Vec<u32> = self.frames.clone().collect();
+        let eyes = self.wanted()?;
+        let Some(output) = &self.output else {
+            self.write_list(session, &program, &eyes)?;
+            return Ok(ExitCode::SUCCESS);
+        };
         let job = Job {
             frames: &frames,
-            eyes: self.eyes.map(Eyes::rule),
+            eyes: &eyes,
             frames_by: settings.frames_by,
             cameras,
             program,
@@ -141,7 +160,7 @@ impl ProgramArgs {
             command_line: lasting_arguments(std::env::args_os().skip(1)),
             record_bytes: settings.record_bytes,
         };
-        let writer = TextraceWriter::create_growing(&self.output)?;
+        let writer = TextraceWriter::create_growing(output)?;
         let writer = writer.with_encoding(self.encoding.encoding());
         let (writer, drained) = drain(session, &job, writer)?;
         let checked = self.check.then(|| check(session, &frames)).transpose()?;
@@ -151,6 +170,42 @@ impl ProgramArgs {
             Some(checked) => report_check(checked),
             None => ExitCode::SUCCESS,
         })
+    }
+}
+
+impl ProgramArgs {
+    /// What is to tell both eyes apart.
+    fn wanted(&self) -> anyhow::Result<Wanted> {
+        Ok(match (&self.rules, self.eyes) {
+            (Some(path), _) => Wanted::File(RuleFile::load(path)?),
+            (None, Some(eyes)) => Wanted::Rule(eyes.rule()),
+            (None, None) => Wanted::First,
+        })
+    }
+
+    /// Prints the frames' passes and writes their page.
+    fn write_list(
+        &self,
+        session: &mut Session,
+        program: &str,
+        wanted: &Wanted,
+    ) -> anyhow::Result<()> {
+        let frames = self.frames.clone();
+        let lists: Result<Vec<List>, _> = frames
+            .map(|frame| programs::list::list(session, frame, wanted))
+            .collect();
+        let lists = lists?;
+        for list in &lists {
+            shell::print(&format!("{}\n{}", list.eyes_text(), list.table()))?;
+        }
+        if let Some(path) = &self.list {
+            let place = || format!("cannot write {}", path.display());
+            let mut file = AtomicFile::create(path).with_context(place)?;
+            let page = programs::list::page(program, &lists);
+            file.write_all(page.as_bytes()).with_context(place)?;
+            file.persist().with_context(place)?;
+        }
+        Ok(())
     }
 }
 

@@ -4,6 +4,7 @@ use super::api::{DeviceLink, take_link};
 use super::dispatch_key;
 use super::instance::{Instance, draw_number_offset};
 use super::next::Next;
+use super::pictures::Pictures;
 use super::queries::Queries;
 use crate::capture::{Capture, capture, lock};
 use crate::inject::Target;
@@ -13,6 +14,7 @@ use crate::track::Tracker;
 use ash::vk;
 use std::collections::HashMap;
 use std::ffi::CStr;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, RwLock};
 
 /// A device that is followed.
@@ -24,6 +26,7 @@ pub(super) struct Device {
     /// Where shaders record; none where nothing can be recorded, or is wanted.
     pub recorder: Option<DeviceRecorder>,
     pub queries: Option<Queries>,
+    pub pictures: Option<Pictures>,
     tracker: Mutex<Tracker>,
     /// Held while commands whose records are wanted are executed.
     pub submitting: Mutex<()>,
@@ -66,6 +69,9 @@ impl DeviceRecorder {
 unsafe impl Send for Device {}
 // SAFETY: likewise; all that changes is behind locks.
 unsafe impl Sync for Device {}
+
+/// Devices of the process so far.
+static NUMBER: AtomicU32 = AtomicU32::new(0);
 
 static DEVICES: LazyLock<RwLock<HashMap<usize, Arc<Device>>>> = LazyLock::new(RwLock::default);
 
@@ -238,7 +244,8 @@ unsafe fn follow(
         capture,
         recorder,
         queries,
-        tracker: Mutex::default(),
+        tracker: Mutex::new(Tracker::of_device(NUMBER.fetch_add(1, Ordering::Relaxed))),
+        pictures: (capture.settings.pictures && is_lavapipe).then(Pictures::default),
         submitting: Mutex::default(),
         swapchains: Mutex::default(),
     }
@@ -258,6 +265,9 @@ pub(super) unsafe extern "system" fn destroy_device(
         if let Some(known) = removed {
             if let Some(queries) = &known.queries {
                 queries.destroy(device, &known.next);
+            }
+            if let Some(pictures) = &known.pictures {
+                pictures.destroy(device, &known.next);
             }
             known.capture.note_frames();
             known.capture.event(&Event::Closed);

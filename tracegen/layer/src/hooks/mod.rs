@@ -9,6 +9,7 @@ mod draws;
 mod instance;
 mod next;
 mod passes;
+mod pictures;
 mod pipeline_state;
 mod pipelines;
 mod queries;

@@ -111,6 +111,17 @@ next_functions! {
     cmd_draw_indirect_byte_count: PFN_vkCmdDrawIndirectByteCountEXT [c"vkCmdDrawIndirectByteCountEXT"];
     cmd_copy_image_to_buffer: PFN_vkCmdCopyImageToBuffer [c"vkCmdCopyImageToBuffer"];
     cmd_copy_image_to_buffer2: PFN_vkCmdCopyImageToBuffer2 [c"vkCmdCopyImageToBuffer2", c"vkCmdCopyImageToBuffer2KHR"];
+    cmd_blit_image: PFN_vkCmdBlitImage [c"vkCmdBlitImage"];
+    cmd_pipeline_barrier: PFN_vkCmdPipelineBarrier [c"vkCmdPipelineBarrier"];
+    create_buffer: PFN_vkCreateBuffer [c"vkCreateBuffer"];
+    destroy_buffer: PFN_vkDestroyBuffer [c"vkDestroyBuffer"];
+    allocate_memory: PFN_vkAllocateMemory [c"vkAllocateMemory"];
+    free_memory: PFN_vkFreeMemory [c"vkFreeMemory"];
+    map_memory: PFN_vkMapMemory [c"vkMapMemory"];
+    bind_image_memory: PFN_vkBindImageMemory [c"vkBindImageMemory"];
+    bind_buffer_memory: PFN_vkBindBufferMemory [c"vkBindBufferMemory"];
+    image_requirements: PFN_vkGetImageMemoryRequirements [c"vkGetImageMemoryRequirements"];
+    buffer_requirements: PFN_vkGetBufferMemoryRequirements [c"vkGetBufferMemoryRequirements"];
     queue_submit: PFN_vkQueueSubmit [c"vkQueueSubmit"];
     queue_submit2: PFN_vkQueueSubmit2 [c"vkQueueSubmit2", c"vkQueueSubmit2KHR"];
     queue_wait_idle: PFN_vkQueueWaitIdle [c"vkQueueWaitIdle"];

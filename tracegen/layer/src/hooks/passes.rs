@@ -2,7 +2,7 @@
 
 use super::api::{find, slice};
 use super::device::Device;
-use crate::spool::ViewInfo;
+use crate::spool::{PassInfo, ViewInfo};
 use crate::track::{Attachment, OpenPass, RenderPass, Subpass};
 use ash::vk::{self, Handle};
 use std::sync::Arc;
@@ -198,10 +198,25 @@ fn next_subpass(known: &Device, buffer: vk::CommandBuffer) {
     }
 }
 
-fn end(known: &Device, buffer: vk::CommandBuffer) {
+/// A pass ends. Tells what it was.
+fn end(known: &Device, buffer: vk::CommandBuffer) -> Option<Arc<PassInfo>> {
     let mut tracker = known.tracker();
     let state = tracker.commands.get_mut(buffer.as_raw());
-    (state.pass, state.open) = (None, None);
+    state.open = None;
+    state.pass.take()
+}
+
+/// Keeps what a pass rendered, where that is wanted.
+///
+/// # Safety
+/// The pass has just ended in a command buffer that is recorded.
+unsafe fn keep(known: &Device, buffer: vk::CommandBuffer, pass: Option<Arc<PassInfo>>) {
+    if let (Some(pictures), Some(pass)) = (&known.pictures, pass)
+        && known.capture.may_want_commands()
+    {
+        // SAFETY: as the caller promises.
+        unsafe { pictures.take(known, buffer, &pass) };
+    }
 }
 
 pub(super) unsafe extern "system" fn cmd_begin_render_pass(
@@ -259,8 +274,9 @@ pub(super) unsafe extern "system" fn cmd_end_render_pass(buffer: vk::CommandBuff
     // SAFETY: a valid call of vkCmdEndRenderPass.
     unsafe {
         let known = Device::of(buffer);
-        end(&known, buffer);
+        let pass = end(&known, buffer);
         (known.next.cmd_end_render_pass)(buffer);
+        keep(&known, buffer, pass);
     }
 }
 
@@ -271,8 +287,9 @@ pub(super) unsafe extern "system" fn cmd_end_render_pass2(
     // SAFETY: a valid call of vkCmdEndRenderPass2.
     unsafe {
         let known = Device::of(buffer);
-        end(&known, buffer);
+        let pass = end(&known, buffer);
         (known.next.cmd_end_render_pass2)(buffer, info);
+        keep(&known, buffer, pass);
     }
 }
 
@@ -310,7 +327,8 @@ pub(super) unsafe extern "system" fn cmd_end_rendering(buffer: vk::CommandBuffer
     // SAFETY: a valid call of vkCmdEndRendering.
     unsafe {
         let known = Device::of(buffer);
-        end(&known, buffer);
+        let pass = end(&known, buffer);
         (known.next.cmd_end_rendering)(buffer);
+        keep(&known, buffer, pass);
     }
 }

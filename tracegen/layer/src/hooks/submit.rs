@@ -7,6 +7,7 @@ use crate::capture::lock;
 use crate::spool::{Event, Span};
 use crate::track::Executed;
 use ash::vk::{self, Handle};
+use std::collections::HashSet;
 
 pub(super) unsafe extern "system" fn queue_submit(
     queue: vk::Queue,
@@ -189,6 +190,14 @@ unsafe fn take(known: &Device, frame: u32, items: &[Executed], numbers: &[u32]) 
         let pass = item.pass.as_ref().map_or(u32::MAX, |pass| pass.pass);
         [item.draw.draw, pass]
     };
+    if let Some(pictures) = &known.pictures {
+        let passes: HashSet<u32> = items
+            .iter()
+            .filter_map(|i| Some(i.pass.as_ref()?.pass))
+            .collect();
+        // SAFETY: as the caller promises.
+        unsafe { pictures.write(known, &passes) };
+    }
     capture.event(&Event::Submit {
         frame,
         draws: items.iter().map(draw).collect(),

@@ -36,6 +36,9 @@ pub struct Settings {
     pub occlusion: bool,
     /// Bytes for the records of one submission.
     pub record_bytes: u64,
+    /// What passes render is kept as pictures.
+    #[serde(default)]
+    pub pictures: bool,
     /// Folder for every module as the program gave it and as it records.
     #[serde(default)]
     pub modules: Option<std::path::PathBuf>,
@@ -72,6 +75,11 @@ impl Settings {
         let bytes = std::fs::read(folder.join(SETTINGS_FILE))?;
         Ok(serde_json::from_slice(&bytes)?)
     }
+}
+
+/// File of the picture of a pass.
+fn picture(folder: &Path, process: &str, pass: u32) -> PathBuf {
+    folder.join(format!("{process}-{pass}.rgba"))
 }
 
 fn file(folder: &Path, name: &str, extension: &str) -> PathBuf {
@@ -120,6 +128,13 @@ pub enum Event {
         lost_bytes: u64,
         /// Samples that each draw's occlusion query counted: number of the draw and count.
         occlusion: Vec<(u32, u64)>,
+    },
+    /// What a pass rendered, small: a file `PASS.rgba` beside the records' has its texels, row by row.
+    Picture {
+        /// Number of the pass.
+        pass: u32,
+        /// Width and height.
+        size: [u32; 2],
     },
     /// A frame ended.
     Frame {

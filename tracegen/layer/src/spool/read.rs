@@ -1,6 +1,6 @@
 //! Reading what the processes of a captured program left behind.
 
-use super::{EVENTS, Event, RECORDS, Span, file};
+use super::{EVENTS, Event, RECORDS, Span, file, picture};
 use crate::inject::{RawSample, UNIT_BYTES, Unit, unpack};
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -100,6 +100,17 @@ impl Process {
             })?;
             events.push(event);
         }
+    }
+
+    /// Texels of the picture of a pass.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn picture(&self, pass: u32) -> Result<Vec<u8>, ReadError> {
+        let folder = self.events.parent().unwrap_or(Path::new("."));
+        let name = (self.events.file_stem()).map(|name| name.to_string_lossy().into_owned());
+        let path = picture(folder, &name.unwrap_or_default(), pass);
+        fs::read(&path).map_err(|e| io_error(&path, e))
     }
 
     /// Its records.

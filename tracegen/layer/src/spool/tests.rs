@@ -76,6 +76,7 @@ fn settings_come_back() {
         frames_by: FramesBy::Present,
         occlusion: true,
         record_bytes: 1 << 20,
+        pictures: false,
         modules: None,
     };
     settings.save(folder.path()).unwrap();

@@ -1,6 +1,6 @@
 //! Writing a process's files.
 
-use super::{EVENTS, Event, RECORDS, Span, file};
+use super::{EVENTS, Event, RECORDS, Span, file, picture};
 use crate::inject::Unit;
 use std::collections::HashSet;
 use std::fs::{File, OpenOptions};
@@ -89,6 +89,16 @@ impl Writer {
         };
         self.written += span.count;
         Ok(span)
+    }
+
+    /// Writes the picture of a pass, and its event.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn picture(&mut self, pass: u32, size: [u32; 2], texels: &[u8]) -> io::Result<()> {
+        self.after_fork()?;
+        std::fs::write(picture(&self.folder, &self.pid.to_string(), pass), texels)?;
+        self.event(&Event::Picture { pass, size })
     }
 
     /// A process that was forked starts files of its own.

@@ -281,6 +281,13 @@ pub struct Commands {
 }
 
 impl Commands {
+    pub(super) fn numbered_from(first: u32) -> Self {
+        Self {
+            draws: first,
+            ..Self::default()
+        }
+    }
+
     /// Recording begins.
     pub fn begin(&mut self, buffer: u64, one_time: bool) {
         self.buffers.insert(buffer, CommandState::new(one_time));

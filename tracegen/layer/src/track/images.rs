@@ -8,6 +8,8 @@ use std::sync::Arc;
 /// Images, views and samplers by handle. Handles are used again, so images have numbers of their own.
 #[derive(Debug, Default)]
 pub struct Images {
+    /// Number of the first one.
+    first: u32,
     images: HashMap<u64, Arc<ImageInfo>>,
     /// By number, those that were destroyed too: a draw may be described later.
     numbered: Vec<Arc<ImageInfo>>,
@@ -16,6 +18,13 @@ pub struct Images {
 }
 
 impl Images {
+    pub(super) fn numbered_from(first: u32) -> Self {
+        Self {
+            first,
+            ..Self::default()
+        }
+    }
+
     /// An image was created.
     pub fn create(&mut self, image: vk::Image, info: &vk::ImageCreateInfo<'_>) {
         let size = [info.extent.width, info.extent.height, info.extent.depth];
@@ -52,7 +61,7 @@ impl Images {
     }
 
     fn add(&mut self, image: vk::Image, info: impl FnOnce(u32) -> ImageInfo) {
-        let info = Arc::new(info(self.numbered.len() as u32));
+        let info = Arc::new(info(self.first + self.numbered.len() as u32));
         self.numbered.push(Arc::clone(&info));
         self.images.insert(image.as_raw(), info);
     }
@@ -65,7 +74,16 @@ impl Images {
     /// An image by its number.
     #[must_use]
     pub fn numbered(&self, number: u32) -> Option<&Arc<ImageInfo>> {
-        self.numbered.get(number as usize)
+        let place = number.checked_sub(self.first)?;
+        self.numbered.get(place as usize)
+    }
+
+    /// Handle of an image that was not destroyed.
+    #[must_use]
+    pub fn handle(&self, number: u32) -> Option<vk::Image> {
+        let mut all = self.images.iter();
+        let found = all.find(|(_, image)| image.image == number);
+        found.map(|(handle, _)| vk::Image::from_raw(*handle))
     }
 
     /// An image by its handle.

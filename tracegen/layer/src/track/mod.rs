@@ -32,6 +32,20 @@ pub struct Tracker {
 }
 
 impl Tracker {
+    /// Of the device with a number in its process: what it numbers has numbers of its own there, too.
+    #[must_use]
+    pub fn of_device(device: u32) -> Self {
+        // More than any program makes of one kind.
+        let first = device << 26;
+        Self {
+            images: Images::numbered_from(first),
+            pipelines: Pipelines::numbered_from(first),
+            passes: Passes::numbered_from(first),
+            commands: Commands::numbered_from(first),
+            ..Self::default()
+        }
+    }
+
     /// What a draw of a command buffer is, with the next draw's number; `None` where no graphics pipeline is bound.
     pub fn draw(&mut self, command_buffer: u64, call: &Call) -> Option<DrawInfo> {
         let textures = self.textures(command_buffer)?;

@@ -43,6 +43,13 @@ pub struct Passes {
 }
 
 impl Passes {
+    pub(super) fn numbered_from(first: u32) -> Self {
+        Self {
+            begun: first,
+            ..Self::default()
+        }
+    }
+
     /// A render pass was created.
     pub fn create(&mut self, handle: vk::RenderPass, pass: RenderPass) {
         self.passes.insert(handle.as_raw(), pass);

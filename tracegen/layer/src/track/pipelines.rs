@@ -88,6 +88,14 @@ pub struct Pipelines {
 }
 
 impl Pipelines {
+    pub(super) fn numbered_from(first: u32) -> Self {
+        Self {
+            created: first,
+            shaders: first,
+            ..Self::default()
+        }
+    }
+
     /// A shader module was created.
     pub fn create_module(&mut self, module: vk::ShaderModule, words: &[u32]) {
         self.modules.insert(module.as_raw(), words.into());

@@ -125,8 +125,8 @@ impl<W: Write + Seek> Builder<W> {
     ) {
         for ((executed, role), weight) in draws.iter().zip(&views.roles).zip(weights) {
             let info = session.draw(executed.draw);
-            if *role == Role::Ignored {
-                self.leave_out("draws into other targets", 1, *weight);
+            if let Role::Other(other) = role {
+                self.leave_out(other.name(), 1, *weight);
             } else if let Some(why) = info.and_then(|info| info.unrecorded.as_ref()) {
                 self.leave_out(why, 1, *weight);
             } else if let Some(info) = info {
